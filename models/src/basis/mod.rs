@@ -1,0 +1,3 @@
+//! Functions in which forms are expanded.
+
+pub mod bspline;

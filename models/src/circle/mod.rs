@@ -1,0 +1,21 @@
+//! Circles through measured points: algebraic fits as seeds, the orthogonal-distance fit as the
+//! answer, and circularity from the least-squares, minimum-zone, inscribed and circumscribed
+//! reference circles (ISO 12181: LSCI, MZCI, MICI, MCCI).
+//!
+//! Positions are in mm; form deviations are in µm and carry `_um` in their names.
+
+mod algebraic;
+mod farthest;
+mod inscribed;
+mod nistir;
+mod orthogonal;
+mod points;
+mod simulate;
+mod zone;
+
+pub use algebraic::{AlgebraicFit, algebraic};
+pub use nistir::{NistirEnding, NistirFit, nistir_fit};
+pub use orthogonal::{CircleFit, OrthogonalCircle, orthogonal_fit};
+pub use points::{Circle, CircleError, Point, check_points};
+pub use simulate::{CircleSimulation, simulate};
+pub use zone::{Circularity, Reference, Zone, circularity, reference_zone};

@@ -1,0 +1,192 @@
+//! The paper's estimators applied to readings, and the totals over whole diagonals, equations (5) to
+//! (11).
+
+use super::components::{Component, Location};
+use super::diagonals::{Diagonal, Sequence, Target, WorkZone};
+use super::estimators::{ESTIMATORS, Estimator, Scale, cell};
+use super::readings::{DiagonalError, DiagonalReading, Edges, check};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// One estimator applied at every step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClosedForm {
+    /// Equation of the paper.
+    pub equation: String,
+    /// Target of the readings used.
+    pub target: Target,
+    /// The error that it stands for if angular errors and mirror misalignment vanish.
+    pub component: Option<Component>,
+    /// Value at each step i, µm or rad.
+    pub steps: Vec<f64>,
+    /// Standard uncertainty of each for readings with unit (1 µm) standard deviation.
+    pub step_gains: Vec<f64>,
+    /// Their sum from the first step on, at the grid positions: zero first.
+    pub profile: Vec<f64>,
+    /// Standard uncertainty of the sums for unit readings.
+    pub profile_gains: Vec<f64>,
+}
+
+/// Every estimator for which all edges were measured, in the order of [`ESTIMATORS`].
+///
+/// # Errors
+/// What [`DiagonalError`] lists for readings that cannot be placed.
+pub fn closed_forms(
+    zone: &WorkZone,
+    readings: &[DiagonalReading],
+) -> Result<Vec<ClosedForm>, DiagonalError> {
+    check(zone, readings)?;
+    let edges = Edges::of(readings);
+    Ok(ESTIMATORS
+        .iter()
+        .filter_map(|e| apply(e, zone, readings, &edges))
+        .collect())
+}
+
+fn apply(
+    estimator: &Estimator,
+    zone: &WorkZone,
+    readings: &[DiagonalReading],
+    edges: &Edges,
+) -> Option<ClosedForm> {
+    let divisor = (estimator.divisor)(&Scale::of(zone, estimator.is_body()));
+    let mut form = ClosedForm {
+        equation: estimator.equation.to_owned(),
+        target: estimator.target,
+        component: estimator.component(),
+        steps: Vec::new(),
+        step_gains: Vec::new(),
+        profile: vec![0.0],
+        profile_gains: vec![0.0],
+    };
+    let mut total: BTreeMap<usize, f64> = BTreeMap::new();
+    for i in 0..zone.steps {
+        let mut weights: BTreeMap<usize, f64> = BTreeMap::new();
+        for (corners, pattern, sign) in estimator.terms {
+            let (diagonal, index) = cell(pattern, i, zone.steps)?;
+            let mut letters = corners.chars();
+            let (from, to) = (letters.next()?, letters.next()?);
+            for (reading, w) in edges.weights(diagonal, estimator.target, index, from, to)? {
+                *weights.entry(reading).or_default() += sign * w / divisor;
+            }
+        }
+        for (reading, w) in &weights {
+            *total.entry(*reading).or_default() += w;
+        }
+        let (value, gain) = evaluate(&weights, readings);
+        form.steps.push(value);
+        form.step_gains.push(gain);
+        let (sum, gain) = evaluate(&total, readings);
+        form.profile.push(sum);
+        form.profile_gains.push(gain);
+    }
+    Some(form)
+}
+
+fn evaluate(weights: &BTreeMap<usize, f64>, readings: &[DiagonalReading]) -> (f64, f64) {
+    let value = weights.iter().map(|(&r, w)| w * readings[r].value).sum();
+    let gain = weights.values().map(|w| w * w).sum::<f64>().sqrt();
+    (value, gain)
+}
+
+/// What the total of the diagonals gives.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Total {
+    /// Equation (7): n·(changes of positioning over the travels, at lines through the centre), µm.
+    PositioningSum,
+    /// Equations (8) to (10) or the two face diagonals: the average squareness, the paper's S, rad.
+    Squareness(Location),
+}
+
+/// One estimate from whole diagonals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TotalsEstimate {
+    /// Equation of the paper; "two face diagonals" where it has none.
+    pub equation: String,
+    /// What it is.
+    pub quantity: Total,
+    /// Value, µm or rad.
+    pub value: f64,
+    /// Its standard uncertainty for a standard deviation of 1 µm in each total dD, as (11).
+    pub gain: f64,
+}
+
+/// The errors dD of whole diagonals, µm: reading at the last corner less that at the first, the mean
+/// over the runs.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct DiagonalTotals {
+    /// By diagonal: dD and the number of runs.
+    pub errors: BTreeMap<Diagonal, (f64, usize)>,
+    /// What they give.
+    pub estimates: Vec<TotalsEstimate>,
+}
+
+/// Equations (7) to (10) from four body diagonals, and the squareness of Y to X from two face
+/// diagonals, whichever were measured from end to end.
+///
+/// # Errors
+/// What [`DiagonalError`] lists for readings that cannot be placed.
+pub fn totals(
+    zone: &WorkZone,
+    readings: &[DiagonalReading],
+) -> Result<DiagonalTotals, DiagonalError> {
+    check(zone, readings)?;
+    let mut runs: BTreeMap<_, (Option<f64>, Option<f64>)> = BTreeMap::new();
+    for r in readings {
+        let stops = zone.stops(r.diagonal, Sequence::Together);
+        let ends = runs.entry(r.run()).or_default();
+        if stops.first() == Some(&r.at) {
+            ends.0 = Some(r.value);
+        }
+        if stops.last() == Some(&r.at) {
+            ends.1 = Some(r.value);
+        }
+    }
+    let mut errors: BTreeMap<Diagonal, (f64, usize)> = BTreeMap::new();
+    for ((diagonal, ..), ends) in runs {
+        if let (Some(first), Some(last)) = ends {
+            let entry = errors.entry(diagonal).or_default();
+            entry.0 += last - first;
+            entry.1 += 1;
+        }
+    }
+    for (sum, count) in errors.values_mut() {
+        *sum /= *count as f64;
+    }
+    let mut estimates = Vec::new();
+    let of = |d: Diagonal| errors.get(&d).map(|e| e.0);
+    if let [Some(ag), Some(bh), Some(ce), Some(df)] = Diagonal::BODY.map(of) {
+        let n = Scale::of(zone, true);
+        let length = n.d * zone.steps as f64;
+        let mut offer = |equation: &str, quantity, sum: f64, divisor: f64| {
+            estimates.push(TotalsEstimate {
+                equation: equation.to_owned(),
+                quantity,
+                value: sum / divisor,
+                gain: 2.0 / divisor.abs(),
+            });
+        };
+        let [x, y, z] = n.n;
+        offer("(7)", Total::PositioningSum, ag + bh + ce + df, 4.0);
+        for (equation, location, sum, product) in [
+            ("(8)", Location::YZ, -ag - bh + ce + df, y * z),
+            ("(9)", Location::XZ, -ag + bh + ce - df, x * z),
+            ("(10)", Location::XY, -ag + bh - ce + df, x * y),
+        ] {
+            let divisor = 4.0 * 1e3 * length * product;
+            offer(equation, Total::Squareness(location), sum, divisor);
+        }
+    }
+    if let [Some(ac), Some(db)] = Diagonal::FACE.map(of) {
+        // dD_AC − dD_DB = −2 nx ΔY S over the plane, with nx ΔY = nx ny D.
+        let n = Scale::of(zone, false);
+        let divisor = 2.0 * 1e3 * n.d * zone.steps as f64 * n.n[0] * n.n[1];
+        estimates.push(TotalsEstimate {
+            equation: "two face diagonals".to_owned(),
+            quantity: Total::Squareness(Location::XY),
+            value: (db - ac) / divisor,
+            gain: std::f64::consts::SQRT_2 / divisor.abs(),
+        });
+    }
+    Ok(DiagonalTotals { errors, estimates })
+}

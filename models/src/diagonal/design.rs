@@ -1,0 +1,238 @@
+//! The design matrix of a set of readings, its rank and its null space.
+
+use super::components::{Axis, Component, NodeKind};
+use super::diagonals::{Diagonal, Sequence, Target, WorkZone};
+use super::prediction::{Parameter, Unknowns, sensitivities};
+use super::readings::{DiagonalError, DiagonalReading, Run};
+use nalgebra::{DMatrix, DVector};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Singular values below this share of the greatest count as zero: the entries carry some 1e-13 of
+/// rounding, the least effect that a grid of twenty steps can show is about 1e-4.
+const RANK_TOLERANCE: f64 = 1e-9;
+
+/// µm that a rotation of 1 rad makes at a lever of 1 mm.
+const UM_PER_RAD_MM: f64 = 1e3;
+
+/// A design: rows of readings freed from the zero of their run, columns scaled to µm.
+#[derive(Debug, Clone)]
+pub(super) struct Design {
+    pub(super) unknowns: Unknowns,
+    /// Readings × parameters, per scaled parameter; each run has mean zero in every column.
+    pub(super) matrix: DMatrix<f64>,
+    /// A parameter is its scaled value times this: µm or rad.
+    pub(super) scale: DVector<f64>,
+    /// Runs, each of which costs one degree of freedom.
+    pub(super) runs: Vec<Run>,
+    /// Run of each reading.
+    pub(super) run_of: Vec<usize>,
+}
+
+/// Whether a parameter is zero by definition of where the errors are counted from: functions at
+/// corner A, straightness at both ends.
+pub(super) fn is_definition(parameter: Parameter, steps: usize) -> bool {
+    match parameter {
+        Parameter::Node(_, 0) => true,
+        Parameter::Node(component, index) => {
+            component.kind() == NodeKind::Straightness && index == steps
+        }
+        _ => false,
+    }
+}
+
+impl Design {
+    /// The design of `readings` in the parameters that `keep` accepts.
+    pub(super) fn of(
+        zone: &WorkZone,
+        readings: &[DiagonalReading],
+        keep: impl Fn(Parameter) -> bool,
+    ) -> Self {
+        let mut known = BTreeMap::new();
+        for r in readings {
+            known
+                .entry((r.diagonal, r.target, r.at))
+                .or_insert_with(|| sensitivities(zone, r.diagonal, r.target, r.at));
+        }
+        // An axis that stands still adds a constant rotation of the tool, which is mirror misalignment
+        // under another name.
+        let moves = |axis: Axis| {
+            readings
+                .iter()
+                .any(|r| r.diagonal.signs()[axis.index()] != 0)
+        };
+        let moving = Axis::ALL.map(moves);
+        let touched: BTreeSet<Parameter> = known
+            .values()
+            .flatten()
+            .map(|t| t.0)
+            .filter(|p| !matches!(p, Parameter::Node(c, _) if !moving[c.axis.index()]))
+            .filter(|&p| keep(p))
+            .collect();
+        let unknowns = Unknowns::of(touched);
+        let diagonal = zone.travel.iter().map(|t| t * t).sum::<f64>().sqrt();
+        let scale = DVector::from_iterator(
+            unknowns.parameters.len(),
+            unknowns.parameters.iter().map(|p| match p {
+                Parameter::Node(c, _) if !c.rotation => 1.0,
+                _ => 1.0 / (UM_PER_RAD_MM * diagonal),
+            }),
+        );
+        let mut runs: Vec<Run> = readings.iter().map(DiagonalReading::run).collect();
+        runs.sort_unstable();
+        runs.dedup();
+        let run_of: Vec<usize> = readings
+            .iter()
+            .map(|r| runs.partition_point(|run| *run < r.run()))
+            .collect();
+        let mut matrix = DMatrix::zeros(readings.len(), unknowns.parameters.len());
+        for (row, r) in readings.iter().enumerate() {
+            for (parameter, value) in known
+                .get(&(r.diagonal, r.target, r.at))
+                .into_iter()
+                .flatten()
+            {
+                if let Some(column) = unknowns.index_of(*parameter) {
+                    matrix[(row, column)] = value * scale[column];
+                }
+            }
+        }
+        let mut design = Self {
+            unknowns,
+            matrix,
+            scale,
+            runs,
+            run_of,
+        };
+        for column in 0..design.matrix.ncols() {
+            let mut values: DVector<f64> = design.matrix.column(column).into();
+            design.free_of_zero(&mut values);
+            design.matrix.set_column(column, &values);
+        }
+        design
+    }
+
+    /// Takes the mean of each run off: the unknown zero of the laser, eliminated.
+    pub(super) fn free_of_zero(&self, values: &mut DVector<f64>) {
+        let mut sums = vec![(0.0, 0.0); self.runs.len()];
+        for (value, &run) in values.iter().zip(&self.run_of) {
+            sums[run].0 += value;
+            sums[run].1 += 1.0;
+        }
+        for (value, &run) in values.iter_mut().zip(&self.run_of) {
+            *value -= sums[run].0 / sums[run].1;
+        }
+    }
+}
+
+/// Singular value decomposition of a tall matrix by way of its triangle, split at the rank.
+pub(super) struct Decomposition {
+    /// Right singular vectors with their singular values, greatest first, down to the rank.
+    pub(super) determined: Vec<(f64, DVector<f64>)>,
+    /// Orthonormal basis of the null space, n × nullity.
+    pub(super) null: DMatrix<f64>,
+}
+
+pub(super) fn decompose(matrix: &DMatrix<f64>) -> Result<Decomposition, DiagonalError> {
+    let n = matrix.ncols();
+    let triangle = if matrix.nrows() > n {
+        matrix.clone().qr().unpack_r()
+    } else {
+        let mut square = DMatrix::zeros(n, n);
+        square.rows_mut(0, matrix.nrows()).copy_from(matrix);
+        square
+    };
+    let svd = nalgebra::SVD::try_new(triangle, false, true, f64::EPSILON, 0).ok_or_else(|| {
+        DiagonalError::Numerical {
+            reason: "the singular values did not converge".to_owned(),
+        }
+    })?;
+    let v_t = svd.v_t.ok_or_else(|| DiagonalError::Numerical {
+        reason: "no singular vectors".to_owned(),
+    })?;
+    let greatest = svd.singular_values.iter().copied().fold(0.0, f64::max);
+    let mut determined = Vec::new();
+    let mut null = Vec::new();
+    for (i, &value) in svd.singular_values.iter().enumerate() {
+        let vector: DVector<f64> = v_t.row(i).transpose();
+        if value > RANK_TOLERANCE * greatest {
+            determined.push((value, vector));
+        } else {
+            null.push(vector);
+        }
+    }
+    let null = if null.is_empty() {
+        DMatrix::zeros(n, 0)
+    } else {
+        DMatrix::from_columns(&null)
+    };
+    Ok(Decomposition { determined, null })
+}
+
+/// How much a set of runs can determine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Identifiability {
+    /// Independent readings: stops less one per run, whose zero is arbitrary.
+    pub readings: usize,
+    /// Parameters that the readings touch, those of definition included.
+    pub parameters: usize,
+    /// Independent combinations that the readings determine.
+    pub rank: usize,
+    /// Parameters left once those of definition are taken as zero.
+    pub defined_parameters: usize,
+    /// The rank in those: the same, if the definitions cost nothing.
+    pub defined_rank: usize,
+}
+
+/// Counts for one run of each (diagonal, target, sequence).
+///
+/// # Errors
+/// [`DiagonalError::Numerical`] if the decomposition fails.
+pub fn identifiability(
+    zone: &WorkZone,
+    runs: &[(Diagonal, Target, Sequence)],
+) -> Result<Identifiability, DiagonalError> {
+    let readings = blank_readings(zone, runs);
+    let all = Design::of(zone, &readings, |_| true);
+    let defined = Design::of(zone, &readings, |p| !is_definition(p, zone.steps));
+    Ok(Identifiability {
+        readings: readings.len() - all.runs.len(),
+        parameters: all.unknowns.parameters.len(),
+        rank: decompose(&all.matrix)?.determined.len(),
+        defined_parameters: defined.unknowns.parameters.len(),
+        defined_rank: decompose(&defined.matrix)?.determined.len(),
+    })
+}
+
+/// Readings of value zero at every stop of the runs.
+pub(super) fn blank_readings(
+    zone: &WorkZone,
+    runs: &[(Diagonal, Target, Sequence)],
+) -> Vec<DiagonalReading> {
+    runs.iter()
+        .flat_map(|&(diagonal, target, sequence)| {
+            zone.stops(diagonal, sequence)
+                .into_iter()
+                .map(move |at| DiagonalReading {
+                    diagonal,
+                    target,
+                    sequence,
+                    repeat: 1,
+                    at,
+                    value: 0.0,
+                })
+        })
+        .collect()
+}
+
+/// Places of the free nodes of a component, in order of their grid index.
+pub(super) fn nodes_of(unknowns: &Unknowns, component: Component) -> Vec<(usize, usize)> {
+    unknowns
+        .parameters
+        .iter()
+        .enumerate()
+        .filter_map(|(place, p)| match p {
+            Parameter::Node(c, index) if *c == component => Some((place, *index)),
+            _ => None,
+        })
+        .collect()
+}

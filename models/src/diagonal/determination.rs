@@ -1,0 +1,332 @@
+//! What a null space means: which errors are determined, which cannot be told apart, and which further
+//! measurement would settle it.
+
+use super::components::{Axis, Component, Location, NodeKind};
+use super::design::nodes_of;
+use super::prediction::{Parameter, Unknowns};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use serde::{Deserialize, Serialize};
+
+/// Squared length below which part of an orthonormal null vector counts as none. Null vectors are
+/// known to about 1e-11; what a set-up really confounds shows with more than 1e-4.
+const NOTHING: f64 = 1e-12;
+
+/// How far the readings determine an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Determined {
+    /// Wholly, counted from its definition.
+    Wholly,
+    /// All but a straight line.
+    ShapeOnly,
+    /// Some combinations of its values.
+    Partly,
+    /// No combination of its own values.
+    Nothing,
+    /// The readings do not depend on it.
+    NotTouched,
+}
+
+impl Determined {
+    /// For people.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Wholly => "determined",
+            Self::ShapeOnly => "shape only, slope not",
+            Self::Partly => "in part",
+            Self::Nothing => "not determined",
+            Self::NotTouched => "not touched by the readings",
+        }
+    }
+}
+
+/// Errors that the readings cannot tell apart.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Ambiguity {
+    /// The least set found: leaving out any one of them removes the ambiguity.
+    pub members: Vec<String>,
+    /// One sentence for a person.
+    pub statement: String,
+}
+
+/// A further measurement and what it would settle.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Remedy {
+    /// What to measure.
+    pub measure: String,
+    /// What the readings would then determine.
+    pub settles: Vec<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    Whole,
+    Slope,
+    Shape,
+}
+
+/// A group of parameters that people name as one thing.
+#[derive(Debug, Clone)]
+struct Block {
+    name: String,
+    rows: Vec<usize>,
+    line: DVector<f64>,
+    part: Part,
+    /// The later, the rather kept when an ambiguity is reduced to its least set.
+    rank: u8,
+}
+
+impl Block {
+    /// Coordinates of the columns of `basis` within this block.
+    fn coordinates(&self, basis: &DMatrix<f64>) -> DMatrix<f64> {
+        let own = basis.select_rows(&self.rows);
+        let along = DMatrix::from_columns(std::slice::from_ref(&self.line));
+        match self.part {
+            Part::Whole => own,
+            Part::Slope => along.tr_mul(&own),
+            Part::Shape => &own - &along * along.tr_mul(&own),
+        }
+    }
+
+    fn moved_by(&self, basis: &DMatrix<f64>) -> bool {
+        self.coordinates(basis).norm_squared() > NOTHING
+    }
+}
+
+fn blocks(unknowns: &Unknowns) -> Vec<Block> {
+    let mut found = Vec::new();
+    let mut add = |name: String, rows: Vec<usize>, line: DVector<f64>, part, rank| {
+        if !rows.is_empty() {
+            found.push(Block {
+                name,
+                rows,
+                line,
+                part,
+                rank,
+            });
+        }
+    };
+    for component in Component::all() {
+        let nodes = nodes_of(unknowns, component);
+        let rows: Vec<usize> = nodes.iter().map(|n| n.0).collect();
+        let line = line_of(&nodes);
+        match component.kind() {
+            NodeKind::Angular => add(component.words(), rows, line, Part::Whole, 0),
+            NodeKind::Straightness => add(component.words(), rows, line, Part::Whole, 1),
+            NodeKind::Positioning => {
+                let axis = component.axis.letter();
+                if rows.len() > 1 {
+                    let name = format!("shape of the positioning of {axis}");
+                    add(name, rows.clone(), line.clone(), Part::Shape, 2);
+                }
+                add(
+                    format!("positioning slope of {axis}"),
+                    rows,
+                    line,
+                    Part::Slope,
+                    5,
+                );
+            }
+        }
+    }
+    for location in Location::ALL {
+        let rows = unknowns
+            .index_of(Parameter::Squareness(location))
+            .into_iter()
+            .collect();
+        add(
+            location.words().to_owned(),
+            rows,
+            DVector::zeros(1),
+            Part::Whole,
+            3,
+        );
+    }
+    let mirrors: Vec<usize> = unknowns
+        .parameters
+        .iter()
+        .enumerate()
+        .filter(|(_, p)| matches!(p, Parameter::Mirror(..)))
+        .map(|(place, _)| place)
+        .collect();
+    let line = DVector::zeros(mirrors.len());
+    add(
+        "mirror misalignment".to_owned(),
+        mirrors,
+        line,
+        Part::Whole,
+        4,
+    );
+    found
+}
+
+/// Unit vector of a straight line through zero at the origin over the free nodes.
+pub(super) fn line_of(nodes: &[(usize, usize)]) -> DVector<f64> {
+    let line = DVector::from_iterator(nodes.len(), nodes.iter().map(|n| n.1 as f64));
+    let length = line.norm();
+    if length > 0.0 { line / length } else { line }
+}
+
+/// The part of a null basis that leaves a block alone.
+fn without(basis: &DMatrix<f64>, block: &Block) -> DMatrix<f64> {
+    if basis.ncols() == 0 {
+        return basis.clone();
+    }
+    let part = block.coordinates(basis);
+    if part.norm_squared() <= NOTHING {
+        return basis.clone();
+    }
+    let eigen = SymmetricEigen::new(part.transpose() * part);
+    let kept: Vec<DVector<f64>> = (0..basis.ncols())
+        .filter(|&i| eigen.eigenvalues[i] <= NOTHING)
+        .map(|i| basis * eigen.eigenvectors.column(i))
+        .collect();
+    if kept.is_empty() {
+        DMatrix::zeros(basis.nrows(), 0)
+    } else {
+        DMatrix::from_columns(&kept)
+    }
+}
+
+/// How far one component is determined, and an orthonormal basis (free nodes × lost) of the
+/// combinations of its own values that are not.
+pub(super) fn determination(
+    unknowns: &Unknowns,
+    null: &DMatrix<f64>,
+    component: Component,
+) -> (Determined, DMatrix<f64>) {
+    let nodes = nodes_of(unknowns, component);
+    let rows: Vec<usize> = nodes.iter().map(|n| n.0).collect();
+    if rows.is_empty() {
+        return (Determined::NotTouched, DMatrix::zeros(0, 0));
+    }
+    let own = null.select_rows(&rows);
+    let eigen = SymmetricEigen::new(&own * own.transpose());
+    let lost: Vec<DVector<f64>> = (0..rows.len())
+        .filter(|&i| eigen.eigenvalues[i] > NOTHING)
+        .map(|i| eigen.eigenvectors.column(i).into_owned())
+        .collect();
+    let determined = match &lost[..] {
+        [] => Determined::Wholly,
+        all if all.len() == rows.len() => Determined::Nothing,
+        [only]
+            if component.kind() != NodeKind::Straightness
+                && only.dot(&line_of(&nodes)).abs() > 1.0 - 1e-6 =>
+        {
+            Determined::ShapeOnly
+        }
+        _ => Determined::Partly,
+    };
+    let lost = if lost.is_empty() {
+        DMatrix::zeros(rows.len(), 0)
+    } else {
+        DMatrix::from_columns(&lost)
+    };
+    (determined, lost)
+}
+
+/// The ambiguities, each reduced to a least set, without repetition.
+pub(super) fn ambiguities(unknowns: &Unknowns, null: &DMatrix<f64>) -> Vec<Ambiguity> {
+    let all = blocks(unknowns);
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    order.sort_by_key(|&b| all[b].rank);
+    let mut found: Vec<(Vec<usize>, Ambiguity)> = Vec::new();
+    for &subject in order.iter().rev() {
+        if !all[subject].moved_by(null) {
+            continue;
+        }
+        let mut basis = null.clone();
+        let mut members: Vec<usize> = (0..all.len()).collect();
+        for &candidate in &order {
+            if candidate == subject {
+                continue;
+            }
+            let reduced = without(&basis, &all[candidate]);
+            if reduced.ncols() > 0 && all[subject].moved_by(&reduced) {
+                basis = reduced;
+                members.retain(|&m| m != candidate);
+            }
+        }
+        members.retain(|&m| all[m].moved_by(&basis));
+        if found.iter().all(|(known, _)| *known != members) {
+            let ambiguity = describe(&members.iter().map(|&m| &all[m]).collect::<Vec<_>>());
+            found.push((members, ambiguity));
+        }
+    }
+    found.into_iter().map(|f| f.1).collect()
+}
+
+fn describe(members: &[&Block]) -> Ambiguity {
+    let names: Vec<String> = members.iter().map(|b| b.name.clone()).collect();
+    let slopes = members.iter().filter(|b| b.part == Part::Slope).count();
+    let rotations: Vec<&str> = members
+        .iter()
+        .filter(|b| b.rank == 0)
+        .map(|b| b.name.as_str())
+        .collect();
+    let advice = if slopes > 0 && rotations.is_empty() {
+        "measure one slope".to_owned()
+    } else if rotations.is_empty() {
+        "measure one of them by other means".to_owned()
+    } else {
+        format!(
+            "measure the {} directly, or add readings with the other target",
+            list(&rotations)
+        )
+    };
+    let text: Vec<&str> = names.iter().map(String::as_str).collect();
+    let statement = match text[..] {
+        [only] => format!("{only} has no effect on the readings: {advice}"),
+        _ => format!("{} cannot be told apart: {advice}", list(&text)),
+    };
+    Ambiguity {
+        members: names,
+        statement,
+    }
+}
+
+/// "a", "a and b", "a, b and c".
+fn list(items: &[&str]) -> String {
+    match items {
+        [] => String::new(),
+        [only] => (*only).to_owned(),
+        [head @ .., last] => format!("{} and {last}", head.join(", ")),
+    }
+}
+
+/// What each single further measurement would settle; those that settle nothing are left out.
+pub(super) fn remedies(unknowns: &Unknowns, null: &DMatrix<f64>) -> Vec<Remedy> {
+    let all = blocks(unknowns);
+    all.iter()
+        .filter(|b| b.rank == 0 || b.part == Part::Slope)
+        .filter(|b| b.moved_by(null))
+        .filter_map(|known| {
+            let rest = without(null, known);
+            let settles: Vec<String> = all
+                .iter()
+                .filter(|b| b.moved_by(null) && !b.moved_by(&rest) && b.name != known.name)
+                .map(|b| b.name.clone())
+                .collect();
+            (!settles.is_empty()).then(|| Remedy {
+                measure: known.name.clone(),
+                settles,
+            })
+        })
+        .collect()
+}
+
+/// Gradient of the positioning slope of an axis in µm/mm by end points, in its free nodes.
+pub(super) fn end_slope(
+    unknowns: &Unknowns,
+    axis: Axis,
+    travel: f64,
+    steps: usize,
+) -> Option<(usize, f64)> {
+    let component = Component {
+        rotation: false,
+        direction: axis,
+        axis,
+    };
+    let place = unknowns.index_of(Parameter::Node(component, steps))?;
+    Some((place, 1.0 / travel))
+}

@@ -1,0 +1,152 @@
+//! The reading as a linear function of the 21 errors and the mirror angles: equations (1) and (4).
+
+use super::components::{Axis, Component, Location};
+use super::diagonals::{Diagonal, Target, WorkZone};
+use super::errors::ErrorTables;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// µm of a lever of 1 mm turned by 1 rad.
+const UM_PER_RAD_MM: f64 = 1e3;
+
+/// One unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Parameter {
+    /// Value of an error function at a grid index, µm or rad.
+    Node(Component, usize),
+    /// The paper's S of a pair of axes, rad.
+    Squareness(Location),
+    /// Misalignment of the mirror of a set-up about one of [`Diagonal::mirror_axes`], rad.
+    Mirror(Diagonal, Target, usize),
+}
+
+/// The unknowns that the readings touch, with their places in the parameter vector.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unknowns {
+    /// The parameters in order.
+    pub parameters: Vec<Parameter>,
+}
+
+impl Unknowns {
+    /// Place of a parameter.
+    pub fn index_of(&self, parameter: Parameter) -> Option<usize> {
+        self.parameters.binary_search(&parameter).ok()
+    }
+
+    /// The set of some parameters, sorted.
+    pub fn of(parameters: impl IntoIterator<Item = Parameter>) -> Self {
+        let mut parameters: Vec<Parameter> = parameters.into_iter().collect();
+        parameters.sort_unstable();
+        parameters.dedup();
+        Self { parameters }
+    }
+}
+
+/// Equation (4) for the reading at grid indices `at` relative to the start of the diagonal: the
+/// parameters it depends on and how, µm per µm or µm per rad.
+///
+/// e(p₃) − e(p₁) along the beam, and the offset of the beam on the mirror, p₁ − p₃, turned by the
+/// tool's rotations (mirror only) and by the misalignment. p₁ may be any point of the beam, because
+/// n·(ε × n) = 0; here it is the start of the diagonal.
+pub(super) fn sensitivities(
+    zone: &WorkZone,
+    diagonal: Diagonal,
+    target: Target,
+    at: [usize; 3],
+) -> Vec<(Parameter, f64)> {
+    let n = diagonal.direction(zone);
+    let start = zone.stops(diagonal, super::Sequence::Together)[0];
+    let (p3, p1) = (zone.position(at), zone.position(start));
+    let offset = p1 - p3;
+    let mut terms: Vec<(Parameter, f64)> = Vec::new();
+    for component in Component::all() {
+        let (a, c) = (component.axis.index(), component.direction.index());
+        let unit = Vector3::ith(c, 1.0);
+        if component.rotation {
+            let here = n.dot(&unit.cross(&lever(component.axis, p3)));
+            let there = n.dot(&unit.cross(&lever(component.axis, p1)));
+            let seen = match target {
+                Target::Mirror => n.dot(&unit.cross(&offset)),
+                Target::RetroReflector => 0.0,
+            };
+            terms.push((
+                Parameter::Node(component, at[a]),
+                UM_PER_RAD_MM * (here + seen),
+            ));
+            terms.push((Parameter::Node(component, start[a]), -UM_PER_RAD_MM * there));
+        } else {
+            terms.push((Parameter::Node(component, at[a]), n[c]));
+            terms.push((Parameter::Node(component, start[a]), -n[c]));
+        }
+    }
+    for location in Location::ALL {
+        let moved = squareness_shift(location, p3) - squareness_shift(location, p1);
+        terms.push((
+            Parameter::Squareness(location),
+            UM_PER_RAD_MM * n.dot(&moved),
+        ));
+    }
+    for (k, axis) in diagonal.mirror_axes(zone).into_iter().enumerate() {
+        terms.push((
+            Parameter::Mirror(diagonal, target, k),
+            UM_PER_RAD_MM * n.dot(&axis.cross(&offset)),
+        ));
+    }
+    merge(terms)
+}
+
+/// From the slide's own origin to the tool: (0, y, z) for X, (0, 0, z) for Y, none for Z.
+fn lever(axis: Axis, p: Vector3<f64>) -> Vector3<f64> {
+    match axis {
+        Axis::X => Vector3::new(0.0, p.y, p.z),
+        Axis::Y => Vector3::new(0.0, 0.0, p.z),
+        Axis::Z => Vector3::zeros(),
+    }
+}
+
+fn squareness_shift(location: Location, p: Vector3<f64>) -> Vector3<f64> {
+    match location {
+        Location::XY => Vector3::new(-p.y, 0.0, 0.0),
+        Location::XZ => Vector3::new(-p.z, 0.0, 0.0),
+        Location::YZ => Vector3::new(0.0, -p.z, 0.0),
+    }
+}
+
+fn merge(mut terms: Vec<(Parameter, f64)>) -> Vec<(Parameter, f64)> {
+    terms.sort_by_key(|t| t.0);
+    let mut merged: Vec<(Parameter, f64)> = Vec::with_capacity(terms.len());
+    for (parameter, value) in terms {
+        match merged.last_mut() {
+            Some(last) if last.0 == parameter => last.1 += value,
+            _ => merged.push((parameter, value)),
+        }
+    }
+    // What cancels leaves only rounding of levers of the size of the zone.
+    merged.retain(|t| t.1.abs() > 1e-9);
+    merged
+}
+
+/// The reading that the linear model predicts, µm.
+pub fn predicted_reading(
+    zone: &WorkZone,
+    errors: &ErrorTables,
+    diagonal: Diagonal,
+    target: Target,
+    mirror: Vector3<f64>,
+    at: [usize; 3],
+) -> f64 {
+    let axes = diagonal.mirror_axes(zone);
+    sensitivities(zone, diagonal, target, at)
+        .into_iter()
+        .map(|(parameter, coefficient)| {
+            let value = match parameter {
+                Parameter::Node(component, index) => {
+                    errors.of(component).get(index).copied().unwrap_or(0.0)
+                }
+                Parameter::Squareness(location) => errors.squareness_of(location),
+                Parameter::Mirror(_, _, k) => axes.get(k).map_or(0.0, |axis| axis.dot(&mirror)),
+            };
+            coefficient * value
+        })
+        .sum()
+}

@@ -1,0 +1,222 @@
+//! Readings along diagonals and the single-axis edges between them.
+
+use super::components::Axis;
+use super::diagonals::{Diagonal, Sequence, Target, WorkZone};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// One reading of the laser.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DiagonalReading {
+    /// Diagonal along which the beam runs.
+    pub diagonal: Diagonal,
+    /// What the tool carries.
+    pub target: Target,
+    /// Order of the motions.
+    pub sequence: Sequence,
+    /// Repeat number, from 1.
+    pub repeat: u32,
+    /// Grid indices of the machine position.
+    pub at: [usize; 3],
+    /// Displacement read less the nominal one, µm.
+    pub value: f64,
+}
+
+/// One run: readings whose laser was zeroed once.
+pub(super) type Run = (Diagonal, Target, Sequence, u32);
+
+impl DiagonalReading {
+    pub(super) fn run(&self) -> Run {
+        (self.diagonal, self.target, self.sequence, self.repeat)
+    }
+}
+
+/// Why readings cannot be used.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum DiagonalError {
+    /// Nothing to work on.
+    #[error("there are no readings")]
+    NoReadings,
+    /// A work zone without volume or steps.
+    #[error(
+        "the work zone {} × {} × {} mm with {} steps makes no grid: every travel used must be positive, with at least one step",
+        travel[0], travel[1], travel[2], steps
+    )]
+    Zone {
+        /// Travel, mm.
+        travel: [f64; 3],
+        /// Steps on each axis.
+        steps: usize,
+    },
+    /// A reading is NaN or infinite.
+    #[error("reading {} is not finite", index + 1)]
+    NotFinite {
+        /// Place in the list, from 0.
+        index: usize,
+    },
+    /// A position that the diagonal's steps do not reach.
+    #[error(
+        "reading {}: position {at:?} (in steps) is no stop of diagonal {} in sequence {}",
+        index + 1, diagonal.name(), sequence.name()
+    )]
+    OffPath {
+        /// Place in the list, from 0.
+        index: usize,
+        /// Grid indices.
+        at: [usize; 3],
+        /// Diagonal.
+        diagonal: Diagonal,
+        /// Sequence.
+        sequence: Sequence,
+    },
+    /// The same stop twice in one run.
+    #[error(
+        "reading {} repeats a stop of diagonal {}, sequence {}, repeat {repeat}: number the repeats",
+        index + 1, diagonal.name(), sequence.name()
+    )]
+    Duplicate {
+        /// Place in the list, from 0.
+        index: usize,
+        /// Diagonal.
+        diagonal: Diagonal,
+        /// Sequence.
+        sequence: Sequence,
+        /// Repeat.
+        repeat: u32,
+    },
+    /// A measured quantity whose standard uncertainty is not positive.
+    #[error("the standard uncertainty of the measured {what} must be greater than zero")]
+    MeasuredUncertainty {
+        /// The quantity.
+        what: String,
+    },
+    /// The regression could not be computed.
+    #[error("the regression failed: {reason}")]
+    Numerical {
+        /// What failed.
+        reason: String,
+    },
+}
+
+/// Refuses readings that the analysis cannot place.
+pub(super) fn check(zone: &WorkZone, readings: &[DiagonalReading]) -> Result<(), DiagonalError> {
+    if readings.is_empty() {
+        return Err(DiagonalError::NoReadings);
+    }
+    let body = readings.iter().any(|r| r.diagonal.is_body());
+    let used = if body { 3 } else { 2 };
+    if zone.steps == 0
+        || zone.travel[..used]
+            .iter()
+            .any(|t| !(*t > 0.0 && t.is_finite()))
+    {
+        return Err(DiagonalError::Zone {
+            travel: zone.travel,
+            steps: zone.steps,
+        });
+    }
+    let mut seen = std::collections::BTreeSet::new();
+    let mut paths: BTreeMap<(Diagonal, Sequence), Vec<[usize; 3]>> = BTreeMap::new();
+    for (index, r) in readings.iter().enumerate() {
+        if !r.value.is_finite() {
+            return Err(DiagonalError::NotFinite { index });
+        }
+        let stops = paths
+            .entry((r.diagonal, r.sequence))
+            .or_insert_with(|| zone.stops(r.diagonal, r.sequence));
+        if !stops.contains(&r.at) {
+            return Err(DiagonalError::OffPath {
+                index,
+                at: r.at,
+                diagonal: r.diagonal,
+                sequence: r.sequence,
+            });
+        }
+        if !seen.insert((r.run(), r.at)) {
+            return Err(DiagonalError::Duplicate {
+                index,
+                diagonal: r.diagonal,
+                sequence: r.sequence,
+                repeat: r.repeat,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// One motion of one axis: the run it belongs to, where it begins, which axis moves.
+type Motion = (Diagonal, Target, [usize; 3], Axis);
+
+/// The readings at both ends of every single-axis motion, the lower end first.
+#[derive(Debug, Clone, Default)]
+pub struct Edges {
+    ends: BTreeMap<Motion, Vec<(usize, usize)>>,
+}
+
+impl Edges {
+    /// Finds the edges of all runs.
+    pub fn of(readings: &[DiagonalReading]) -> Self {
+        let mut runs: BTreeMap<Run, BTreeMap<[usize; 3], usize>> = BTreeMap::new();
+        for (index, r) in readings.iter().enumerate() {
+            runs.entry(r.run()).or_default().insert(r.at, index);
+        }
+        let mut edges = Self::default();
+        for ((diagonal, target, _, _), stops) in &runs {
+            for (&at, &low) in stops {
+                for axis in Axis::ALL {
+                    let mut next = at;
+                    next[axis.index()] += 1;
+                    if let Some(&high) = stops.get(&next) {
+                        edges
+                            .ends
+                            .entry((*diagonal, *target, at, axis))
+                            .or_default()
+                            .push((low, high));
+                    }
+                }
+            }
+        }
+        edges
+    }
+
+    /// dd_PQ of a cell, as weights on readings: the mean over the runs that hold the edge. `from` and
+    /// `to` are the letters of its corners, A to H.
+    pub fn weights(
+        &self,
+        diagonal: Diagonal,
+        target: Target,
+        cell: [usize; 3],
+        from: char,
+        to: char,
+    ) -> Option<Vec<(usize, f64)>> {
+        let (p, q) = (corner(from)?, corner(to)?);
+        let axis = Axis::ALL.into_iter().find(|a| {
+            let a = a.index();
+            p[a] != q[a] && (0..3).all(|b| b == a || p[b] == q[b])
+        })?;
+        let forward = q[axis.index()] > p[axis.index()];
+        let low: [usize; 3] = std::array::from_fn(|a| cell[a] + p[a].min(q[a]));
+        let ends = self.ends.get(&(diagonal, target, low, axis))?;
+        let share = if forward { 1.0 } else { -1.0 } / ends.len() as f64;
+        Some(
+            ends.iter()
+                .flat_map(|&(l, h)| [(h, share), (l, -share)])
+                .collect(),
+        )
+    }
+}
+
+fn corner(letter: char) -> Option<[usize; 3]> {
+    Some(match letter {
+        'A' => [0, 0, 0],
+        'B' => [1, 0, 0],
+        'C' => [1, 1, 0],
+        'D' => [0, 1, 0],
+        'E' => [0, 0, 1],
+        'F' => [1, 0, 1],
+        'G' => [1, 1, 1],
+        'H' => [0, 1, 1],
+        _ => return None,
+    })
+}

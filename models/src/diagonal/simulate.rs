@@ -1,0 +1,132 @@
+//! Step-diagonal data of a machine with known errors.
+
+use super::components::{Component, NodeKind};
+use super::diagonals::{Diagonal, Sequence, Target, WorkZone};
+use super::errors::ErrorTables;
+use super::geometry::exact_reading;
+use super::readings::DiagonalReading;
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What to simulate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DiagonalSimulation {
+    /// The box.
+    pub zone: WorkZone,
+    /// Diagonals measured.
+    pub diagonals: Vec<Diagonal>,
+    /// Targets, each with all diagonals and sequences.
+    pub targets: Vec<Target>,
+    /// Sequences measured.
+    pub sequences: Vec<Sequence>,
+    /// Repeats of each run.
+    pub repeats: u32,
+    /// Size of the translational errors, µm.
+    pub translation: f64,
+    /// Size of the angular and squareness errors, rad.
+    pub rotation: f64,
+    /// Standard deviation of the mirror's misalignment about each direction, rad.
+    pub mirror: f64,
+    /// Standard deviation of each reading, µm.
+    pub noise: f64,
+}
+
+impl Default for DiagonalSimulation {
+    fn default() -> Self {
+        Self {
+            zone: WorkZone {
+                travel: [600.0, 500.0, 400.0],
+                steps: 5,
+            },
+            diagonals: Diagonal::BODY.to_vec(),
+            targets: vec![Target::Mirror],
+            sequences: Sequence::STEPS.to_vec(),
+            repeats: 1,
+            translation: 5.0,
+            rotation: 20e-6,
+            mirror: 50e-6,
+            noise: 0.2,
+        }
+    }
+}
+
+/// Angles (rad) of the reflector of each set-up out of its nominal direction.
+pub type Misalignments = BTreeMap<(Diagonal, Target), Vector3<f64>>;
+
+/// Readings by exact geometry, the errors they were made of and the misalignment of each set-up.
+pub fn simulate(
+    what: &DiagonalSimulation,
+    seed: u64,
+) -> (Vec<DiagonalReading>, ErrorTables, Misalignments) {
+    let zone = &what.zone;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let errors = random_errors(zone, what.translation, what.rotation, &mut rng);
+    let mut mirrors = BTreeMap::new();
+    let mut readings = Vec::new();
+    for &target in &what.targets {
+        for &diagonal in &what.diagonals {
+            let mirror = Vector3::from_fn(|_, _| what.mirror * normal(&mut rng));
+            mirrors.insert((diagonal, target), mirror);
+            for &sequence in &what.sequences {
+                for repeat in 1..=what.repeats.max(1) {
+                    for at in distinct(zone.stops(diagonal, sequence)) {
+                        let exact = exact_reading(zone, &errors, diagonal, target, mirror, at);
+                        readings.push(DiagonalReading {
+                            diagonal,
+                            target,
+                            sequence,
+                            repeat,
+                            at,
+                            value: exact + what.noise * normal(&mut rng),
+                        });
+                    }
+                }
+            }
+        }
+    }
+    (readings, errors, mirrors)
+}
+
+fn distinct(mut stops: Vec<[usize; 3]>) -> Vec<[usize; 3]> {
+    stops.dedup();
+    stops
+}
+
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// A slope, a bend and a wave in each function; zero at corner A, straightness zero at both ends.
+fn random_errors(
+    zone: &WorkZone,
+    translation: f64,
+    rotation: f64,
+    rng: &mut ChaCha8Rng,
+) -> ErrorTables {
+    let mut errors = ErrorTables::zero(zone);
+    for component in Component::all() {
+        let size = if component.rotation {
+            rotation
+        } else {
+            translation
+        };
+        let (slope, bend, wave) = (normal(rng), normal(rng), normal(rng));
+        let phase = rng.random_range(0.0..std::f64::consts::TAU);
+        let shape = |t: f64| slope * t + bend * t * t + 0.5 * wave * (9.0 * t + phase).sin();
+        let (first, last) = (shape(0.0), shape(1.0));
+        let chord = match component.kind() {
+            NodeKind::Straightness => last - first,
+            NodeKind::Positioning | NodeKind::Angular => 0.0,
+        };
+        for (i, value) in errors.of_mut(component).iter_mut().enumerate() {
+            let t = i as f64 / zone.steps as f64;
+            *value = size * (shape(t) - first - chord * t);
+        }
+    }
+    errors.squareness = std::array::from_fn(|_| rotation * normal(rng));
+    errors
+}

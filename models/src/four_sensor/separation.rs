@@ -1,0 +1,187 @@
+//! Surface, straightness and tilt from the outputs.
+
+use errsep_solvers::regularization::{Decomposition, Penalty};
+use nalgebra::{DMatrix, DVector};
+
+use super::frame::Frame;
+use super::gauge::section;
+use super::{
+    Choice, Chosen, FourSensorError, Geometry, Line, Outputs, Parabola, Penalised, choice, direct,
+};
+use crate::uncertainty::DegreesOfFreedom;
+
+/// How outputs are separated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// How λ is chosen.
+    pub choice: Choice,
+    /// Standard deviation of one reading, µm; estimated from the residuals where absent.
+    pub noise: Option<f64>,
+    /// Where the parabola comes from.
+    pub parabola: Parabola,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            choice: Choice::LCurve,
+            noise: None,
+            parabola: Parabola::LeastNorm,
+        }
+    }
+}
+
+/// Values along x with what is known of their errors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// Values: µm, for a tilt rad.
+    pub values: DVector<f64>,
+    /// Standard deviations from the noise of the readings; the penalty's pull is not in them, nor
+    /// is the parabola's where it was assumed.
+    pub std: DVector<f64>,
+    /// The penalty's pull if the truth were the estimate.
+    pub bias: DVector<f64>,
+    /// The largest pull of a truth whose ‖Lf‖ is that of the estimate.
+    pub bias_bound: DVector<f64>,
+}
+
+/// Outputs separated into what they are made of.
+#[derive(Debug, Clone)]
+pub struct Separation {
+    /// f at the surface positions, µm, length N.
+    pub surface: Profile,
+    /// S at the slide positions, µm, length K.
+    pub straightness: Profile,
+    /// γ at the slide positions, rad, length K; its mean goes with e₄ = 0.
+    pub tilt: Profile,
+    /// e of the four sensors, µm, with e₁ = e₄ = 0.
+    pub zero_adjustment: [f64; 4],
+    /// Output less model, µm, one row a slide position.
+    pub residuals: Vec<[f64; 4]>,
+    /// The standard deviation of one reading used, µm.
+    pub noise: f64,
+    /// Whether it was estimated from the residuals.
+    pub noise_estimated: bool,
+    /// How well that is known: infinite where it was stated.
+    pub degrees_of_freedom: Option<DegreesOfFreedom>,
+    /// λ and how it came about.
+    pub chosen: Chosen,
+    /// Coefficient of x² that was given to the surface, µm/mm².
+    pub curvature: f64,
+}
+
+/// The direct system of one geometry, decomposed once for any number of outputs.
+#[derive(Debug, Clone)]
+pub struct Separator {
+    geometry: Geometry,
+    line: Line,
+    section: DMatrix<f64>,
+    decomposition: Decomposition,
+}
+
+impl Separator {
+    /// Decomposes the direct system with a penalty on the surface counted from a line; N³
+    /// operations, for up to a thousand points or two.
+    ///
+    /// # Errors
+    /// The decomposition did not converge.
+    pub fn new(
+        geometry: &Geometry,
+        penalised: Penalised,
+        line: Line,
+    ) -> Result<Self, FourSensorError> {
+        let section = section(geometry, line);
+        let matrix = direct::matrix(geometry) * &section;
+        let penalty = direct::penalty(geometry, penalised) * &section;
+        Ok(Self {
+            geometry: *geometry,
+            line,
+            decomposition: Decomposition::general(&matrix, &Penalty::Custom(penalty))?,
+            section,
+        })
+    }
+
+    /// The decomposed system.
+    pub fn decomposition(&self) -> &Decomposition {
+        &self.decomposition
+    }
+
+    /// Separates outputs.
+    ///
+    /// # Errors
+    /// The outputs belong to another geometry; a stated value is not finite; the system has no
+    /// range of λ to choose from.
+    pub fn separate(
+        &self,
+        outputs: &Outputs,
+        settings: &Settings,
+    ) -> Result<Separation, FourSensorError> {
+        if outputs.geometry() != &self.geometry {
+            return Err(FourSensorError::OutputCount {
+                found: outputs.readings().len(),
+                expected: self.geometry.output_count(),
+            });
+        }
+        let data = direct::data(outputs);
+        let spectrum = self.decomposition.with_data(&data)?;
+        let chosen = choice::choose(&spectrum, settings.choice, settings.noise)?;
+        let lambda = chosen.point.lambda;
+        let solution = &self.section * spectrum.solution(lambda)?;
+        let estimated = chosen.point.noise_estimate(data.len());
+        let noise = match (settings.noise, estimated) {
+            (Some(noise), _) => noise,
+            (None, Some(noise)) => noise,
+            (None, None) => return Err(FourSensorError::NoNoise),
+        };
+        let uncertainty = spectrum.uncertainty(lambda, noise)?;
+        let frame = Frame::new(outputs, self.line, settings.parabola);
+        let settled = frame.settle(&solution);
+        let map = frame.map() * &self.section;
+        let spread = (&map * &uncertainty.covariance)
+            .component_mul(&map)
+            .column_sum();
+        let bias = &map * &uncertainty.bias_estimate;
+        let pull = row_norms(&(&map * &uncertainty.pull)) * chosen.point.seminorm;
+        let own = frame.own_variances() * noise.powi(2);
+        let std = (spread + own).map(|variance| variance.max(0.0).sqrt());
+        let points = self.geometry.point_count();
+        let count = self.geometry.output_count();
+        let profile = |values: DVector<f64>, from: usize| {
+            let part = |all: &DVector<f64>| all.rows(from, values.len()).into_owned();
+            Profile {
+                std: part(&std),
+                bias: part(&bias),
+                bias_bound: part(&pull),
+                values,
+            }
+        };
+        Ok(Separation {
+            residuals: frame.residuals(&settled),
+            zero_adjustment: settled.zero_adjustment.into(),
+            curvature: settled.curvature,
+            surface: profile(settled.surface, 0),
+            straightness: profile(settled.straightness, points),
+            tilt: profile(settled.tilt, points + count),
+            noise,
+            noise_estimated: settings.noise.is_none(),
+            degrees_of_freedom: degrees_of_freedom(settings, &chosen, data.len()),
+            chosen,
+        })
+    }
+}
+
+/// Of the noise of one reading: what the residuals of `rows` leave, unless it was stated.
+pub(super) fn degrees_of_freedom(
+    settings: &Settings,
+    chosen: &Chosen,
+    rows: usize,
+) -> Option<DegreesOfFreedom> {
+    match settings.noise {
+        Some(_) => Some(DegreesOfFreedom::Infinite),
+        None => DegreesOfFreedom::new(chosen.point.residual_degrees_of_freedom(rows)).ok(),
+    }
+}
+
+fn row_norms(matrix: &DMatrix<f64>) -> DVector<f64> {
+    DVector::from_iterator(matrix.nrows(), matrix.row_iter().map(|row| row.norm()))
+}

@@ -1,0 +1,27 @@
+//! Straightness by the Fourier two-sensor and three-sensor methods and their combination over several
+//! probe spacings.
+//!
+//! P. Huang et al., *On-machine workpiece straightness profile measurement using a hybrid Fourier
+//! 3-sensor method*, Precision Engineering (2022), with its signs corrected: with φ = 2π d/L the second
+//! probe sees f(θ + φ), so that the difference m = m₁ − m₂ has M = (1 − e^{+jφω}) F.
+//!
+//! Positions and spacings are in mm, readings and profiles in µm.
+
+mod joint;
+mod noise;
+mod quantities;
+mod repeatability;
+mod scan;
+mod separation;
+mod simulate;
+mod spectrum;
+mod transfer;
+mod variance;
+
+pub use joint::{Compensation, Joint, ShiftTerm, join};
+pub use noise::NoiseSource;
+pub use repeatability::{mean_deviation, mean_harmonic_deviation, repeatability};
+pub use scan::{FourierError, Scan, ScanReading, Section};
+pub use separation::{Combination, OrderResidual, OrderResult, Separation, separate, straightness};
+pub use simulate::{FourierSimulation, FourierTruth, simulate};
+pub use transfer::{LOST_BELOW, determinant, noise_gain, sensitive_orders, transfer};

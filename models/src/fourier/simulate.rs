@@ -1,0 +1,159 @@
+//! Scans of a known workpiece on a known slide: the simulation of the paper's section 2.2, with tilt,
+//! height difference and noise.
+
+use super::scan::{FourierError, Scan, ScanReading};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+use realfft::num_complex::Complex64;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// What to simulate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FourierSimulation {
+    /// Section L, mm.
+    pub length: f64,
+    /// Grid points on the section.
+    pub samples: usize,
+    /// Probe spacings d, mm, one scan each and per repeat.
+    pub spacings: Vec<f64>,
+    /// Repeats of each spacing.
+    pub repeats: u32,
+    /// Orders in workpiece and slide: 7 e^{−0.12 ω} and 5 e^{−0.08 ω} µm with phases of the seed.
+    pub orders: usize,
+    /// Slope of the workpiece, µm per radian of θ (0.2 in the paper).
+    pub slope: f64,
+    /// Step of the workpiece, µm, and its position, mm (40 µm at 105 mm in the paper).
+    pub step: (f64, f64),
+    /// A2 − A3, µm.
+    pub height_difference: f64,
+    /// Rise of the slide over the section, µm; zero is the condition of equation (20).
+    pub slide_rise: f64,
+    /// Standard deviation of each reading, µm.
+    pub noise: f64,
+    /// Whether there is a third probe.
+    pub third_probe: bool,
+}
+
+impl Default for FourierSimulation {
+    fn default() -> Self {
+        Self {
+            length: 100.0,
+            samples: 1000,
+            spacings: vec![48.5, 34.1, 78.6],
+            repeats: 1,
+            orders: 30,
+            slope: 0.2,
+            step: (40.0, 105.0),
+            height_difference: 0.0,
+            slide_rise: 0.0,
+            noise: 2.0,
+            third_probe: true,
+        }
+    }
+}
+
+/// What the scans were made of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FourierTruth {
+    /// Positions on the section, mm.
+    pub x: Vec<f64>,
+    /// Workpiece there, µm.
+    pub workpiece: Vec<f64>,
+    /// Slide there, µm.
+    pub slide: Vec<f64>,
+}
+
+/// Σ a_ω cos(ωθ + φ_ω) = Re Σ c_ω z^ω with z = e^{jθ}.
+struct Waves {
+    coefficients: Vec<Complex64>,
+}
+
+impl Waves {
+    fn draw(rng: &mut ChaCha8Rng, orders: usize, first: f64, decay: f64) -> Self {
+        let coefficients = (1..=orders)
+            .map(|w| {
+                let amplitude = first * (-decay * w as f64).exp();
+                Complex64::from_polar(amplitude, rng.random_range(0.0..TAU))
+            })
+            .collect();
+        Self { coefficients }
+    }
+
+    fn at(&self, theta: f64) -> f64 {
+        let z = Complex64::from_polar(1.0, theta);
+        let sum = self
+            .coefficients
+            .iter()
+            .rev()
+            .fold(Complex64::default(), |sum, c| (sum + c) * z);
+        sum.re
+    }
+}
+
+/// The scans of one seed and what they were made of.
+///
+/// # Errors
+/// [`FourierError::Spacing`] and [`FourierError::Simulation`] for figures that make no sense.
+pub fn simulate(
+    what: &FourierSimulation,
+    seed: u64,
+) -> Result<(Vec<Scan>, FourierTruth), FourierError> {
+    let length = what.length;
+    if what.samples < 3 || what.spacings.is_empty() {
+        return Err(FourierError::Simulation {
+            what: "a simulation needs at least three samples and one spacing".to_owned(),
+        });
+    }
+    let normal = Normal::new(0.0, what.noise.abs()).map_err(|_| FourierError::Simulation {
+        what: "the noise is not finite".to_owned(),
+    })?;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let workpiece_waves = Waves::draw(&mut rng, what.orders, 7.0, 0.12);
+    let slide_waves = Waves::draw(&mut rng, what.orders, 5.0, 0.08);
+    let workpiece = |x: f64| {
+        let theta = TAU * x / length;
+        let step = if x >= what.step.1 { what.step.0 } else { 0.0 };
+        workpiece_waves.at(theta) + what.slope * theta + step
+    };
+    let slide = |x: f64| slide_waves.at(TAU * x / length) + what.slide_rise * x / length;
+    let grid = |i: usize| length * i as f64 / what.samples as f64;
+    let truth = FourierTruth {
+        x: (0..what.samples).map(grid).collect(),
+        workpiece: (0..what.samples).map(|i| workpiece(grid(i))).collect(),
+        slide: (0..what.samples).map(|i| slide(grid(i))).collect(),
+    };
+    let mut scans = Vec::new();
+    for repeat in 1..=what.repeats.max(1) {
+        for &spacing in &what.spacings {
+            if !(spacing > 0.0 && spacing < length) {
+                return Err(FourierError::Spacing { spacing, length });
+            }
+            let joint = length - spacing;
+            // One step before the joint, so that it can be interpolated where it is off the grid.
+            let third_from = joint - 1.5 * length / what.samples as f64;
+            let readings = (0..=what.samples)
+                .map(|i| {
+                    let x = grid(i);
+                    let mut noise = || normal.sample(&mut rng);
+                    ScanReading {
+                        x,
+                        m1: workpiece(x) + slide(x) + noise(),
+                        m2: Some(
+                            what.height_difference + workpiece(x + spacing) + slide(x) + noise(),
+                        ),
+                        m3: (what.third_probe && x >= third_from)
+                            .then(|| workpiece(x - joint) + slide(x) + noise()),
+                    }
+                })
+                .collect();
+            scans.push(Scan {
+                spacing,
+                repeat,
+                readings,
+            });
+        }
+    }
+    Ok((scans, truth))
+}

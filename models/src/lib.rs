@@ -1,0 +1,14 @@
+//! Models of the errors of machines, artefacts, sensors and set-ups.
+
+pub mod anova;
+pub mod basis;
+pub mod circle;
+pub mod diagonal;
+pub mod four_sensor;
+pub mod fourier;
+pub mod machine;
+pub mod model;
+pub mod reversal;
+pub mod straightness;
+pub mod uncertainty;
+pub mod units;

@@ -1,0 +1,301 @@
+//! What a fitted model offers to the diagnosis of its gap, whatever it is a model of.
+//!
+//! The diagnosis never looks inside a model. It asks for the readings with their circumstances,
+//! for what the fit can absorb, for the quantities people act on, and for a catalogue of effects
+//! that the model leaves out.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+/// The circumstances of one reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Index into [`FittedModel::channel_names`].
+    pub channel: usize,
+    /// Position along the trace, in the unit of [`FittedModel::position_unit`].
+    pub x: f64,
+    /// Seconds since the first reading, measured or taken from the order of the traces.
+    pub time: f64,
+    /// Repeat number.
+    pub repeat: u32,
+    /// +1 forward, −1 backward.
+    pub direction: f64,
+    /// Readings in the same cell have the same expectation under the model.
+    pub cell: usize,
+}
+
+/// A sparse signature: the change of each reading per unit of an amplitude.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Column {
+    /// Places of the readings that change.
+    pub rows: Vec<usize>,
+    /// Change of the reading at each row, in the unit of the reading.
+    pub values: Vec<f64>,
+}
+
+impl Column {
+    /// The signature whose value at each reading is given by a function of its circumstances.
+    pub fn from_places(places: &[Place], value: impl Fn(usize, &Place) -> f64) -> Self {
+        let (rows, values) = places
+            .iter()
+            .enumerate()
+            .map(|(k, place)| (k, value(k, place)))
+            .filter(|(_, v)| *v != 0.0)
+            .unzip();
+        Self { rows, values }
+    }
+
+    /// All readings, zeros included.
+    pub fn dense(&self, readings: usize) -> DVector<f64> {
+        let mut full = DVector::zeros(readings);
+        for (&row, &value) in self.rows.iter().zip(&self.values) {
+            full[row] = value;
+        }
+        full
+    }
+}
+
+/// What the fit of a model can absorb: the column space of its Jacobian.
+#[derive(Debug, Clone, Default)]
+pub struct Freedom {
+    /// Columns of the Jacobian, readings × columns; may be rank deficient.
+    pub columns: DMatrix<f64>,
+    /// Unknown profiles that are free at every position, where all traces share their positions.
+    pub profiles: Option<Profiles>,
+}
+
+/// Unknown functions of position, each seen by the traces with fixed weights.
+///
+/// Trace t reads Σₖ patterns\[t, k\] · fₖ(x). The functions are free at every position except that
+/// each of `withheld` names a direction which the model does not allow them.
+#[derive(Debug, Clone)]
+pub struct Profiles {
+    /// Weights, traces × functions.
+    pub patterns: DMatrix<f64>,
+    /// Pairs (function, profile over the positions) that this function must not contain.
+    pub withheld: Vec<(usize, DVector<f64>)>,
+}
+
+/// A number people act on, as a linear function of the readings.
+#[derive(Debug, Clone)]
+pub struct Quantity {
+    /// Name in tables and JSON.
+    pub name: String,
+    /// Unit.
+    pub unit: &'static str,
+    /// Weight of each reading.
+    pub weights: DVector<f64>,
+}
+
+/// A profile people act on, for reporting how far an effect moved it.
+#[derive(Debug, Clone)]
+pub struct Profile {
+    /// Name in tables and JSON.
+    pub name: String,
+    /// Unit of the values.
+    pub unit: &'static str,
+    /// Values over the positions.
+    pub values: DVector<f64>,
+    /// Standard deviation of a value per unit standard deviation of one reading.
+    pub noise_gain: f64,
+}
+
+/// Weights over the channels that make a combination people have a name for.
+#[derive(Debug, Clone)]
+pub struct Pattern {
+    /// Name in tables and JSON.
+    pub name: String,
+    /// Weight of each channel.
+    pub weights: Vec<f64>,
+}
+
+/// A parameter of an effect with its unit and the range in which it is physically plausible.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Name in tables and JSON.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Smallest plausible value.
+    pub low: f64,
+    /// Greatest plausible value.
+    pub high: f64,
+}
+
+/// The estimate of one parameter of an effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Name of the parameter.
+    pub name: String,
+    /// Best value.
+    pub value: f64,
+    /// Standard uncertainty.
+    pub std: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// One member of an effect's family of signatures: its variant and its nonlinear parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// Which of the effect's discrete variants (a channel, a sign pattern …).
+    pub variant: usize,
+    /// Nonlinear parameters, in the order of [`Effect::shape_parameters`].
+    pub values: Vec<f64>,
+    /// First step of the search around each value; zero keeps it.
+    pub steps: Vec<f64>,
+}
+
+impl Shape {
+    /// The only member of an effect without nonlinear parameters.
+    pub fn only() -> Self {
+        Self::variant(0)
+    }
+
+    /// A variant without nonlinear parameters.
+    pub fn variant(variant: usize) -> Self {
+        Self {
+            variant,
+            values: Vec::new(),
+            steps: Vec::new(),
+        }
+    }
+}
+
+/// What people should know of an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct About {
+    /// What happens physically.
+    pub physics: &'static str,
+    /// The observation that would confirm or refute it.
+    pub confirm: &'static str,
+    /// Where the formula comes from.
+    pub source: &'static str,
+}
+
+/// A physical effect that a model leaves out.
+pub trait Effect<M>: Send + Sync {
+    /// Name in verdicts, options and files.
+    fn name(&self) -> &str;
+
+    /// Physics, confirmation and source.
+    fn about(&self) -> About;
+
+    /// The parameters that enter linearly, one signature each.
+    fn amplitudes(&self) -> Vec<Parameter>;
+
+    /// The parameters that enter nonlinearly.
+    fn shape_parameters(&self) -> Vec<Parameter> {
+        Vec::new()
+    }
+
+    /// The shapes at which the search begins, dense enough that the best is near one of them.
+    fn grid(&self, _model: &M) -> Vec<Shape> {
+        vec![Shape::only()]
+    }
+
+    /// The change of the readings per unit of each amplitude, at the fitted state of the model.
+    fn columns(&self, model: &M, shape: &Shape) -> Vec<Column>;
+
+    /// Whether a shape is one that the search may go to.
+    fn allowed(&self, _model: &M, _shape: &Shape) -> bool {
+        true
+    }
+
+    /// The shape that belongs to estimated amplitudes, for effects whose signature depends on
+    /// their size.
+    fn settled(&self, _shape: &Shape, _amplitudes: &[f64]) -> Option<Shape> {
+        None
+    }
+
+    /// The variant in words, where the effect has several.
+    fn variant_name(&self, _model: &M, _shape: &Shape) -> Option<String> {
+        None
+    }
+
+    /// What is reported from amplitudes and shape, both with their covariance
+    /// (amplitudes first, then shape parameters).
+    fn estimates(
+        &self,
+        shape: &Shape,
+        amplitudes: &[f64],
+        covariance: &DMatrix<f64>,
+    ) -> Vec<Estimate> {
+        let values = amplitudes.iter().chain(&shape.values);
+        let names = self.amplitudes().into_iter().chain(self.shape_parameters());
+        values
+            .zip(names)
+            .enumerate()
+            .map(|(k, (&value, parameter))| Estimate {
+                name: parameter.name.to_owned(),
+                value,
+                std: covariance
+                    .get((k, k))
+                    .map_or(f64::NAN, |v| v.max(0.0).sqrt()),
+                unit: parameter.unit.to_owned(),
+            })
+            .collect()
+    }
+}
+
+/// A model fitted to readings, as the diagnosis sees it.
+pub trait FittedModel: Sized + Send + Sync {
+    /// Name of the model, for reports.
+    fn name(&self) -> &'static str;
+
+    /// Unit of the readings.
+    fn reading_unit(&self) -> &'static str;
+
+    /// Unit of the positions.
+    fn position_unit(&self) -> &'static str {
+        "mm"
+    }
+
+    /// The circumstances of all readings; the readings of one trace stand together.
+    fn places(&self) -> &[Place];
+
+    /// The traces: readings taken in one go, along which noise may be correlated.
+    fn traces(&self) -> &[Range<usize>];
+
+    /// The readings.
+    fn observed(&self) -> &DVector<f64>;
+
+    /// What the fit can absorb, at its optimum.
+    fn freedom(&self) -> Freedom;
+
+    /// The readings less the part of the model that is not linear in its unknowns, so that what
+    /// remains is fitted by [`Self::freedom`].
+    fn linearised(&self) -> DVector<f64> {
+        self.observed().clone()
+    }
+
+    /// Names of the channels.
+    fn channel_names(&self) -> Vec<String>;
+
+    /// Combinations of the channels to look at beside the channels themselves.
+    fn patterns(&self) -> Vec<Pattern> {
+        Vec::new()
+    }
+
+    /// The numbers people act on.
+    fn quantities(&self) -> Vec<Quantity> {
+        Vec::new()
+    }
+
+    /// The profiles people act on.
+    fn profiles(&self) -> Vec<Profile> {
+        Vec::new()
+    }
+
+    /// Standard deviation of one reading where the user states it.
+    fn stated_noise(&self) -> Option<f64> {
+        None
+    }
+
+    /// The same model fitted to other values of the same readings.
+    fn refit(&self, observed: DVector<f64>) -> Self;
+
+    /// The effects which the model leaves out.
+    fn effects(&self) -> Vec<Box<dyn Effect<Self>>>;
+}

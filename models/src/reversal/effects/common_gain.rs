@@ -1,0 +1,36 @@
+//! Both indicators have the same wrong gain.
+
+use super::FirstOrder;
+use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+
+/// See the head of the file.
+pub(super) struct CommonGain;
+
+impl Effect<FirstOrder> for CommonGain {
+    fn name(&self) -> &str {
+        "common-gain"
+    }
+
+    fn about(&self) -> About {
+        About {
+            physics: "both indicators read the same part too much or too little, which scales every form and tilt alike",
+            confirm: "calibrate one indicator against gauge blocks",
+            source: "I (1 + g): the whole model is linear in g",
+        }
+    }
+
+    fn amplitudes(&self) -> Vec<Parameter> {
+        vec![Parameter {
+            name: "gain",
+            unit: "1",
+            low: -0.5,
+            high: 0.5,
+        }]
+    }
+
+    fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
+        vec![Column::from_places(model.places(), |_, place| {
+            model.smooth_reading(place) - model.mid_reading(place)
+        })]
+    }
+}

@@ -1,0 +1,38 @@
+//! The artefact sags by its weight, in the same direction in both spindle positions.
+
+use super::FirstOrder;
+use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+
+/// See the head of the file.
+pub(super) struct GravitySag;
+
+impl Effect<FirstOrder> for GravitySag {
+    fn name(&self) -> &str {
+        "gravity-sag"
+    }
+
+    fn about(&self) -> About {
+        About {
+            physics: "the artefact bends under its weight and does not turn its bend with the spindle, exactly as the slide's form would appear",
+            confirm: "compute the sag from section and overhang, or repeat with the axis vertical",
+            source: "cantilever under its own weight, Roark's Formulas for Stress and Strain",
+        }
+    }
+
+    fn amplitudes(&self) -> Vec<Parameter> {
+        vec![Parameter {
+            name: "end-sag",
+            unit: "um",
+            low: -1000.0,
+            high: 1000.0,
+        }]
+    }
+
+    fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
+        vec![Column::from_places(model.places(), |_, place| {
+            let u = place.x / model.travel();
+            let sag = u * u * (6.0 - 4.0 * u + u * u) / 3.0;
+            model.channel(place).indicator_sign() * sag
+        })]
+    }
+}

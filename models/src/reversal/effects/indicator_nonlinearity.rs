@@ -1,0 +1,56 @@
+//! The indicator's reading is not proportional to its displacement.
+
+use super::FirstOrder;
+use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+
+/// See the head of the file. Variants: quadratic (lever at an angle) and cubic (transducer near the
+/// end of its range), both as the deviation at the
+/// greatest reading off the indicator's zero.
+pub(super) struct IndicatorNonlinearity;
+
+impl Effect<FirstOrder> for IndicatorNonlinearity {
+    fn name(&self) -> &str {
+        "indicator-nonlinearity"
+    }
+
+    fn about(&self) -> About {
+        About {
+            physics: "both indicators read a curved function of the displacement, so large and small readings are scaled differently",
+            confirm: "calibrate the indicator over the span of the readings, or align so that the readings stay small",
+            source: "second and third term of the calibration curve; cosine error of a lever-type indicator",
+        }
+    }
+
+    fn amplitudes(&self) -> Vec<Parameter> {
+        vec![Parameter {
+            name: "deviation",
+            unit: "um",
+            low: -200.0,
+            high: 200.0,
+        }]
+    }
+
+    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+        vec![Shape::variant(0), Shape::variant(1)]
+    }
+
+    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+        let reach = model.reading_reach();
+        let power = if shape.variant == 0 { 2 } else { 3 };
+        vec![Column::from_places(model.places(), |_, place| {
+            let part = model.smooth_reading(place) / reach;
+            part.powi(power)
+        })]
+    }
+
+    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+        Some(
+            if shape.variant == 0 {
+                "quadratic"
+            } else {
+                "cubic"
+            }
+            .to_owned(),
+        )
+    }
+}

@@ -1,0 +1,36 @@
+//! The artefact is a cone: both surfaces fall away from its axis.
+
+use super::FirstOrder;
+use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+
+/// See the head of the file.
+pub(super) struct Taper;
+
+impl Effect<FirstOrder> for Taper {
+    fn name(&self) -> &str {
+        "taper"
+    }
+
+    fn about(&self) -> About {
+        About {
+            physics: "the diameter changes along the artefact, so every channel climbs alike",
+            confirm: "measure the diameter at both ends with a micrometer",
+            source: "rigid-body geometry of a frustum between two indicators (contrast + + + + of the four slopes)",
+        }
+    }
+
+    fn amplitudes(&self) -> Vec<Parameter> {
+        vec![Parameter {
+            name: "half-angle",
+            unit: "rad",
+            low: -0.1,
+            high: 0.1,
+        }]
+    }
+
+    fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
+        vec![Column::from_places(model.places(), |_, place| {
+            place.x * 1e3
+        })]
+    }
+}

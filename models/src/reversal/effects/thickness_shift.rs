@@ -1,0 +1,46 @@
+//! The probed point lies half a thickness from the tilted axis.
+
+use super::{FirstOrder, SETTLING, settled_at};
+use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+
+/// See the head of the file.
+pub(super) struct ThicknessShift;
+
+impl Effect<FirstOrder> for ThicknessShift {
+    fn name(&self) -> &str {
+        "thickness-shift"
+    }
+
+    fn about(&self) -> About {
+        About {
+            physics: "the probe touches the tilted artefact half a thickness off its axis, so near and far probe points lie thickness times tilt apart",
+            confirm: "measure the thickness and give it in the set-up, or align the artefact better and repeat",
+            source: "exact geometry of a tilted artefact, u = x + h psi to first order",
+        }
+    }
+
+    fn amplitudes(&self) -> Vec<Parameter> {
+        vec![Parameter {
+            name: "thickness",
+            unit: "mm",
+            low: 0.0,
+            high: 500.0,
+        }]
+    }
+
+    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+        vec![SETTLING]
+    }
+
+    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+        let thickness = shape.values.first().copied().unwrap_or(0.0);
+        vec![Column::from_places(model.places(), |_, place| {
+            let per_mm = 0.5 * model.tilt(model.channel(place));
+            per_mm * model.side_chord(place, per_mm * thickness)
+        })]
+    }
+
+    fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
+        settled_at(shape, amplitudes)
+    }
+}

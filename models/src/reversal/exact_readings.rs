@@ -1,0 +1,620 @@
+//! Readings of a reversal with known truth and any effect of the catalogue switched on, each in
+//! its exact form. Nothing here is shared with the signatures by which the diagnosis finds them.
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::{Channel, Direction, Observations, Reading};
+
+/// A form as a sum of waves and bumps over the travel, µm over mm.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Form {
+    /// Amplitude µm, wave number rad/mm, phase rad.
+    pub waves: Vec<(f64, f64, f64)>,
+    /// Height µm, centre mm, width mm.
+    pub bumps: Vec<(f64, f64, f64)>,
+    /// A straight line, µm and µm/mm.
+    pub line: (f64, f64),
+}
+
+impl Form {
+    /// A form with decreasing waves of up to `highest` periods over the travel and a few bumps.
+    pub fn random(size: f64, travel: f64, highest: u32, random: &mut impl Rng) -> Self {
+        let waves = (1..=highest)
+            .map(|k| {
+                let normal: f64 = StandardNormal.sample(random);
+                let amplitude = size * normal / f64::from(k).powf(0.8);
+                let number = std::f64::consts::TAU * (f64::from(k) - 0.5 + random.random::<f64>());
+                (amplitude, number / travel, 6.3 * random.random::<f64>())
+            })
+            .collect();
+        let bumps = (0..2)
+            .map(|_| {
+                let normal: f64 = StandardNormal.sample(random);
+                (
+                    0.5 * size * normal,
+                    travel * random.random::<f64>(),
+                    travel * (0.04 + 0.06 * random.random::<f64>()),
+                )
+            })
+            .collect();
+        Self {
+            waves,
+            bumps,
+            line: (0.0, 0.0),
+        }
+    }
+
+    /// The same form without its least-squares line over some positions: the line of a form is a
+    /// tilt or a cone.
+    pub fn level(mut self, positions: &[f64]) -> Self {
+        let n = positions.len() as f64;
+        let mean = positions.iter().sum::<f64>() / n;
+        let height = positions.iter().map(|x| self.at(*x)).sum::<f64>() / n;
+        let square: f64 = positions.iter().map(|x| (x - mean).powi(2)).sum();
+        let slope = positions
+            .iter()
+            .map(|x| self.at(*x) * (x - mean))
+            .sum::<f64>()
+            / square;
+        self.line.0 -= height - slope * mean;
+        self.line.1 -= slope;
+        self
+    }
+
+    /// Height at a position, µm.
+    pub fn at(&self, x: f64) -> f64 {
+        let waves: f64 = self
+            .waves
+            .iter()
+            .map(|(a, k, p)| a * (k * x + p).sin())
+            .sum();
+        let bumps: f64 = self
+            .bumps
+            .iter()
+            .map(|(h, c, w)| h * (-0.5 * ((x - c) / w).powi(2)).exp())
+            .sum();
+        waves + bumps + self.line.0 + self.line.1 * x
+    }
+}
+
+/// An effect in its exact form.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Injection {
+    /// Half cone angle, rad.
+    Taper(f64),
+    /// Axial shift in the second spindle position, mm.
+    ReversalShift(f64),
+    /// Thickness of the artefact that the model leaves out, mm.
+    ThicknessShift(f64),
+    /// Gain of the near less that of the far indicator.
+    GainMismatch(f64),
+    /// Gain of both indicators less one.
+    CommonGain(f64),
+    /// Deviation at the greatest reading off the indicator's zero, µm; quadratic or cubic.
+    IndicatorNonlinearity {
+        /// Deviation, µm.
+        deviation: f64,
+        /// Third power in place of the second.
+        cubic: bool,
+    },
+    /// Exponential drift over the whole test, µm.
+    ThermalDrift {
+        /// Drift at the end, µm.
+        drift: f64,
+        /// Time constant, s.
+        constant: f64,
+        /// Both indicators drift alike, in place of opposite.
+        alike: bool,
+    },
+    /// Lost motion of the slide, mm.
+    AxisBacklash(f64),
+    /// Width of the indicator's play, µm.
+    Hysteresis(f64),
+    /// A jump of one indicator's zero.
+    ZeroJump {
+        /// Size, µm.
+        jump: f64,
+        /// The channel being read.
+        channel: Channel,
+        /// When, s.
+        time: f64,
+    },
+    /// A bump of dirt.
+    LocalContamination {
+        /// Height, µm.
+        height: f64,
+        /// The channel in which it lies under the stylus.
+        channel: Channel,
+        /// The only repeat in which it lies there, or all.
+        repeat: Option<u32>,
+        /// Where, mm.
+        position: f64,
+        /// Standard width, mm.
+        width: f64,
+    },
+    /// A periodic error.
+    CyclicError {
+        /// Amplitude, µm.
+        amplitude: f64,
+        /// Period: µm of the reading or mm of the travel.
+        period: f64,
+        /// Phase, rad.
+        phase: f64,
+        /// Periodic in the reading, in place of the travel in the first spindle position.
+        of_reading: bool,
+    },
+    /// Sag of the free end, µm.
+    GravitySag(f64),
+    /// Radius of the stylus ball, mm.
+    TipRadius(f64),
+}
+
+impl Injection {
+    /// The effect of a name in the catalogue at a size; what else it needs is drawn at random.
+    pub fn named(name: &str, size: f64, frame: &Frame, random: &mut impl Rng) -> Option<Self> {
+        let travel = frame.travel.1 - frame.travel.0;
+        let channel = Channel::ALL[random.random_range(0..4)];
+        let inside = 0.15 + 0.7 * random.random::<f64>();
+        Some(match name {
+            "taper" => Self::Taper(size),
+            "reversal-shift" => Self::ReversalShift(size),
+            "thickness-shift" => Self::ThicknessShift(size),
+            "gain-mismatch" => Self::GainMismatch(size),
+            "common-gain" => Self::CommonGain(size),
+            "indicator-nonlinearity" => Self::IndicatorNonlinearity {
+                deviation: size,
+                cubic: random.random_bool(0.4),
+            },
+            "thermal-drift" => Self::ThermalDrift {
+                drift: size,
+                constant: frame.duration * 10f64.powf(-1.0 + 1.3 * random.random::<f64>()),
+                alike: random.random_bool(0.4),
+            },
+            "axis-backlash" => Self::AxisBacklash(size),
+            "hysteresis" => Self::Hysteresis(size),
+            "zero-jump" => {
+                let (from, to) = frame.times[channel.index()];
+                Self::ZeroJump {
+                    jump: size,
+                    channel,
+                    time: from + inside * (to - from),
+                }
+            }
+            "local-contamination" => Self::LocalContamination {
+                height: size,
+                channel,
+                repeat: random
+                    .random_bool(0.5)
+                    .then(|| random.random_range(1..=frame.repeats.max(1))),
+                position: frame.travel.0 + inside * travel,
+                width: travel * (0.01 + 0.04 * random.random::<f64>()),
+            },
+            "cyclic-error" => {
+                let of_reading = random.random_bool(0.4);
+                let cycles = 4.0 + 20.0 * random.random::<f64>();
+                let whole = if of_reading { frame.span } else { travel };
+                Self::CyclicError {
+                    amplitude: size,
+                    period: whole / cycles,
+                    phase: 6.3 * random.random::<f64>(),
+                    of_reading,
+                }
+            }
+            "gravity-sag" => Self::GravitySag(size),
+            "tip-radius" => Self::TipRadius(size),
+            _ => return None,
+        })
+    }
+}
+
+/// What the secondary parameters of an effect are drawn from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// First and last position, mm.
+    pub travel: (f64, f64),
+    /// Span of the readings, µm.
+    pub span: f64,
+    /// Duration of the whole test, s.
+    pub duration: f64,
+    /// First and last time of every channel, s.
+    pub times: [(f64, f64); 4],
+    /// Repeats.
+    pub repeats: u32,
+}
+
+/// What the indicators' readings are counted from.
+struct Zero {
+    /// Reading of every channel at mid travel, µm.
+    middle: [f64; 4],
+    /// Greatest reading off the indicators' zero, µm.
+    reach: f64,
+    /// Play of the indicators, µm.
+    width: f64,
+}
+
+/// The noise of a scene, standard deviations in µm.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SceneNoise {
+    /// White part.
+    pub white: f64,
+    /// Part correlated along a trace.
+    pub correlated: f64,
+    /// Its correlation length, mm.
+    pub length: f64,
+    /// Shift of each trace.
+    pub shift: f64,
+}
+
+/// A machine, an artefact and a plan of measurement with known truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// Commanded positions, mm.
+    pub positions: Vec<f64>,
+    /// Repeats of every trace.
+    pub repeats: u32,
+    /// Whether every trace is also run backward.
+    pub both_directions: bool,
+    /// Seconds between readings.
+    pub interval: f64,
+    /// α, β, γ, rad.
+    pub tilts: [f64; 3],
+    /// Offsets of the four channels, µm.
+    pub offsets: [f64; 4],
+    /// Form of the slide.
+    pub m: Form,
+    /// Form of side A.
+    pub s_a: Form,
+    /// Form of side B.
+    pub s_b: Form,
+    /// Noise.
+    pub noise: SceneNoise,
+    /// Effects.
+    pub effects: Vec<Injection>,
+}
+
+impl Scene {
+    /// A random scene without effects.
+    pub fn random(
+        positions: usize,
+        repeats: u32,
+        tilt: f64,
+        form: f64,
+        noise: SceneNoise,
+        random: &mut impl Rng,
+    ) -> Self {
+        let travel = 150.0 + 300.0 * random.random::<f64>();
+        let mut normal = || -> f64 { StandardNormal.sample(random) };
+        let tilts = [tilt * normal(), tilt * normal(), tilt * normal()];
+        let offsets = [normal(), normal(), normal(), normal()].map(|v| 5.0 * v);
+        let positions: Vec<f64> = (0..positions)
+            .map(|k| travel * k as f64 / (positions.max(2) - 1) as f64)
+            .collect();
+        let mut shape = |size: f64| Form::random(size, travel, 9, random).level(&positions);
+        let (m, s_a, s_b) = (shape(form), shape(form), shape(form));
+        Self {
+            positions,
+            repeats,
+            both_directions: true,
+            interval: 0.5,
+            tilts,
+            offsets,
+            m,
+            s_a,
+            s_b,
+            noise,
+            effects: Vec::new(),
+        }
+    }
+
+    /// Length of travel, mm.
+    pub fn travel(&self) -> f64 {
+        match (self.positions.first(), self.positions.last()) {
+            (Some(first), Some(last)) => last - first,
+            _ => 0.0,
+        }
+    }
+
+    fn passes(&self) -> u32 {
+        self.repeats * if self.both_directions { 2 } else { 1 }
+    }
+
+    /// Duration of the whole test, s.
+    pub fn duration(&self) -> f64 {
+        2.0 * f64::from(self.passes()) * self.positions.len() as f64 * self.interval
+    }
+
+    /// What the secondary parameters of an effect are drawn from.
+    pub fn frame(&self) -> Frame {
+        let half = 0.5 * self.duration();
+        Frame {
+            travel: (0.0, self.travel()),
+            span: self.reading_span(),
+            duration: self.duration(),
+            times: Channel::ALL.map(|c| {
+                if c.spindle_sign() > 0.0 {
+                    (0.0, half)
+                } else {
+                    (half, 2.0 * half)
+                }
+            }),
+            repeats: self.repeats,
+        }
+    }
+
+    /// Smallest to greatest reading of all channels about their middles, µm.
+    pub fn reading_span(&self) -> f64 {
+        let middle = 0.5 * self.travel();
+        let values: Vec<f64> = Channel::ALL
+            .into_iter()
+            .flat_map(|c| {
+                let zero = self.geometry(c, middle, 1.0, 1, false);
+                self.positions
+                    .iter()
+                    .map(move |x| self.geometry(c, *x, 1.0, 1, false) - zero)
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        high - low
+    }
+
+    fn reading_reach(&self) -> f64 {
+        Channel::ALL
+            .into_iter()
+            .flat_map(|c| self.positions.iter().map(move |x| (c, *x)))
+            .map(|(c, x)| self.geometry(c, x, 1.0, 1, false).abs())
+            .fold(f64::MIN_POSITIVE, f64::max)
+    }
+
+    /// The displacement under an indicator, µm: exact rigid geometry of slide and artefact.
+    fn geometry(
+        &self,
+        channel: Channel,
+        commanded: f64,
+        direction: f64,
+        repeat: u32,
+        effects: bool,
+    ) -> f64 {
+        let active: &[Injection] = if effects { &self.effects } else { &[] };
+        let [alpha, beta, gamma] = self.tilts;
+        let mut angle = channel.indicator_sign() * alpha
+            + channel.spindle_sign() * beta
+            + channel.side_sign() * gamma;
+        let (mut slide, mut axial, mut half) = (commanded, 0.0, 0.0);
+        let (mut sag, mut radius) = (0.0, 0.0);
+        for effect in active {
+            match *effect {
+                Injection::Taper(cone) => angle += cone,
+                Injection::AxisBacklash(lost) => slide -= 0.5 * direction * lost,
+                Injection::ReversalShift(shift) if channel.spindle_sign() < 0.0 => axial += shift,
+                Injection::ThicknessShift(thickness) => half += 0.5 * thickness,
+                Injection::GravitySag(end) => sag += end,
+                Injection::TipRadius(r) => radius += r,
+                _ => {}
+            }
+        }
+        let side = if channel.is_side_a() {
+            &self.s_a
+        } else {
+            &self.s_b
+        };
+        let dirt = |u: f64| -> f64 {
+            active
+                .iter()
+                .map(|effect| match *effect {
+                    Injection::LocalContamination {
+                        height,
+                        channel: where_it_lies,
+                        repeat: when,
+                        position,
+                        width,
+                    } if where_it_lies == channel && when.is_none_or(|r| r == repeat) => {
+                        height * (-0.5 * ((u - position) / width).powi(2)).exp()
+                    }
+                    _ => 0.0,
+                })
+                .sum()
+        };
+        let surface = |u: f64| {
+            let here = side.at(u - axial);
+            let slope = (side.at(u - axial + 0.01) - side.at(u - axial - 0.01)) / 0.02e3;
+            (here + dirt(u) + 0.5e3 * radius * slope * slope) * 1e-3
+        };
+        // u: position on the artefact's own axis that lies under the stylus, by fixed point; the
+        // map contracts by |S′ tan ψ|, far below one.
+        let (sine, cosine) = angle.sin_cos();
+        let mut u = slide;
+        for _ in 0..60 {
+            let next = (slide + (half + surface(u)) * sine) / cosine;
+            let step = (next - u).abs();
+            u = next;
+            if step < 1e-12 {
+                break;
+            }
+        }
+        let reading = u * sine + (half + surface(u)) * cosine - half;
+        let part = if self.travel() > 0.0 {
+            slide / self.travel()
+        } else {
+            0.0
+        };
+        let bend = sag * part * part * (6.0 - 4.0 * part + part * part) / 3.0;
+        reading * 1e3
+            + channel.indicator_sign() * (self.m.at(slide) + bend)
+            + self.offsets[channel.index()]
+    }
+
+    /// What an indicator shows of a displacement at a time, before noise and play.
+    fn indicated(
+        &self,
+        zero: &Zero,
+        channel: Channel,
+        x: f64,
+        time: f64,
+        displacement: f64,
+    ) -> f64 {
+        let mut shown = displacement;
+        for effect in &self.effects {
+            let about = displacement - zero.middle[channel.index()];
+            shown += match *effect {
+                Injection::GainMismatch(gain) => 0.5 * channel.indicator_sign() * gain * about,
+                Injection::CommonGain(gain) => gain * about,
+                Injection::IndicatorNonlinearity { deviation, cubic } => {
+                    deviation * (displacement / zero.reach).powi(if cubic { 3 } else { 2 })
+                }
+                Injection::ThermalDrift {
+                    drift,
+                    constant,
+                    alike,
+                } => {
+                    let sign = if alike { 1.0 } else { channel.indicator_sign() };
+                    let whole = 1.0 - (-self.duration() / constant).exp();
+                    sign * drift * (1.0 - (-time / constant).exp()) / whole
+                }
+                Injection::ZeroJump {
+                    jump,
+                    channel: which,
+                    time: when,
+                } if which == channel && time > when => jump,
+                Injection::CyclicError {
+                    amplitude,
+                    period,
+                    phase,
+                    of_reading,
+                } => {
+                    let turn = std::f64::consts::TAU / period;
+                    if of_reading {
+                        amplitude * (turn * displacement + phase).sin()
+                    } else if channel.spindle_sign() > 0.0 {
+                        amplitude * (turn * x + phase).sin()
+                    } else {
+                        0.0
+                    }
+                }
+                _ => 0.0,
+            };
+        }
+        shown
+    }
+
+    /// Readings without noise.
+    pub fn exact(&self) -> Observations {
+        self.readings(None)
+    }
+
+    /// Readings with noise.
+    pub fn measured(&self, seed: u64) -> Observations {
+        self.readings(Some(ChaCha8Rng::seed_from_u64(seed)))
+    }
+
+    fn readings(&self, mut random: Option<ChaCha8Rng>) -> Observations {
+        let mut readings = Vec::new();
+        let width: f64 = self
+            .effects
+            .iter()
+            .map(|e| match e {
+                Injection::Hysteresis(width) => *width,
+                _ => 0.0,
+            })
+            .sum();
+        let middle = 0.5 * self.travel();
+        let zero = Zero {
+            middle: Channel::ALL.map(|c| self.geometry(c, middle, 1.0, 1, false)),
+            reach: self.reading_reach(),
+            width,
+        };
+        let mut pass = 0;
+        for spindle in [1.0, -1.0] {
+            for repeat in 1..=self.repeats {
+                let directions: &[Direction] = if self.both_directions {
+                    &[Direction::Forward, Direction::Backward]
+                } else {
+                    &[Direction::Forward]
+                };
+                for &direction in directions {
+                    for channel in Channel::ALL
+                        .into_iter()
+                        .filter(|c| c.spindle_sign() == spindle)
+                    {
+                        self.trace(
+                            channel,
+                            repeat,
+                            direction,
+                            pass,
+                            &zero,
+                            &mut random,
+                            &mut readings,
+                        );
+                    }
+                    pass += 1;
+                }
+            }
+        }
+        Observations { readings }
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "one trace of a plan")]
+    fn trace(
+        &self,
+        channel: Channel,
+        repeat: u32,
+        direction: Direction,
+        pass: usize,
+        zero: &Zero,
+        random: &mut Option<ChaCha8Rng>,
+        readings: &mut Vec<Reading>,
+    ) {
+        let (n, width) = (self.positions.len(), zero.width);
+        let sign = if direction == Direction::Forward {
+            1.0
+        } else {
+            -1.0
+        };
+        let mut normal = || -> f64 {
+            random
+                .as_mut()
+                .map_or(0.0, |source| StandardNormal.sample(source))
+        };
+        let shift = self.noise.shift * normal();
+        let mut walk = self.noise.correlated * normal();
+        let mut pointer: Option<f64> = None;
+        for step in 0..n {
+            let k = if sign > 0.0 { step } else { n - 1 - step };
+            let x = self.positions[k];
+            let time = (pass * n + step) as f64 * self.interval;
+            let displacement = self.geometry(channel, x, sign, repeat, true);
+            let mut shown = self.indicated(zero, channel, x, time, displacement);
+            if width > 0.0 {
+                // The slide comes from a little before the first position.
+                let before = self.indicated(
+                    zero,
+                    channel,
+                    x - sign * 1e-3,
+                    time,
+                    self.geometry(channel, x - sign * 1e-3, sign, repeat, true),
+                );
+                let last = pointer.unwrap_or(shown - 0.5 * width * (shown - before).signum());
+                let next = last.clamp(shown - 0.5 * width, shown + 0.5 * width);
+                pointer = Some(next);
+                shown = next;
+            }
+            if step > 0 && self.noise.correlated > 0.0 {
+                let previous = self.positions[if sign > 0.0 { k - 1 } else { k + 1 }];
+                let decay = (-(x - previous).abs() / self.noise.length).exp();
+                walk =
+                    decay * walk + self.noise.correlated * (1.0 - decay * decay).sqrt() * normal();
+            }
+            readings.push(Reading {
+                channel,
+                repeat,
+                direction,
+                time: Some(time),
+                x,
+                value: shown + shift + walk + self.noise.white * normal(),
+            });
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! The four-channel reversal: the parallelism of spindle and slide, the form of the slide and the
+//! form of both sides of the artefact, from traces at two spindle positions.
+
+mod combinations;
+mod convention;
+pub mod diagnosable;
+pub mod effects;
+pub mod exact_readings;
+pub mod forward;
+pub mod injected;
+mod observations;
+pub mod simulate;
+pub mod simultaneous;
+mod smooth_profile;
+pub mod staged;
+pub mod turning;
+
+pub use combinations::Combination;
+pub use convention::{Contrast, Convention, NOT_SHOWN};
+pub use observations::{Channel, Direction, Observations, Reading};

@@ -1,0 +1,62 @@
+//! Why there is no simultaneous solution.
+
+use errsep_solvers::problem::NoValue;
+use thiserror::Error;
+
+use crate::basis::bspline::BreakError;
+
+/// Why there is no simultaneous solution.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ReversalError {
+    /// No reading at all.
+    #[error("there are no readings")]
+    NoReadings,
+    /// A reading or option that is not finite, or not in its range.
+    #[error("{what} is {value}: it must be {must}")]
+    NotUsable {
+        /// What it is.
+        what: String,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        must: &'static str,
+    },
+    /// A channel whose readings are all at one position has no slope.
+    #[error("channel {channel}: all readings are at {x} mm; a slope needs two positions")]
+    OnePosition {
+        /// The channel.
+        channel: &'static str,
+        /// The position, mm.
+        x: f64,
+    },
+    /// Fewer readings than unknowns.
+    #[error(
+        "{readings} readings cannot determine {unknowns} unknowns: take more readings or fewer knots"
+    )]
+    TooFewReadings {
+        /// Number of readings.
+        readings: usize,
+        /// Number of unknowns.
+        unknowns: usize,
+    },
+    /// Break points that carry no spline.
+    #[error("knots: {0}")]
+    Breaks(#[from] BreakError),
+    /// The start given has the wrong length.
+    #[error("{given} starting tilts are given, the fit has {needed}")]
+    StartLength {
+        /// How many are given.
+        given: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// The model has no value at the start.
+    #[error("the fit cannot begin: {0}")]
+    NoStart(#[from] NoValue),
+    /// The fit did not end at a minimum that determines the unknowns.
+    #[error("the simultaneous fit has no answer: {ending}")]
+    NotConverged {
+        /// How it ended, in words.
+        ending: String,
+    },
+}

@@ -1,0 +1,267 @@
+//! How many knots: from the data, by an information criterion over a ladder of fits.
+//!
+//! At the seed's tilts one factorisation gives the cost of the linear fit with K cells. The choice
+//! is the least corrected Akaike criterion (Hurvich and Tsai, Biometrika 76, 1989),
+//! m ln(RSS/m) + 2pm/(m − p − 1); Schwarz's criterion and generalised cross-validation stand beside
+//! it in the table.
+
+use errsep_solvers::linear::bordered::Bordered;
+use errsep_solvers::structured::{StructuredProblem, evaluate};
+
+use super::problem::Reversal;
+use super::readings::ChannelReadings;
+use super::seed;
+use super::unknowns::Unknowns;
+use super::{Axis, Noise, ReversalError, gauge};
+use crate::basis::bspline::CubicBSpline;
+use crate::reversal::forward::Attitude;
+
+/// One rung of the ladder.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KnotTrial {
+    /// Number of cells.
+    pub cells: usize,
+    /// Number of unknowns of the whole fit.
+    pub unknowns: usize,
+    /// Root mean square of the weighted residuals over their degrees of freedom, relative to the
+    /// first rung's guess of the noise.
+    pub noise: f64,
+    /// Corrected Akaike criterion.
+    pub aicc: f64,
+    /// Schwarz's criterion.
+    pub bic: f64,
+    /// Generalised cross-validation score.
+    pub gcv: f64,
+}
+
+/// Rungs after the best one before the ladder is left.
+const PATIENCE: usize = 3;
+
+/// Readings' positions a cell must have on average, so that the table never ends in interpolation.
+const POSITIONS_A_CELL: usize = 3;
+
+/// Cell counts of the ladder: a factor of about √2 apart.
+fn ladder(most: usize) -> impl Iterator<Item = usize> {
+    (2..)
+        .map(|k: u32| {
+            let power = 1_usize << (k / 2);
+            if k.is_multiple_of(2) {
+                power
+            } else {
+                power + power / 2
+            }
+        })
+        .take_while(move |cells| *cells <= most)
+}
+
+/// What the fits of the ladder share.
+pub struct Choice<'a> {
+    /// Sorted readings.
+    pub channels: &'a [ChannelReadings],
+    /// Tilt and offset of each channel's line.
+    pub lines: &'a [(f64, f64)],
+    /// The axis of the gauge.
+    pub axis: Axis,
+    /// Thickness, mm.
+    pub thickness_mm: f64,
+    /// 1/σ by channel.
+    pub weights: &'a [f64],
+}
+
+impl Choice<'_> {
+    /// Breaks of so many equal cells, cells without the readings they need joined to a neighbour.
+    ///
+    /// A cell needs readings of channels that tell all fitted forms apart; otherwise coefficients
+    /// there would be determined by nothing.
+    pub fn breaks(&self, unknowns: &Unknowns, cells: usize) -> Result<Vec<f64>, ReversalError> {
+        let (low, high) = gauge::range(self.channels);
+        let even = CubicBSpline::uniform(low, high, cells.max(1))?;
+        let mut breaks = vec![low];
+        let mut seen = vec![false; self.channels.len()];
+        let mut at = vec![0; self.channels.len()];
+        for right in &even.breaks()[1..] {
+            for (c, channel) in self.channels.iter().enumerate() {
+                let next = at[c] + channel.x[at[c]..].partition_point(|x| x < right);
+                seen[c] |= next > at[c];
+                at[c] = next;
+            }
+            if unknowns.told_apart_by(&seen) {
+                breaks.push(*right);
+                seen.fill(false);
+            }
+        }
+        // What is left at the end belongs to the last cell.
+        if breaks.len() > 1 {
+            breaks.pop();
+        }
+        breaks.push(high);
+        Ok(breaks)
+    }
+
+    /// The bases of the fitted forms on these breaks: the slide's on the positions, the artefact's
+    /// stretched to where the tilted probes touch it.
+    pub fn bases(
+        &self,
+        unknowns: &Unknowns,
+        breaks: &[f64],
+    ) -> Result<Vec<CubicBSpline>, ReversalError> {
+        let (low, high) = gauge::range(self.channels);
+        let slide = CubicBSpline::new(breaks.to_vec())?;
+        let mut bases = Vec::with_capacity(unknowns.forms.len());
+        for form in &unknowns.forms {
+            let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
+            for (channel, line) in self.channels.iter().zip(self.lines) {
+                if form.is_side_of(channel.channel) {
+                    let attitude = Attitude::new(line.0, self.thickness_mm / 2.0)?;
+                    let touched = |x: f64| (x + attitude.half_mm * attitude.sin) / attitude.cos;
+                    if let (Some(first), Some(last)) = (channel.x.first(), channel.x.last()) {
+                        from = from.min(touched(*first));
+                        to = to.max(touched(*last));
+                    }
+                }
+            }
+            if from < to {
+                let stretched = breaks
+                    .iter()
+                    .map(|b| from + (to - from) * ((b - low) / (high - low)))
+                    .collect();
+                bases.push(CubicBSpline::new(stretched)?);
+            } else {
+                bases.push(slide.clone());
+            }
+        }
+        Ok(bases)
+    }
+
+    /// Goes up the ladder; the table and the best number of cells.
+    pub fn choose(
+        &self,
+        unknowns_of: impl Fn(usize) -> Unknowns,
+    ) -> Result<(usize, Vec<KnotTrial>), ReversalError> {
+        let readings: usize = self.channels.iter().map(ChannelReadings::len).sum();
+        let most = self
+            .channels
+            .iter()
+            .map(|c| c.x.chunk_by(|a, b| a == b).count())
+            .max()
+            .unwrap_or(0)
+            / POSITIONS_A_CELL;
+        let mut table: Vec<KnotTrial> = Vec::new();
+        let mut best = 0;
+        for cells in std::iter::once(1).chain(ladder(most)) {
+            let breaks = self.breaks(&unknowns_of(cells + 3), cells)?;
+            let unknowns = unknowns_of(breaks.len() + 2);
+            let count = unknowns.free_count();
+            if table.last().is_some_and(|t| t.cells == breaks.len() - 1) {
+                continue;
+            }
+            if readings < count + 2 {
+                break;
+            }
+            let bases = self.bases(&unknowns, &breaks)?;
+            let tilts = seed::tilts(&unknowns, self.lines);
+            let start = seed::start(&unknowns, &tilts, self.lines, self.thickness_mm);
+            let problem = Reversal::new(
+                self.channels,
+                unknowns,
+                bases,
+                self.axis,
+                self.thickness_mm,
+                self.weights.to_vec(),
+            );
+            let evaluation = evaluate(&problem, &start)?;
+            let Some(squares) = linear_squares(&problem, &evaluation.system) else {
+                break;
+            };
+            table.push(trial(breaks.len() - 1, readings, count, squares));
+            let last = table.len() - 1;
+            if table[last].aicc < table[best].aicc {
+                best = last;
+            } else if last >= best + PATIENCE {
+                break;
+            }
+        }
+        let cells = table.get(best).map_or(1, |t| t.cells);
+        Ok((cells, table))
+    }
+}
+
+fn trial(cells: usize, readings: usize, unknowns: usize, squares: f64) -> KnotTrial {
+    let (m, p) = (readings as f64, unknowns as f64);
+    // Noise-free readings leave rounding only: keep the logarithm finite.
+    let log = (squares / m).max(f64::MIN_POSITIVE).ln();
+    KnotTrial {
+        cells,
+        unknowns,
+        noise: (squares / (m - p)).sqrt(),
+        aicc: m * log + 2.0 * p * m / (m - p - 1.0),
+        bic: m * log + p * m.ln(),
+        gcv: m * squares / (m - p).powi(2),
+    }
+}
+
+/// The sum of squares that the linear fit leaves.
+fn linear_squares(problem: &Reversal, system: &Bordered) -> Option<f64> {
+    let solved = system
+        .solve(
+            problem.constraints(),
+            &nalgebra::DVector::zeros(problem.constraints().len()),
+            problem.held(),
+        )
+        .ok()?;
+    let left =
+        system.sum_of_squares() - 2.0 * system.predicted_reduction(&solved.band, &solved.border);
+    Some(left.max(system.unreachable_residual().powi(2)))
+}
+
+/// First guess of each channel's noise, µm: from every reading against the line through its
+/// neighbours, by the median, so that neither smooth forms nor outliers count.
+pub fn first_noise(channels: &[ChannelReadings], noise: Noise) -> Vec<f64> {
+    match noise {
+        Noise::Declared(sigma) => vec![sigma; channels.len()],
+        Noise::Equal => vec![1.0; channels.len()],
+        Noise::PerChannel => {
+            let guesses: Vec<f64> = channels.iter().map(median_second_difference).collect();
+            let largest = guesses.iter().fold(0.0_f64, |m, g| m.max(*g));
+            // Channels whose readings show no noise at all get a share of the noisiest.
+            guesses
+                .into_iter()
+                .map(|g| {
+                    if largest > 0.0 {
+                        g.max(1e-3 * largest)
+                    } else {
+                        1.0
+                    }
+                })
+                .collect()
+        }
+    }
+}
+
+/// Most differences that enter the median.
+const DIFFERENCES: usize = 4096;
+
+fn median_second_difference(channel: &ChannelReadings) -> f64 {
+    let count = channel.len().saturating_sub(2);
+    let step = count.div_ceil(DIFFERENCES).max(1);
+    let mut scaled: Vec<f64> = (0..count)
+        .step_by(step)
+        .map(|i| {
+            let (x, y) = (&channel.x[i..i + 3], &channel.value[i..i + 3]);
+            let share = if x[2] > x[0] {
+                (x[1] - x[0]) / (x[2] - x[0])
+            } else {
+                0.5
+            };
+            let rest = y[1] - (1.0 - share) * y[0] - share * y[2];
+            rest.abs() / (1.0 + share * share + (1.0 - share) * (1.0 - share)).sqrt()
+        })
+        .collect();
+    if scaled.is_empty() {
+        return 0.0;
+    }
+    let middle = scaled.len() / 2;
+    let (_, median, _) = scaled.select_nth_unstable_by(middle, f64::total_cmp);
+    // The median of |z| of a normal z is 0.6745 σ.
+    *median / 0.6745
+}

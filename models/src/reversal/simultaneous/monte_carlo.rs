@@ -1,0 +1,154 @@
+//! Uncertainty by propagation of distributions (JCGM 101:2008, clause 7): readings are drawn anew
+//! around the fitted model with the estimated noise, and fitted again on the same knots.
+
+use errsep_solvers::structured::{Options as Minimisation, minimise};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::error::ReversalError;
+use super::problem::Reversal;
+use super::readings::ChannelReadings;
+use super::solution::Simultaneous;
+use crate::reversal::Observations;
+
+/// What the trials say of one quantity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spread {
+    /// Its name.
+    pub name: String,
+    /// Mean over the trials.
+    pub mean: f64,
+    /// Standard deviation over the trials.
+    pub std: f64,
+    /// The 2.5 % and 97.5 % quantiles: the probabilistically symmetric 95 % interval.
+    pub interval_95: [f64; 2],
+}
+
+/// The result of the trials.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MonteCarlo {
+    /// Number of trials.
+    pub trials: usize,
+    /// The tilts, rad, in the order of [`Simultaneous::tilts`].
+    pub tilts: Vec<Spread>,
+    /// The forms, µm, in the order of [`Simultaneous::forms`]: one a position.
+    pub forms: Vec<Vec<Spread>>,
+}
+
+/// Draws and fits `trials` times; forms are looked at in the positions `x`, mm.
+///
+/// # Errors
+/// [`ReversalError`] where a trial has no answer, or for fewer than two trials.
+pub fn monte_carlo(
+    solution: &Simultaneous,
+    observations: &Observations,
+    x: &[f64],
+    trials: usize,
+    seed: u64,
+) -> Result<MonteCarlo, ReversalError> {
+    if trials < 2 {
+        return Err(ReversalError::NotUsable {
+            what: "the number of trials".to_owned(),
+            value: trials as f64,
+            must: "two or more",
+        });
+    }
+    let mut channels = ChannelReadings::sort(observations);
+    let models: Vec<Vec<f64>> = channels
+        .iter()
+        .map(|c| {
+            c.value
+                .iter()
+                .zip(&c.source)
+                .map(|(value, i)| value - solution.residuals.get(*i as usize).unwrap_or(&0.0))
+                .collect()
+        })
+        .collect();
+    let sigmas: Vec<f64> = solution.noise.iter().map(|n| n.sigma).collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut tilts: Vec<Vec<f64>> = Vec::new();
+    let mut forms: Vec<Vec<f64>> = Vec::new();
+    for _ in 0..trials {
+        for ((channel, model), sigma) in channels.iter_mut().zip(&models).zip(&sigmas) {
+            for (value, model) in channel.value.iter_mut().zip(model) {
+                let z: f64 = StandardNormal.sample(&mut rng);
+                *value = model + sigma * z;
+            }
+        }
+        let problem = Reversal::new(
+            &channels,
+            solution.unknowns.clone(),
+            solution.bases.clone(),
+            solution.axis,
+            solution.thickness_mm,
+            sigmas.iter().map(|s| 1.0 / s).collect(),
+        );
+        let fit = minimise(
+            &problem,
+            solution.parameters.clone(),
+            Minimisation::default(),
+        )?;
+        if !fit.converged() {
+            return Err(ReversalError::NotConverged {
+                ending: fit.ending.to_string(),
+            });
+        }
+        let mut trial = solution.clone();
+        trial.cubics = problem.cubics(&fit.parameters);
+        trial.parameters = fit.parameters;
+        tilts.push(trial.tilts().iter().map(|t| t.angle.value).collect());
+        forms.push(
+            trial
+                .form_values(x)
+                .into_iter()
+                .flat_map(|(_, values)| values)
+                .collect(),
+        );
+    }
+    let tilt_names: Vec<String> = solution.tilts().into_iter().map(|t| t.name).collect();
+    let form_names: Vec<String> = solution
+        .form_values(&[])
+        .into_iter()
+        .map(|(name, _)| name)
+        .collect();
+    Ok(MonteCarlo {
+        trials,
+        tilts: tilt_names
+            .into_iter()
+            .enumerate()
+            .map(|(j, name)| spread(name, tilts.iter().map(|t| t[j]).collect()))
+            .collect(),
+        forms: form_names
+            .into_iter()
+            .enumerate()
+            .map(|(f, name)| {
+                (0..x.len())
+                    .map(|k| {
+                        let at = f * x.len() + k;
+                        spread(name.clone(), forms.iter().map(|t| t[at]).collect())
+                    })
+                    .collect()
+            })
+            .collect(),
+    })
+}
+
+fn spread(name: String, mut values: Vec<f64>) -> Spread {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    values.sort_by(f64::total_cmp);
+    let quantile = |p: f64| {
+        let at = p * (n - 1.0);
+        let (low, share) = (at.floor() as usize, at.fract());
+        let high = (low + 1).min(values.len() - 1);
+        values[low] + share * (values[high] - values[low])
+    };
+    Spread {
+        interval_95: [quantile(0.025), quantile(0.975)],
+        name,
+        mean,
+        std: (squares / (n - 1.0)).sqrt(),
+    }
+}

@@ -1,0 +1,60 @@
+//! What a user may choose.
+
+use errsep_solvers::loss::Loss;
+
+use crate::reversal::Convention;
+
+/// How to fit.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Options {
+    /// Which contrasts of the slopes are tilts and which is held at zero.
+    pub convention: Convention,
+    /// Thickness (diameter) of the artefact.
+    pub thickness: Thickness,
+    /// Noise of a reading.
+    pub noise: Noise,
+    /// Break points of the forms.
+    pub knots: Knots,
+    /// Loss of a residual in units of its standard deviation; quadratic: least squares.
+    pub loss: Loss,
+    /// Tilts to begin with instead of those of the staged solution, rad, in the order of the fit.
+    pub start_tilts_rad: Option<Vec<f64>>,
+    /// Settings of the minimisation.
+    pub minimisation: errsep_solvers::structured::Options,
+}
+
+/// What is known of the artefact's thickness.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Thickness {
+    /// Nothing: no shift between near and far probe points.
+    #[default]
+    NotKnown,
+    /// Known, mm.
+    Known(f64),
+    /// To be fitted, from a first guess, mm. Determined only where tilts and forms are large.
+    Fitted(f64),
+}
+
+/// What is known of the noise.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Noise {
+    /// Nothing: estimated for every channel by itself.
+    #[default]
+    PerChannel,
+    /// The same in every channel, to be estimated.
+    Equal,
+    /// The standard deviation of one reading, µm.
+    Declared(f64),
+}
+
+/// Where the forms' break points lie.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Knots {
+    /// As many equal cells as the data support, by the corrected information criterion.
+    #[default]
+    Chosen,
+    /// So many equal cells (fewer where cells would be without readings).
+    Cells(usize),
+    /// These break points, mm, for all forms.
+    At(Vec<f64>),
+}

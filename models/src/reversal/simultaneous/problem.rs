@@ -1,0 +1,452 @@
+//! The reversal as a structured least-squares problem.
+//!
+//! A task is one cell and one channel: the readings for which the lower of the two cells that a
+//! reading sees (slide's form at x, artefact's form at u) is that cell. Both are monotone in x, so
+//! a task is a run of the sorted readings, and its ends are found by bisection.
+
+use errsep_solvers::linear::banded::Tall;
+use errsep_solvers::linear::bordered::Constraints;
+use errsep_solvers::loss::Loss;
+use errsep_solvers::problem::NoValue;
+use errsep_solvers::structured::{Parameters, Sink, StructuredProblem};
+use nalgebra::DMatrix;
+
+use super::gauge::{self, Axis};
+use super::readings::ChannelReadings;
+use super::rows::{CellForm, Points, Run};
+use super::unknowns::{Form, Unknowns};
+use crate::basis::bspline::{Cubic, CubicBSpline, horner};
+use crate::reversal::forward::{Attitude, no_contact};
+use crate::units::mm_from_um;
+
+/// The problem: readings, bases, weights.
+#[derive(Debug, Clone)]
+pub struct Reversal<'a> {
+    /// Sorted readings.
+    pub channels: &'a [ChannelReadings],
+    /// The unknowns.
+    pub unknowns: Unknowns,
+    /// The bases of the fitted forms, all of the same number of cells.
+    pub bases: Vec<CubicBSpline>,
+    /// The axis of the gauge.
+    pub axis: Axis,
+    /// Thickness where it is not an unknown, mm.
+    pub thickness_mm: f64,
+    /// 1/σ of a reading of each channel, 1/µm.
+    pub weights: Vec<f64>,
+    /// Loss of a weighted residual.
+    pub loss: Loss,
+    maps: Vec<DMatrix<f64>>,
+    constraints: Constraints,
+    held: Vec<bool>,
+    /// First reading at or beyond each break of the slide's form, by channel.
+    slide_starts: Vec<Vec<usize>>,
+}
+
+impl<'a> Reversal<'a> {
+    /// The problem for these unknowns and bases.
+    pub fn new(
+        channels: &'a [ChannelReadings],
+        unknowns: Unknowns,
+        bases: Vec<CubicBSpline>,
+        axis: Axis,
+        thickness_mm: f64,
+        weights: Vec<f64>,
+    ) -> Self {
+        let maps = (0..channels.len())
+            .map(|c| unknowns.border_map(c))
+            .collect();
+        let constraints = gauge::constraints(&unknowns, &bases, channels, axis);
+        let held = unknowns.held();
+        let slide_starts = match unknowns.place(Form::Slide) {
+            Some(form) => channels
+                .iter()
+                .map(|c| starts(&c.x, bases[form].breaks()))
+                .collect(),
+            None => Vec::new(),
+        };
+        Self {
+            channels,
+            unknowns,
+            bases,
+            axis,
+            thickness_mm,
+            weights,
+            loss: Loss::Quadratic,
+            maps,
+            constraints,
+            held,
+            slide_starts,
+        }
+    }
+
+    /// Number of cells of every form.
+    pub fn cell_count(&self) -> usize {
+        self.bases.first().map_or(0, CubicBSpline::cell_count)
+    }
+
+    /// The gauge.
+    pub fn gauge(&self) -> &Constraints {
+        &self.constraints
+    }
+
+    /// The thickness at a point, mm.
+    pub fn thickness(&self, at: &Parameters) -> f64 {
+        self.unknowns
+            .thickness_index()
+            .map_or(self.thickness_mm, |j| at.border[j])
+    }
+
+    /// The fitted forms, less their lines, as polynomials of their cells, µm.
+    pub fn cubics(&self, at: &Parameters) -> Vec<Vec<Cubic>> {
+        (0..self.unknowns.forms.len())
+            .map(|form| {
+                let coefficients = self.unknowns.coefficients_of(form, &at.band);
+                let [height, slope] = self.unknowns.line(form).map(|j| at.border[j]);
+                let basis = &self.bases[form];
+                (0..basis.cell_count())
+                    .map(|k| {
+                        let (left, width) = basis.cell(k);
+                        let mut cubic = basis.cubic(&coefficients, k);
+                        cubic[0] -= height + slope * self.axis.xi(left);
+                        cubic[1] -= slope * width / self.axis.scale;
+                        cubic
+                    })
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// Goes through the runs of a task: readings from..to, cell of the artefact's form, cell of
+    /// the slide's.
+    fn runs(
+        &self,
+        prepared: &Prepared,
+        channel: usize,
+        cell: usize,
+        mut run: impl FnMut(usize, usize, usize, usize) -> Result<(), NoValue>,
+    ) -> Result<(), NoValue> {
+        let side = &prepared.side_starts[channel];
+        let slide = self.slide_starts.get(channel).unwrap_or(side);
+        let cells = self.cell_count();
+        // A reading belongs to the lower of its two cells: to cell k from the later start on.
+        let start = side[cell].max(slide[cell]);
+        let end = side[cell + 1].max(slide[cell + 1]);
+        let (mut at_side, mut at_slide) = (cell, cell);
+        let mut from = start;
+        while from < end {
+            while at_side + 1 < cells && side[at_side + 1] <= from {
+                at_side += 1;
+            }
+            while at_slide + 1 < cells && slide[at_slide + 1] <= from {
+                at_slide += 1;
+            }
+            let to = end.min(side[at_side + 1]).min(slide[at_slide + 1]);
+            run(from, to, at_side, at_slide)?;
+            from = to;
+        }
+        Ok(())
+    }
+
+    /// What the readings of a channel share, in two cells.
+    fn run<'b>(
+        &'b self,
+        prepared: &Prepared,
+        channel: usize,
+        side: usize,
+        slide: usize,
+    ) -> Run<'b> {
+        let cell = |form: usize, k: usize| {
+            let (left, width) = self.bases[form].cell(k);
+            CellForm {
+                left,
+                width,
+                form: prepared.cubics[form][k],
+                basis: self.bases[form].polynomials(k),
+            }
+        };
+        let name = self.channels[channel].channel;
+        Run {
+            attitude: prepared.attitudes[channel],
+            side: cell(self.unknowns.side_of(name), side),
+            slide: self
+                .unknowns
+                .place(Form::Slide)
+                .map(|form| (cell(form, slide), name.indicator_sign())),
+            offset: prepared.offsets[channel],
+            center: self.axis.center,
+            scale: self.axis.scale,
+            weight: self.weights[channel],
+            thickness: self.unknowns.thickness,
+        }
+    }
+
+    /// Hands out model less reading, µm, of every reading: channel, place among its sorted
+    /// readings, value.
+    ///
+    /// # Errors
+    /// [`NoValue`] where the model is not defined.
+    pub fn residuals(
+        &self,
+        at: &Parameters,
+        mut take: impl FnMut(usize, usize, f64),
+    ) -> Result<(), NoValue> {
+        let prepared = self.prepare(at)?;
+        let mut points = Box::<Points>::default();
+        for (c, channel) in self.channels.iter().enumerate() {
+            for cell in 0..self.cell_count() {
+                self.runs(&prepared, c, cell, |from, to, side, slide| {
+                    let run = self.run(&prepared, c, side, slide);
+                    for first in (from..to).step_by(Tall::CAPACITY) {
+                        let last = to.min(first + Tall::CAPACITY);
+                        points.locate(
+                            &run,
+                            &channel.x[first..last],
+                            &channel.value[first..last],
+                        )?;
+                        for (i, r) in (first..last).zip(&points.residual) {
+                            take(c, i, r / self.weights[c]);
+                        }
+                    }
+                    Ok(())
+                })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Reversal<'_> {
+    /// The band unknowns of the local columns of a run.
+    fn band_columns(&self, channel: usize, side: usize, slide: usize) -> Vec<Option<usize>> {
+        let form = self.unknowns.side_of(self.channels[channel].channel);
+        let mut band = Vec::with_capacity(8);
+        if let Some(m) = self.unknowns.place(Form::Slide) {
+            band.extend((slide..slide + 4).map(|k| self.unknowns.coefficient(m, k)));
+        }
+        band.extend((side..side + 4).map(|k| self.unknowns.coefficient(form, k)));
+        band
+    }
+
+    /// Where the rows of each channel begin when all are written below each other.
+    pub fn row_starts(&self) -> Vec<usize> {
+        self.channels
+            .iter()
+            .scan(0, |next, c| {
+                let start = *next;
+                *next += c.len();
+                Some(start)
+            })
+            .collect()
+    }
+
+    /// Hands out all rows in batches: channel, place of the first among its sorted readings, band
+    /// unknowns of the local columns, rows.
+    ///
+    /// # Errors
+    /// [`NoValue`] where the model is not defined.
+    pub fn for_each_batch(
+        &self,
+        at: &Parameters,
+        mut take: impl FnMut(usize, usize, &[Option<usize>], &Tall),
+    ) -> Result<(), NoValue> {
+        let prepared = self.prepare(at)?;
+        let mut points = Box::<Points>::default();
+        let mut batch = Tall::new(16);
+        for (c, channel) in self.channels.iter().enumerate() {
+            for cell in 0..self.cell_count() {
+                self.runs(&prepared, c, cell, |from, to, side, slide| {
+                    let run = self.run(&prepared, c, side, slide);
+                    let band = self.band_columns(c, side, slide);
+                    for first in (from..to).step_by(Tall::CAPACITY) {
+                        let last = to.min(first + Tall::CAPACITY);
+                        let x = &channel.x[first..last];
+                        points.locate(&run, x, &channel.value[first..last])?;
+                        batch.reset(last - first, run.columns());
+                        points.fill(&run, x, None, &mut batch);
+                        take(c, first, &band, &batch);
+                    }
+                    Ok(())
+                })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// For each break the first of the sorted positions at or beyond it; the first and last breaks
+/// take in everything outside.
+fn starts(x: &[f64], breaks: &[f64]) -> Vec<usize> {
+    let mut starts: Vec<usize> = breaks
+        .iter()
+        .map(|b| x.partition_point(|x| x < b))
+        .collect();
+    if let Some(first) = starts.first_mut() {
+        *first = 0;
+    }
+    if let Some(last) = starts.last_mut() {
+        *last = x.len();
+    }
+    starts
+}
+
+/// What a robust loss makes of a batch: rows and residuals times √ρ′, and the cost ½ Σ ρ.
+///
+/// Plain reweighting: it converges linearly, but from anywhere. The correction by the curvature
+/// takes every row far from the model for an outlier without curvature, and there are many where
+/// forms begin at zero.
+struct Robust {
+    rows: [f64; Tall::CAPACITY],
+    residuals: [f64; Tall::CAPACITY],
+    cost: f64,
+}
+
+impl Robust {
+    fn of(loss: Loss, residuals: &[f64]) -> Self {
+        let mut robust = Self {
+            rows: [0.0; Tall::CAPACITY],
+            residuals: [0.0; Tall::CAPACITY],
+            cost: loss.cost(residuals),
+        };
+        for (i, r) in residuals.iter().enumerate() {
+            robust.rows[i] = loss.at(r * r).first.max(0.0).sqrt();
+            robust.residuals[i] = robust.rows[i] * r;
+        }
+        robust
+    }
+}
+
+/// What all tasks at a point share.
+#[derive(Debug, Clone)]
+pub struct Prepared {
+    cubics: Vec<Vec<Cubic>>,
+    attitudes: Vec<Attitude>,
+    offsets: Vec<f64>,
+    /// First reading whose probe point is at or beyond each break of the artefact's form.
+    side_starts: Vec<Vec<usize>>,
+    width: usize,
+}
+
+impl StructuredProblem for Reversal<'_> {
+    type Prepared = Prepared;
+
+    fn band_count(&self) -> usize {
+        self.unknowns.band_count()
+    }
+
+    fn border_count(&self) -> usize {
+        self.unknowns.border_count()
+    }
+
+    fn border_maps(&self) -> &[DMatrix<f64>] {
+        &self.maps
+    }
+
+    fn constraints(&self) -> &Constraints {
+        &self.constraints
+    }
+
+    fn held(&self) -> &[bool] {
+        &self.held
+    }
+
+    fn prepare(&self, at: &Parameters) -> Result<Prepared, NoValue> {
+        let half_mm = self.thickness(at) / 2.0;
+        let cubics = self.cubics(at);
+        let mut attitudes = Vec::with_capacity(self.channels.len());
+        let mut side_starts = Vec::with_capacity(self.channels.len());
+        for (c, channel) in self.channels.iter().enumerate() {
+            let attitude = Attitude::new(self.unknowns.slope(c, &at.border), half_mm)?;
+            let form = self.unknowns.side_of(channel.channel);
+            let basis = &self.bases[form];
+            // Breaks of the artefact's form, seen on the slide.
+            let breaks: Vec<f64> = basis
+                .breaks()
+                .iter()
+                .enumerate()
+                .map(|(k, u)| {
+                    let height = match cubics[form].get(k) {
+                        Some(cubic) => cubic[0],
+                        None => cubics[form].last().map_or(0.0, |cubic| horner(cubic, 1.0)),
+                    };
+                    attitude.slide_position(*u, mm_from_um(height))
+                })
+                .collect();
+            if let Some(pair) = breaks.windows(2).find(|pair| !(pair[0] < pair[1])) {
+                return Err(no_contact(pair[0]));
+            }
+            attitudes.push(attitude);
+            side_starts.push(starts(&channel.x, &breaks));
+        }
+        let mut prepared = Prepared {
+            cubics,
+            attitudes,
+            offsets: (0..self.channels.len())
+                .map(|c| at.border[self.unknowns.offset(c)])
+                .collect(),
+            side_starts,
+            width: 0,
+        };
+        let mut apart = 0;
+        for channel in 0..self.channels.len() {
+            for cell in 0..self.cell_count() {
+                self.runs(&prepared, channel, cell, |_, _, side, slide| {
+                    apart = apart.max(side.abs_diff(slide));
+                    Ok(())
+                })?;
+            }
+        }
+        prepared.width = (self.unknowns.forms.len() * (4 + apart)).min(self.band_count());
+        Ok(prepared)
+    }
+
+    fn band_width(&self, prepared: &Prepared) -> usize {
+        prepared.width
+    }
+
+    fn task_count(&self, _: &Prepared) -> usize {
+        self.cell_count() * self.channels.len()
+    }
+
+    fn task(&self, prepared: &Prepared, index: usize, sink: &mut Sink) -> Result<(), NoValue> {
+        let (cell, c) = (index / self.channels.len(), index % self.channels.len());
+        let channel = &self.channels[c];
+        let mut points = Points::default();
+        self.runs(prepared, c, cell, |from, to, side, slide| {
+            let run = self.run(prepared, c, side, slide);
+            sink.open(run.columns());
+            for first in (from..to).step_by(Tall::CAPACITY) {
+                let last = to.min(first + Tall::CAPACITY);
+                let x = &channel.x[first..last];
+                points.locate(&run, x, &channel.value[first..last])?;
+                if self.loss == Loss::Quadratic {
+                    points.fill(&run, x, None, sink.batch(last - first));
+                    sink.push();
+                } else {
+                    let robust = Robust::of(self.loss, &points.residual[..last - first]);
+                    let batch = sink.batch(last - first);
+                    points.fill(&run, x, Some(&robust.rows), batch);
+                    let residual = batch.columns() - 1;
+                    batch
+                        .column_mut(residual)
+                        .copy_from_slice(&robust.residuals[..last - first]);
+                    let cost = robust.cost;
+                    sink.push_with_cost(cost);
+                }
+            }
+            let band = self.band_columns(c, side, slide);
+            sink.close(band, c);
+            Ok(())
+        })
+    }
+
+    fn border_name(&self, index: usize) -> String {
+        self.unknowns.border_name(index)
+    }
+
+    fn band_name(&self, index: usize) -> String {
+        self.bases
+            .first()
+            .map_or_else(String::new, |b| self.unknowns.band_name(index, b.breaks()))
+    }
+}

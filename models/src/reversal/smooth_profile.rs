@@ -1,0 +1,155 @@
+//! A measured profile as a smooth function with derivatives: the natural cubic smoothing spline
+//! with its weight chosen by generalised cross-validation.
+//!
+//! Green and Silverman, Nonparametric Regression and Generalized Linear Models (1994), chapter 2;
+//! the basis that makes every weight cheap is that of Demmler and Reinsch (1975).
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// The smoother of one set of positions: found once, used for every profile over them.
+#[derive(Debug, Clone)]
+pub struct Smoother {
+    positions: Arc<Vec<f64>>,
+    /// Columns: the Demmler–Reinsch basis.
+    basis: Arc<DMatrix<f64>>,
+    roughness: Arc<DVector<f64>>,
+    /// γ = `curvature` · g: second derivatives at the inner positions from the values.
+    curvature: Arc<DMatrix<f64>>,
+}
+
+/// A smooth profile at its positions.
+#[derive(Debug, Clone)]
+pub struct SmoothProfile {
+    /// Values.
+    pub values: DVector<f64>,
+    /// First derivatives, unit of the values per unit of the positions.
+    pub slopes: DVector<f64>,
+}
+
+impl SmoothProfile {
+    /// The value at any position by the cubic between neighbours; straight beyond the ends.
+    pub fn at(&self, positions: &[f64], x: f64) -> f64 {
+        let n = positions.len();
+        let right = positions.partition_point(|p| *p < x);
+        if right == 0 || right >= n {
+            let end = if right == 0 { 0 } else { n - 1 };
+            return self.values[end] + self.slopes[end] * (x - positions[end]);
+        }
+        let (left, h) = (right - 1, positions[right] - positions[right - 1]);
+        let t = (x - positions[left]) / h;
+        let (u, tt) = (1.0 - t, t * t);
+        let (uu, rest) = (u * u, t * u);
+        self.values[left] * uu * (1.0 + 2.0 * t)
+            + self.values[right] * tt * (1.0 + 2.0 * u)
+            + h * rest * (self.slopes[left] * u - self.slopes[right] * t)
+    }
+}
+
+impl Smoother {
+    /// The smoother over strictly increasing positions, or `None` for fewer than four of them.
+    pub fn new(positions: &[f64]) -> Option<Self> {
+        let n = positions.len();
+        if n < 4 || positions.windows(2).any(|w| w[1] <= w[0]) {
+            return None;
+        }
+        let gap: Vec<f64> = positions.windows(2).map(|w| w[1] - w[0]).collect();
+        let mut differences = DMatrix::zeros(n, n - 2);
+        let mut gram = DMatrix::zeros(n - 2, n - 2);
+        for j in 0..n - 2 {
+            differences[(j, j)] = 1.0 / gap[j];
+            differences[(j + 1, j)] = -1.0 / gap[j] - 1.0 / gap[j + 1];
+            differences[(j + 2, j)] = 1.0 / gap[j + 1];
+            gram[(j, j)] = (gap[j] + gap[j + 1]) / 3.0;
+            if j + 1 < n - 2 {
+                gram[(j, j + 1)] = gap[j + 1] / 6.0;
+                gram[(j + 1, j)] = gap[j + 1] / 6.0;
+            }
+        }
+        let curvature = gram.cholesky()?.solve(&differences.transpose());
+        let eigen = SymmetricEigen::new(&differences * &curvature);
+        Some(Self {
+            positions: Arc::new(positions.to_vec()),
+            basis: Arc::new(eigen.eigenvectors),
+            roughness: Arc::new(eigen.eigenvalues.map(|v| v.max(0.0))),
+            curvature: Arc::new(curvature),
+        })
+    }
+
+    /// The smooth profile that generalised cross-validation prefers.
+    pub fn smooth(&self, values: &DVector<f64>) -> SmoothProfile {
+        let n = values.len();
+        let coefficients = self.basis.tr_mul(values);
+        // Two directions (the straight lines) have no roughness; eigenvalues that rounding
+        // leaves there are far below this.
+        let top = self.roughness.max();
+        let mut best = (f64::INFINITY, 0.0);
+        for step in 0..=60 {
+            let weight = 10f64.powf(-6.0 + 0.3 * f64::from(step)) / top;
+            let (mut rss, mut left) = (0.0, 0.0);
+            for (c, d) in coefficients.iter().zip(self.roughness.iter()) {
+                let shrunk = weight * d / (1.0 + weight * d);
+                rss += (c * shrunk).powi(2);
+                left += shrunk;
+            }
+            let score = n as f64 * rss / (left * left).max(f64::MIN_POSITIVE);
+            if score < best.0 {
+                best = (score, weight);
+            }
+        }
+        let kept = coefficients.zip_map(&self.roughness, |c, d| c / (1.0 + best.1 * d));
+        self.through(&*self.basis * kept)
+    }
+
+    /// The natural cubic spline through given values.
+    pub fn through(&self, values: DVector<f64>) -> SmoothProfile {
+        let n = values.len();
+        let inner = &*self.curvature * &values;
+        let mut curvatures = DVector::zeros(n);
+        curvatures.rows_mut(1, n - 2).copy_from(&inner);
+        let mut slopes = DVector::zeros(n);
+        for k in 0..n - 1 {
+            let h = self.positions[k + 1] - self.positions[k];
+            let chord = (values[k + 1] - values[k]) / h;
+            slopes[k] = chord - h * (2.0 * curvatures[k] + curvatures[k + 1]) / 6.0;
+            if k + 2 == n {
+                slopes[k + 1] = chord + h * (curvatures[k] + 2.0 * curvatures[k + 1]) / 6.0;
+            }
+        }
+        SmoothProfile { values, slopes }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn follows_a_wave_and_its_slope_through_noise() {
+        let x: Vec<f64> = (0..120).map(|k| f64::from(k) * 2.5).collect();
+        let wave = |t: f64| (t / 20.0).sin();
+        let noisy = DVector::from_iterator(
+            x.len(),
+            x.iter()
+                .enumerate()
+                .map(|(k, &t)| wave(t) + 0.01 * (7919.0 * (k * k) as f64).sin()),
+        );
+        let profile = Smoother::new(&x).unwrap().smooth(&noisy);
+        for k in 5..115 {
+            // k·u: three standard deviations of the noise, and of its slope over a few positions.
+            assert!((profile.values[k] - wave(x[k])).abs() < 0.03);
+            assert!((profile.slopes[k] - (x[k] / 20.0).cos() / 20.0).abs() < 0.004);
+        }
+    }
+
+    #[test]
+    fn a_straight_line_is_left_alone() {
+        let x = [0.0, 1.0, 2.5, 3.0, 7.0, 8.0];
+        let line = DVector::from_iterator(6, x.iter().map(|t| 3.0 - 0.5 * t));
+        let profile = Smoother::new(&x).unwrap().smooth(&line);
+        // Epsilons, times the condition of the eigenvectors.
+        assert!((profile.values - line).amax() < 1e-9);
+        assert!(profile.slopes.iter().all(|s| (s + 0.5).abs() < 1e-9));
+    }
+}

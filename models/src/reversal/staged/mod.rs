@@ -1,0 +1,357 @@
+//! The staged solution: lines, contrasts, forms from what the lines leave.
+//!
+//! Each channel's least-squares line gives its tilt; the contrasts of the tilts give α, β, γ; the
+//! rest of each channel, freed of its tilt by shear or rotation, gives the forms. See
+//! `docs/theory/reversal-staged.md`.
+
+mod answers;
+mod estimates;
+mod forms;
+mod grid;
+mod line;
+mod no_solution;
+mod noise;
+mod resample;
+mod rotation;
+mod tilts;
+mod trace;
+
+pub use super::Combination;
+pub use estimates::ErrorEstimates;
+pub use no_solution::NoSolution;
+pub use noise::{Noise, NoiseSource};
+pub use resample::Interpolation;
+pub use rotation::Removal;
+pub use trace::Trace;
+
+use super::convention::{Contrast, Convention};
+use super::{Channel, Observations};
+use estimates::rms;
+use forms::{Together, UnitVariances, bring_together, combine, solve_forms, take_tilt_out};
+use line::Line;
+use rotation::{angle_of_slope, sheared};
+use tilts::{channel_lines, contrasts, solve_tilts};
+
+/// How to solve.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Options {
+    /// How the tilt is taken out; absent: whichever has the smaller estimated error (shear where its
+    /// error is below a hundredth of the noise).
+    pub removal: Option<Removal>,
+    /// How rotated or differing grids are brought together.
+    pub interpolation: Interpolation,
+    /// How the slopes are read.
+    pub convention: Convention,
+    /// Thickness (diameter) D of the artefact, mm, if known.
+    pub thickness: Option<f64>,
+    /// Standard deviation of one reading, µm, if known.
+    pub noise: Option<f64>,
+}
+
+/// A number with its standard uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Value {
+    /// The estimate.
+    pub value: f64,
+    /// Its standard uncertainty (k = 1), from the noise of the readings.
+    pub std: f64,
+}
+
+/// The least-squares line of one channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelLine {
+    /// Which channel.
+    pub channel: Channel,
+    /// Readings used.
+    pub readings: usize,
+    /// Different positions among them.
+    pub positions: usize,
+    /// Tilt, the arctangent of the slope, rad.
+    pub tilt: Value,
+    /// Height of the line at x = 0, µm.
+    pub offset: f64,
+    /// Root mean square of what the line leaves, µm.
+    pub rest_rms: f64,
+    /// Mean of backward minus forward readings, µm, where both were taken.
+    pub direction_difference: Option<f64>,
+    /// Estimated errors of shear, interpolation and thickness along the channel.
+    pub estimates: ErrorEstimates,
+}
+
+/// A combination of tilts that the channels determine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tilt {
+    /// Its name in the convention, such as `alpha` or `beta + gamma`.
+    pub name: String,
+    /// Its coefficients on the convention's tilts and its weights on the channels.
+    pub combination: Combination,
+    /// Value, rad.
+    pub angle: Value,
+}
+
+/// A combination of forms that the channels determine, on the common grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Form {
+    /// Its name, such as `M` or `S_A/2 - S_B/2`.
+    pub name: String,
+    /// Its coefficients on M, S_A, S_B and its weights on the channels.
+    pub combination: Combination,
+    /// Values, µm, without straight-line part.
+    pub values: Vec<f64>,
+    /// Standard uncertainties, µm.
+    pub std: Vec<f64>,
+}
+
+/// What the one redundancy of four channels says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Closure {
+    /// The contrast that the convention says is zero, rad.
+    pub slope: Value,
+    /// (R1A + R1B − R2A − R2B)/4 on the common grid, µm, without straight-line part.
+    pub profile: Vec<f64>,
+    /// Its root mean square, µm.
+    pub rms: f64,
+    /// The root mean square that the noise alone would give, µm.
+    pub expected_rms: f64,
+}
+
+/// Root mean squares over all channels of the method's estimated errors, µm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorRms {
+    /// Shear instead of rotation.
+    pub shear: f64,
+    /// Interpolation after rotation.
+    pub interpolation: f64,
+    /// The source document's shear error.
+    pub shear_as_printed: f64,
+    /// The source document's interpolation error.
+    pub interpolation_as_printed: f64,
+    /// Thickness, where it is known.
+    pub thickness: Option<f64>,
+}
+
+/// What the model leaves of the readings on the common grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// Root mean square, µm.
+    pub rms: f64,
+    /// Mean readings less unknowns.
+    pub degrees_of_freedom: usize,
+}
+
+/// The staged solution.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Staged {
+    /// How the slopes were read.
+    pub convention: Convention,
+    /// How the tilt was taken out.
+    pub removal: Removal,
+    /// The lines, in the order of the channels.
+    pub lines: Vec<ChannelLine>,
+    /// The tilts or their combinations, orthogonal to each other.
+    pub tilts: Vec<Tilt>,
+    /// All four contrasts of the slopes; only four channels have them.
+    pub contrasts: Option<[(Contrast, Value); 4]>,
+    /// Positions of the forms, mm.
+    pub x: Vec<f64>,
+    /// Whether the traces share that grid, or were interpolated onto it.
+    pub one_grid: bool,
+    /// The forms or their combinations.
+    pub forms: Vec<Form>,
+    /// The closure; only four channels have one.
+    pub closure: Option<Closure>,
+    /// What the model leaves.
+    pub residual: Residual,
+    /// The noise behind the uncertainties, and the other figures that the data give.
+    pub noise: Noise,
+    /// Every noise figure at hand, the one in use first.
+    pub noise_figures: Vec<Noise>,
+}
+
+/// The names of the forms.
+pub const FORMS: [&str; 3] = ["M", "S_A", "S_B"];
+
+const MOST: f64 = std::f64::consts::FRAC_PI_4;
+
+/// Solves in stages.
+///
+/// Repeats and directions are averaged at each position; traces of different grids are interpolated
+/// onto a common one. Any subset of channels is taken: the answer holds the combinations that it
+/// determines.
+///
+/// # Errors
+/// [`NoSolution`] says what is missing.
+pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, NoSolution> {
+    check(observations, options)?;
+    let traces = Channel::ALL
+        .into_iter()
+        .filter_map(|c| Trace::of(observations, c))
+        .collect::<Vec<_>>();
+    let fits = fit_lines(&traces)?;
+    let estimates = estimate_errors(&traces, &fits, options);
+    let early_noise = noise_figures(options, &traces, None);
+    let removal = options
+        .removal
+        .unwrap_or_else(|| choose(&estimates, early_noise.first()));
+    let half = options.thickness.unwrap_or(0.0) / 2.0;
+    let (removal, profiles) = match take_tilt_out(&traces, &fits, removal, half) {
+        Err(NoSolution::Folded { .. }) if options.removal.is_none() => (
+            Removal::Shear,
+            take_tilt_out(&traces, &fits, Removal::Shear, half)?,
+        ),
+        profiles => (removal, profiles?),
+    };
+    let Together { x, rests, one_grid } =
+        bring_together(&traces, &profiles, removal, options.interpolation)?;
+    let unit = UnitVariances::of(&traces, &x);
+    let closure_profile = (traces.len() == 4).then(|| {
+        let weights = Channel::ALL.map(|c| c.spindle_sign() / 4.0);
+        (combine(&x, &rests, &weights), unit.of_profile(&x, &weights))
+    });
+    let noise_figures = noise_figures(options, &traces, closure_profile.as_ref());
+    let noise = *noise_figures.first().ok_or(NoSolution::NoReadings)?;
+    let lines = channel_lines(&traces, &fits, estimates, noise.sigma);
+    let forms = solve_forms(&x, &rests, &traces, &unit, noise.sigma);
+    let contrasts = (traces.len() == 4).then(|| contrasts(&lines));
+    let closure = closure_profile
+        .zip(contrasts)
+        .map(|((profile, unit), contrasts)| {
+            let closing = options.convention.closure();
+            let slope = contrasts.iter().find(|(c, _)| *c == closing);
+            let expected = unit.iter().sum::<f64>() / unit.len() as f64;
+            Closure {
+                slope: slope.map_or(
+                    Value {
+                        value: 0.0,
+                        std: 0.0,
+                    },
+                    |(_, v)| *v,
+                ),
+                rms: rms(&profile),
+                expected_rms: noise.sigma * expected.sqrt(),
+                profile,
+            }
+        });
+    let freedom = residual_freedom(&x, &lines);
+    let mut staged = Staged {
+        convention: options.convention,
+        removal,
+        tilts: solve_tilts(&lines, options.convention),
+        contrasts,
+        residual: freedom,
+        lines,
+        x,
+        one_grid,
+        forms,
+        closure,
+        noise,
+        noise_figures,
+    };
+    staged.residual.rms = rms(staged.residuals().iter().flat_map(|(_, r)| r));
+    Ok(staged)
+}
+
+fn check(observations: &Observations, options: &Options) -> Result<(), NoSolution> {
+    if observations.readings.is_empty() {
+        return Err(NoSolution::NoReadings);
+    }
+    let refuse = |what, value| Err(NoSolution::NotUsable { what, value });
+    for r in &observations.readings {
+        if !r.x.is_finite() {
+            return refuse("a position", r.x);
+        }
+        if !r.value.is_finite() {
+            return refuse("a reading", r.value);
+        }
+    }
+    if let Some(d) = options.thickness.filter(|d| !(d.is_finite() && *d >= 0.0)) {
+        return refuse("the thickness", d);
+    }
+    if let Some(s) = options.noise.filter(|s| !(s.is_finite() && *s > 0.0)) {
+        return refuse("the noise", s);
+    }
+    Ok(())
+}
+
+fn fit_lines(traces: &[Trace]) -> Result<Vec<Line>, NoSolution> {
+    traces
+        .iter()
+        .map(|t| {
+            let too_few = NoSolution::TooFewPositions {
+                channel: t.channel.name(),
+                positions: t.x.len(),
+            };
+            if t.x.len() < 3 {
+                return Err(too_few);
+            }
+            let line = Line::fit(&t.x, &t.mean, &t.count).ok_or(too_few)?;
+            let tilt = angle_of_slope(line.slope);
+            // Written so that a slope that overflowed is refused too.
+            if tilt.abs() < MOST && line.at(0.0).is_finite() {
+                Ok(line)
+            } else {
+                Err(NoSolution::TooSteep {
+                    channel: t.channel.name(),
+                    degrees: tilt.to_degrees(),
+                })
+            }
+        })
+        .collect()
+}
+
+fn estimate_errors(traces: &[Trace], lines: &[Line], options: &Options) -> Vec<ErrorEstimates> {
+    traces
+        .iter()
+        .zip(lines)
+        .map(|(t, line)| {
+            let (x, rest) = sheared(t, line);
+            ErrorEstimates::of(&x, &rest, line, options.thickness, options.interpolation)
+        })
+        .collect()
+}
+
+/// A shear error below this share of the noise is not worth an interpolation.
+const NEGLIGIBLE: f64 = 0.01;
+
+/// The removal whose estimated error is smaller, root mean square over all channels; the simpler
+/// shear where its error is lost in the noise.
+fn choose(estimates: &[ErrorEstimates], noise: Option<&Noise>) -> Removal {
+    let shear = rms(estimates.iter().flat_map(|e| &e.shear));
+    let interpolation = rms(estimates.iter().flat_map(|e| &e.interpolation));
+    let lost = noise.map_or(0.0, |n| NEGLIGIBLE * n.sigma);
+    if interpolation < shear && shear > lost {
+        Removal::Rotation
+    } else {
+        Removal::Shear
+    }
+}
+
+fn noise_figures(
+    options: &Options,
+    traces: &[Trace],
+    closure: Option<&(Vec<f64>, Vec<f64>)>,
+) -> Vec<Noise> {
+    let declared = options.noise.map(|sigma| Noise {
+        sigma,
+        source: NoiseSource::Declared,
+        degrees_of_freedom: None,
+    });
+    [
+        declared,
+        noise::from_repeats(traces),
+        closure.and_then(|(profile, unit)| noise::from_closure(profile, unit)),
+        noise::from_neighbours(traces),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// Four channels of n positions: 4 n mean readings; 4 offsets, 3 tilts and 3 forms of n values less
+/// line each. Fewer channels leave nothing.
+fn residual_freedom(x: &[f64], lines: &[ChannelLine]) -> Residual {
+    Residual {
+        rms: 0.0,
+        degrees_of_freedom: if lines.len() == 4 { x.len() - 1 } else { 0 },
+    }
+}

@@ -1,0 +1,96 @@
+//! The standard deviation of one reading: declared, or estimated from what the data repeat.
+
+use serde::{Deserialize, Serialize};
+
+use super::line::Line;
+use super::trace::Trace;
+
+/// Where a noise figure comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum NoiseSource {
+    /// Given in the set-up.
+    Declared,
+    /// Scatter of repeats at the same position, direction and channel.
+    Repeats,
+    /// The closure profile, the one redundancy of four channels.
+    Closure,
+    /// Each reading against its two neighbours: holds the curvature of the forms too, so that it is
+    /// too large rather than too small.
+    Neighbours,
+}
+
+impl NoiseSource {
+    /// In words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Declared => "declared in the set-up",
+            Self::Repeats => "from the scatter of repeats",
+            Self::Closure => "from the closure profile",
+            Self::Neighbours => "from each reading against its neighbours (an upper bound)",
+        }
+    }
+}
+
+/// A noise figure.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Noise {
+    /// Standard deviation of one reading, µm.
+    pub sigma: f64,
+    /// Where it comes from.
+    pub source: NoiseSource,
+    /// Degrees of freedom; absent where declared.
+    pub degrees_of_freedom: Option<f64>,
+}
+
+/// From the scatter of repeats, if there are any.
+pub fn from_repeats(traces: &[Trace]) -> Option<Noise> {
+    let squares = traces.iter().map(|t| t.scatter).sum::<f64>();
+    let freedom = traces.iter().map(|t| t.scatter_freedom).sum::<usize>();
+    (freedom > 0).then(|| Noise {
+        sigma: (squares / freedom as f64).sqrt(),
+        source: NoiseSource::Repeats,
+        degrees_of_freedom: Some(freedom as f64),
+    })
+}
+
+/// From the closure profile (line removed) and the variance that one unit of noise gives it at each
+/// position.
+pub fn from_closure(closure: &[f64], unit_variance: &[f64]) -> Option<Noise> {
+    let expected = unit_variance.iter().sum::<f64>();
+    let freedom = closure.len().checked_sub(2).filter(|&f| f > 0)?;
+    (expected > 0.0).then(|| Noise {
+        sigma: (closure.iter().map(|c| c * c).sum::<f64>() / expected).sqrt(),
+        source: NoiseSource::Closure,
+        degrees_of_freedom: Some(freedom as f64),
+    })
+}
+
+/// From each mean reading against the straight line between its neighbours.
+///
+/// The second differences of n independent values have about (n − 2)·18/35 degrees of freedom
+/// (von Neumann's ratio for second differences).
+pub fn from_neighbours(traces: &[Trace]) -> Option<Noise> {
+    let (mut squares, mut n) = (0.0, 0.0);
+    for trace in traces {
+        let Some(line) = Line::fit(&trace.x, &trace.mean, &trace.count) else {
+            continue;
+        };
+        for k in 1..trace.x.len().saturating_sub(1) {
+            let (x, count) = (&trace.x, &trace.count);
+            let right = (x[k] - x[k - 1]) / (x[k + 1] - x[k - 1]);
+            let left = 1.0 - right;
+            let rest = |j: usize| trace.mean[j] - line.at(x[j]);
+            let difference = rest(k) - left * rest(k - 1) - right * rest(k + 1);
+            let variance =
+                1.0 / count[k] + left * left / count[k - 1] + right * right / count[k + 1];
+            squares += difference * difference / variance;
+            n += 1.0;
+        }
+    }
+    (n > 0.0).then(|| Noise {
+        sigma: f64::sqrt(squares / n),
+        source: NoiseSource::Neighbours,
+        degrees_of_freedom: Some(n * 18.0 / 35.0),
+    })
+}

@@ -1,0 +1,102 @@
+//! One trace a channel: the mean reading at each position over repeats and directions.
+
+use crate::reversal::{Channel, Direction, Observations};
+
+/// The mean readings of a channel at its positions, in growing order of position.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    /// Which channel.
+    pub channel: Channel,
+    /// Positions, mm, growing.
+    pub x: Vec<f64>,
+    /// Mean reading at each position, µm.
+    pub mean: Vec<f64>,
+    /// Readings behind each mean.
+    pub count: Vec<f64>,
+    /// Sum of squares of the readings about the mean of their position and direction, µm².
+    pub scatter: f64,
+    /// Degrees of freedom of `scatter`.
+    pub scatter_freedom: usize,
+    /// Mean of backward minus forward where both were read, µm: the reversal error of the slide and
+    /// the indicator together.
+    pub direction_difference: Option<f64>,
+}
+
+/// Two positions closer than this share of the range are the same place.
+const SAME_PLACE: f64 = 1e-9;
+
+impl Trace {
+    /// The trace of one channel, or `None` where it has no reading.
+    pub fn of(observations: &Observations, channel: Channel) -> Option<Self> {
+        let mut readings = observations
+            .of(channel)
+            .map(|r| (r.x, r.direction, r.value))
+            .collect::<Vec<_>>();
+        readings.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let range = readings.last()?.0 - readings.first()?.0;
+        let mut trace = Self {
+            channel,
+            x: Vec::new(),
+            mean: Vec::new(),
+            count: Vec::new(),
+            scatter: 0.0,
+            scatter_freedom: 0,
+            direction_difference: None,
+        };
+        let (mut differences, mut both) = (0.0, 0.0);
+        for place in readings.chunk_by(|a, b| b.0 - a.0 <= SAME_PLACE * range) {
+            let of = |direction| {
+                let mut cell = Cell::default();
+                place
+                    .iter()
+                    .filter(|r| r.1 == direction)
+                    .for_each(|r| cell.add(r.2));
+                cell
+            };
+            let (forward, backward) = (of(Direction::Forward), of(Direction::Backward));
+            let n = place.len() as f64;
+            trace.x.push(place.iter().map(|r| r.0).sum::<f64>() / n);
+            trace
+                .mean
+                .push((forward.n * forward.mean + backward.n * backward.mean) / n);
+            trace.count.push(n);
+            for cell in [&forward, &backward].into_iter().filter(|c| c.n > 0.0) {
+                trace.scatter += cell.squares;
+                trace.scatter_freedom += cell.n as usize - 1;
+            }
+            if forward.n > 0.0 && backward.n > 0.0 {
+                differences += backward.mean - forward.mean;
+                both += 1.0;
+            }
+        }
+        if both > 0.0 {
+            trace.direction_difference = Some(differences / both);
+        }
+        Some(trace)
+    }
+
+    /// First and last position, mm.
+    pub fn range(&self) -> (f64, f64) {
+        match (self.x.first(), self.x.last()) {
+            (Some(&first), Some(&last)) => (first, last),
+            _ => (0.0, 0.0),
+        }
+    }
+}
+
+/// Running mean and sum of squares about it (Welford).
+#[derive(Default)]
+struct Cell {
+    n: f64,
+    mean: f64,
+    squares: f64,
+}
+
+impl Cell {
+    fn add(&mut self, value: f64) {
+        self.n += 1.0;
+        let before = value - self.mean;
+        self.mean += before / self.n;
+        self.squares += before * (value - self.mean);
+    }
+}

@@ -1,0 +1,293 @@
+//! Traces at two opposite spindle angles from one indicator on an artefact that turns while the
+//! slide feeds.
+//!
+//! The reading is F(x) + a once-per-turn wave (the artefact runs out by its eccentricity and tilt)
+//! and its harmonics. The wave tells the spindle angle: its frequency is found where a least-squares
+//! fit of wave and smooth background leaves least. Every half turn the indicator sees the opposite
+//! side, as in the channels 1A and 2B of the reversal.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+use thiserror::Error;
+
+use super::{Channel, Direction, Observations, Reading};
+
+/// One sample of the run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Seconds.
+    pub time: f64,
+    /// Slide position, mm.
+    pub x: f64,
+    /// Reading, µm.
+    pub value: f64,
+}
+
+/// How the spindle turned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turning {
+    /// Turns in a second.
+    pub frequency: f64,
+    /// Its standard uncertainty.
+    pub frequency_std: f64,
+    /// Time, s, at which the once-per-turn wave is highest, nearest the middle of the run.
+    pub highest_at: f64,
+    /// Half the run-out in the middle of the run: amplitude of the once-per-turn wave, µm.
+    pub amplitude: f64,
+    /// Standard uncertainty of the spindle angle in the middle of the run, rad.
+    pub angle_std_rad: f64,
+    /// Root mean square of what background, wave and its harmonics leave, µm.
+    pub rest_rms: f64,
+    /// Turns in the run.
+    pub turns: f64,
+}
+
+/// Why a run gives no traces.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum NoTraces {
+    /// Too few samples.
+    #[error("{samples} samples are too few: a run of three turns with 20 samples a turn is needed")]
+    TooFew {
+        /// How many there are.
+        samples: usize,
+    },
+    /// Times do not grow.
+    #[error("sample {index}: times must grow")]
+    Time {
+        /// Which sample, from 0.
+        index: usize,
+    },
+    /// Nothing turns.
+    #[error("no once-per-turn wave stands out of the readings")]
+    NoWave,
+}
+
+/// Degree of the polynomial that stands for all that is slow.
+const BACKGROUND_DEGREE: usize = 8;
+/// Harmonics of the turn in the fit of its frequency.
+const HARMONICS: usize = 2;
+/// Samples a turn needs, and turns a run needs.
+const SAMPLES_PER_TURN: f64 = 20.0;
+const FEWEST_TURNS: f64 = 3.0;
+
+/// Finds how the spindle turned; `about` is a guess of its turns in a second, if there is one.
+///
+/// # Errors
+/// [`NoTraces`].
+pub fn find_turning(samples: &[Sample], about: Option<f64>) -> Result<Turning, NoTraces> {
+    let n = samples.len();
+    let too_few = NoTraces::TooFew { samples: n };
+    if (n as f64) < FEWEST_TURNS * SAMPLES_PER_TURN {
+        return Err(too_few);
+    }
+    if let Some(i) = samples.windows(2).position(|w| w[1].time <= w[0].time) {
+        return Err(NoTraces::Time { index: i + 1 });
+    }
+    let span = samples[n - 1].time - samples[0].time;
+    let step = 1.0 / (2.0 * span);
+    let (from, to) = match about {
+        Some(f) => (0.95 * f, 1.05 * f),
+        None => (FEWEST_TURNS / span, n as f64 / (SAMPLES_PER_TURN * span)),
+    };
+    if !(from > 0.0 && from < to) {
+        return Err(too_few);
+    }
+    let rest = Fit::of(samples, None, 0).ok_or(NoTraces::NoWave)?.rests;
+    let power = |f: f64| {
+        let (c, s) = samples
+            .iter()
+            .zip(&rest)
+            .fold((0.0, 0.0), |(c, s), (p, r)| {
+                let (sin, cos) = (TAU * f * p.time).sin_cos();
+                (c + r * cos, s + r * sin)
+            });
+        c * c + s * s
+    };
+    let coarse = (0..=((to - from) / step).ceil() as usize)
+        .into_par_iter()
+        .map(|k| from + k as f64 * step)
+        .map(|f| (power(f), f))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .ok_or(NoTraces::NoWave)?
+        .1;
+    // Of steady amplitude: a run-out that turned evenly along the artefact could not be told from a
+    // little more or less speed, and would leave the frequency undetermined.
+    let squares = |f: f64| Fit::of(samples, Some(f), 2).map_or(f64::INFINITY, |fit| fit.squares);
+    let frequency = golden_section(coarse - 1.5 * step, coarse + 1.5 * step, squares);
+    let fit = Fit::of(samples, Some(frequency), 4).ok_or(NoTraces::NoWave)?;
+    let sigma = (fit.squares / (n - fit.unknowns) as f64).sqrt();
+    let amplitude = fit.cosine.hypot(fit.sine);
+    // Four standard deviations of the amplitude that noise alone would show.
+    if amplitude.is_nan() || amplitude <= 4.0 * sigma * (2.0 / n as f64).sqrt() {
+        return Err(NoTraces::NoWave);
+    }
+    let middle = f64::midpoint(samples[0].time, samples[n - 1].time);
+    let phase = fit.sine.atan2(fit.cosine);
+    Ok(Turning {
+        frequency,
+        // Cramér–Rao bound of a wave's frequency in white noise.
+        frequency_std: 6f64.sqrt() * sigma / (PI * span * amplitude * (n as f64).sqrt()),
+        highest_at: middle + phase / (TAU * frequency),
+        amplitude,
+        angle_std_rad: sigma * (2.0 / n as f64).sqrt() / amplitude,
+        rest_rms: sigma,
+        turns: span * frequency,
+    })
+}
+
+/// The run as traces of the channels 1A (spindle at `angle_rad` after the wave's highest reading) and
+/// 2B (half a turn later).
+///
+/// Each time the spindle passes one of the angles, the parabola through the samples within
+/// `window_rad` on either side gives one reading, at the mean speed of the slide there. A passage
+/// with fewer than four samples, or at an end of the run, is left out.
+///
+/// # Errors
+/// [`NoTraces`].
+pub fn traces(
+    samples: &[Sample],
+    turning: &Turning,
+    angle_rad: f64,
+    window_rad: f64,
+) -> Result<Observations, NoTraces> {
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
+        return Err(NoTraces::TooFew { samples: 0 });
+    };
+    let half_turn = 0.5 / turning.frequency;
+    let half_window = window_rad / (TAU * turning.frequency);
+    let origin = turning.highest_at + angle_rad / (TAU * turning.frequency);
+    let from = ((first.time + half_window - origin) / half_turn).ceil() as i64;
+    let to = ((last.time - half_window - origin) / half_turn).floor() as i64;
+    let mut readings = Vec::new();
+    for k in from..=to {
+        let time = origin + k as f64 * half_turn;
+        let begin = samples.partition_point(|p| p.time < time - half_window);
+        let end = samples.partition_point(|p| p.time <= time + half_window);
+        if let Some((x, value)) = passage(&samples[begin..end], time) {
+            readings.push(Reading {
+                channel: if k.rem_euclid(2) == 0 {
+                    Channel::C1A
+                } else {
+                    Channel::C2B
+                },
+                repeat: 1,
+                direction: Direction::Forward,
+                time: Some(time),
+                x,
+                value,
+            });
+        }
+    }
+    if readings.is_empty() {
+        return Err(NoTraces::TooFew {
+            samples: samples.len(),
+        });
+    }
+    if readings[0].x > readings[readings.len() - 1].x {
+        readings
+            .iter_mut()
+            .for_each(|r| r.direction = Direction::Backward);
+    }
+    Ok(Observations { readings })
+}
+
+/// Position (a line) and reading (a parabola) at a time, by least squares.
+fn passage(samples: &[Sample], time: f64) -> Option<(f64, f64)> {
+    if samples.len() < 4 {
+        return None;
+    }
+    let scale = samples
+        .iter()
+        .map(|p| (p.time - time).abs())
+        .fold(0.0, f64::max);
+    let at = |i: usize| (samples[i].time - time) / scale;
+    let fit = |columns: usize, y: fn(&Sample) -> f64| {
+        let design = DMatrix::from_fn(samples.len(), columns, |i, j| at(i).powi(j as i32));
+        let values = DVector::from_iterator(samples.len(), samples.iter().map(y));
+        let solution = design.svd(true, true).solve(&values, 1e-12).ok()?;
+        solution.get(0).copied()
+    };
+    Some((fit(2, |p| p.x)?, fit(3, |p| p.value)?))
+}
+
+/// Least squares of background, and of the wave of a frequency with its harmonics: two columns a
+/// harmonic for steady amplitudes, four for such that change evenly along the run.
+struct Fit {
+    squares: f64,
+    unknowns: usize,
+    rests: Vec<f64>,
+    /// Once-per-turn amplitudes in the middle of the run.
+    cosine: f64,
+    sine: f64,
+}
+
+impl Fit {
+    fn of(samples: &[Sample], frequency: Option<f64>, columns: usize) -> Option<Self> {
+        let (first, last) = (samples.first()?.time, samples.last()?.time);
+        let middle = f64::midpoint(first, last);
+        let background = BACKGROUND_DEGREE + 1;
+        let unknowns = background + columns * HARMONICS;
+        let fill = |p: &Sample, row: &mut DVector<f64>| {
+            let t = (p.time - middle) / (last - middle);
+            row[0] = 1.0;
+            row[1] = t;
+            for k in 2..background {
+                row[k] = 2.0 * t * row[k - 1] - row[k - 2];
+            }
+            if let Some(f) = frequency {
+                for h in 0..HARMONICS {
+                    let (sin, cos) = ((h + 1) as f64 * TAU * f * (p.time - middle)).sin_cos();
+                    let values = [cos, sin, t * cos, t * sin];
+                    for (k, value) in values.into_iter().take(columns).enumerate() {
+                        row[background + columns * h + k] = value;
+                    }
+                }
+            }
+        };
+        // Chebyshev polynomials and waves are near orthogonal: normal equations lose few digits.
+        let mut row = DVector::zeros(unknowns);
+        let mut normal = DMatrix::zeros(unknowns, unknowns);
+        let mut right = DVector::zeros(unknowns);
+        for p in samples {
+            fill(p, &mut row);
+            normal.ger(1.0, &row, &row, 1.0);
+            right.axpy(p.value, &row, 1.0);
+        }
+        let solution = normal.cholesky()?.solve(&right);
+        let rests = samples
+            .iter()
+            .map(|p| {
+                fill(p, &mut row);
+                p.value - row.dot(&solution)
+            })
+            .collect::<Vec<_>>();
+        let amplitude = |k: usize| solution.get(background + k).copied().unwrap_or(0.0);
+        Some(Self {
+            squares: rests.iter().map(|r| r * r).sum(),
+            unknowns,
+            cosine: amplitude(0),
+            sine: amplitude(1),
+            rests,
+        })
+    }
+}
+
+/// The least value of a function with one minimum between two points, to about √ε of their distance.
+fn golden_section(mut a: f64, mut b: f64, f: impl Fn(f64) -> f64) -> f64 {
+    const SHARE: f64 = 0.618_033_988_749_894_9;
+    let (mut c, mut d) = (b - SHARE * (b - a), a + SHARE * (b - a));
+    let (mut fc, mut fd) = (f(c), f(d));
+    for _ in 0..36 {
+        if fc < fd {
+            (b, d, fd) = (d, c, fc);
+            c = b - SHARE * (b - a);
+            fc = f(c);
+        } else {
+            (a, c, fc) = (c, d, fd);
+            d = a + SHARE * (b - a);
+            fd = f(d);
+        }
+    }
+    f64::midpoint(a, b)
+}

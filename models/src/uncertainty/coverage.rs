@@ -1,0 +1,60 @@
+//! Coverage factor and expanded uncertainty (GUM chapter 6 and annex G).
+
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+
+use super::{DegreesOfFreedom, Quantity, UncertaintyError};
+
+/// The factor `k` for which `±k u` holds the given share of Student's distribution with these
+/// degrees of freedom (GUM G.3.2); of the normal distribution when they are infinite.
+///
+/// # Errors
+/// A probability outside 0..1, or degrees of freedom that are not positive.
+pub fn coverage_factor(
+    probability: f64,
+    degrees_of_freedom: DegreesOfFreedom,
+) -> Result<f64, UncertaintyError> {
+    if !(probability > 0.0 && probability < 1.0) {
+        return Err(UncertaintyError::BadProbability { found: probability });
+    }
+    let upper = 0.5 + 0.5 * probability;
+    match degrees_of_freedom {
+        DegreesOfFreedom::Infinite => Ok(Normal::standard().inverse_cdf(upper)),
+        DegreesOfFreedom::Finite(number) => StudentsT::new(0.0, 1.0, number)
+            .map(|student| student.inverse_cdf(upper))
+            .map_err(|_| UncertaintyError::BadDegreesOfFreedom { found: number }),
+    }
+}
+
+/// An expanded uncertainty `U = k u` and its interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Expanded {
+    /// Share of the distribution that the interval is meant to hold.
+    pub coverage_probability: f64,
+    /// Coverage factor `k`.
+    pub coverage_factor: f64,
+    /// Expanded uncertainty `U`, in the unit of the quantity.
+    pub expanded_uncertainty: f64,
+    /// Lower end `value - U`.
+    pub lower: f64,
+    /// Upper end `value + U`.
+    pub upper: f64,
+}
+
+impl Quantity {
+    /// Expands to the given coverage probability with Student's factor.
+    ///
+    /// # Errors
+    /// As [`coverage_factor`].
+    pub fn expanded(&self, probability: f64) -> Result<Expanded, UncertaintyError> {
+        let k = coverage_factor(probability, self.degrees_of_freedom)?;
+        let u = k * self.standard_uncertainty;
+        Ok(Expanded {
+            coverage_probability: probability,
+            coverage_factor: k,
+            expanded_uncertainty: u,
+            lower: self.value - u,
+            upper: self.value + u,
+        })
+    }
+}

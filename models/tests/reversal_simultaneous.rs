@@ -1,0 +1,628 @@
+//! The simultaneous solution against known truth, against the staged solution, and against itself.
+
+use errsep_models::basis::bspline::CubicBSpline;
+use errsep_models::reversal::simulate::{GaugedForm, Plan, TrueForm, Truth, even_grid, simulate};
+use errsep_models::reversal::simultaneous::{
+    Axis, ChannelReadings, DenseReversal, Knots, Noise, Options, Reversal, ReversalError,
+    Simultaneous, Thickness, Unknowns, fit, monte_carlo,
+};
+use errsep_models::reversal::{
+    Channel, Convention, Direction, Observations, Reading, simultaneous, staged,
+};
+use errsep_solvers::loss::Loss;
+use errsep_solvers::structured::{Parameters, evaluate};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const LENGTH: f64 = 300.0;
+
+/// Spline forms of 1 µm on equal cells, four traces of n readings.
+fn spline_plan(cells: usize, n: usize, noise: f64, seed: u64) -> (Plan, CubicBSpline) {
+    let basis = CubicBSpline::uniform(0.0, LENGTH, cells).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(4 + cells as u64);
+    let mut plan = Plan::even(0.0, LENGTH, n, noise);
+    plan.m = TrueForm::random_spline(&mut rng, basis.clone(), 1.0);
+    plan.s_a = TrueForm::random_spline(&mut rng, basis.clone(), 1.0);
+    plan.s_b = TrueForm::random_spline(&mut rng, basis.clone(), 1.0);
+    plan.alpha_rad = 120e-6;
+    plan.beta_rad = -80e-6;
+    plan.gamma_rad = 900e-6;
+    plan.thickness_mm = 42.0;
+    for (i, trace) in plan.traces.iter_mut().enumerate() {
+        trace.offset = 3.0 - 2.0 * i as f64;
+    }
+    plan.seed = seed;
+    (plan, basis)
+}
+
+fn options(basis: &CubicBSpline, thickness_mm: f64, noise: Noise) -> Options {
+    Options {
+        thickness: Thickness::Known(thickness_mm),
+        noise,
+        knots: Knots::At(basis.breaks().to_vec()),
+        ..Options::default()
+    }
+}
+
+fn tilt(solution: &Simultaneous, name: &str) -> staged::Value {
+    solution
+        .tilts()
+        .iter()
+        .find(|t| t.name == name)
+        .unwrap_or_else(|| panic!("no {name} among {:?}", solution.tilts()))
+        .angle
+}
+
+fn truths(truth: &Truth) -> [(&'static str, f64); 3] {
+    [
+        ("alpha", truth.alpha_rad),
+        ("beta", truth.beta_rad),
+        ("gamma", truth.gamma_rad),
+    ]
+}
+
+fn true_forms(truth: &Truth) -> [&GaugedForm; 3] {
+    [&truth.m, &truth.s_a, &truth.s_b]
+}
+
+#[test]
+fn noise_free_readings_give_the_truth() {
+    for tilt_scale in [0.01, 1.0, 10.0] {
+        let (mut plan, basis) = spline_plan(12, 150, 0.0, 1);
+        plan.alpha_rad *= tilt_scale;
+        plan.beta_rad *= tilt_scale;
+        plan.gamma_rad *= tilt_scale;
+        let (observations, truth) = simulate(&plan, &[]).unwrap();
+        let solution = fit(&observations, &options(&basis, 42.0, Noise::Equal)).unwrap();
+        for (name, value) in truths(&truth) {
+            let error = tilt(&solution, name).value - value;
+            // Exact limit: the target, 1e-12 rad; 300 mm times that is 3e-7 µm.
+            assert!(error.abs() < 1e-12, "{name} at {tilt_scale}: {error:e}");
+        }
+        for (profile, form) in solution
+            .forms(&even_grid(0.0, LENGTH, 77))
+            .iter()
+            .zip(true_forms(&truth))
+        {
+            for (x, value) in profile.x.iter().zip(&profile.values) {
+                let error = value - form.at(*x);
+                // Exact limit: the target.
+                assert!(
+                    error.abs() < 1e-9,
+                    "{} at {x} mm, {tilt_scale}: {error:e}",
+                    profile.name
+                );
+            }
+        }
+        assert!(solution.convergence.iterations() <= 10);
+    }
+}
+
+#[test]
+fn with_small_tilts_no_thickness_and_equal_noise_it_is_the_staged_solution() {
+    let n = 40;
+    let (mut plan, _) = spline_plan(9, n, 0.05, 2);
+    (plan.alpha_rad, plan.beta_rad, plan.gamma_rad) = (1e-6, -2e-6, 3e-6);
+    plan.thickness_mm = 0.0;
+    let (observations, _) = simulate(&plan, &[]).unwrap();
+    // A break at every position but the second from either end: the splines pass through any values.
+    let mut breaks = even_grid(0.0, LENGTH, n);
+    breaks.remove(n - 2);
+    breaks.remove(1);
+    let simultaneous = fit(
+        &observations,
+        &Options {
+            knots: Knots::At(breaks),
+            noise: Noise::Equal,
+            ..Options::default()
+        },
+    )
+    .unwrap();
+    let staged = staged::solve(
+        &observations,
+        &staged::Options {
+            removal: Some(staged::Removal::Shear),
+            ..staged::Options::default()
+        },
+    )
+    .unwrap();
+    for s in &staged.tilts {
+        let error = tilt(&simultaneous, &s.name).value - s.angle.value;
+        // Exact limit: what is left is the rotation of a 1 µm form by 6 µrad.
+        assert!(error.abs() < 1e-12, "{}: {error:e}", s.name);
+    }
+    let closure = simultaneous.closure.as_ref().unwrap();
+    assert!((closure.slope.value - staged.closure.as_ref().unwrap().slope.value).abs() < 1e-12);
+    for (form, s) in simultaneous.forms(&staged.x).iter().zip(&staged.forms) {
+        assert_eq!(form.name, s.name);
+        for (a, b) in form.values.iter().zip(&s.values) {
+            assert!((a - b).abs() < 1e-9, "{}: {a} and {b}", form.name);
+        }
+    }
+}
+
+#[test]
+fn derivatives_are_those_of_finite_differences() {
+    let (mut plan, basis) = spline_plan(5, 33, 0.1, 3);
+    (plan.alpha_rad, plan.gamma_rad) = (0.02, 0.3);
+    let (observations, _) = simulate(&plan, &[]).unwrap();
+    let channels = ChannelReadings::sort(&observations);
+    let unknowns = Unknowns::new(Channel::ALL.to_vec(), Convention::Seed, true, 8);
+    let axis = Axis::of(&channels).unwrap();
+    let problem = Reversal::new(
+        &channels,
+        unknowns.clone(),
+        vec![basis; 3],
+        axis,
+        42.0,
+        vec![1.0; 4],
+    );
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let mut at = Parameters::zeros(unknowns.band_count(), unknowns.border_count());
+    for c in at.band.iter_mut() {
+        // Steep on purpose: slopes of some mm/mm·10⁻¹ make every term of the derivatives count.
+        *c = 3_000.0 * rng.random_range(-1.0..1.0);
+    }
+    for y in at.border.iter_mut() {
+        *y = rng.random_range(-0.1..0.1);
+    }
+    *at.border.last_mut().unwrap() = 40.0;
+    let count = observations.readings.len();
+    let model = |at: &Parameters| {
+        let mut r = vec![0.0; count];
+        problem
+            .residuals(at, |c, i, value| r[channels[c].source[i] as usize] = value)
+            .unwrap();
+        r
+    };
+    let system = evaluate(&problem, &at).unwrap().system;
+    let (band_norm, border_norm) = system.column_norms();
+    let (band_gradient, border_gradient) = system.gradient();
+    let residual = model(&at);
+    let n = unknowns.band_count();
+    for j in 0..n + unknowns.border_count() {
+        let (norm, gradient) = if j < n {
+            (band_norm[j], band_gradient[j])
+        } else {
+            (border_norm[j - n], border_gradient[j - n])
+        };
+        let step = |sign: f64| {
+            let mut moved = at.clone();
+            let (value, h) = if j < n {
+                (&mut moved.band[j], 1e-2)
+            } else if j - n < 4 {
+                (&mut moved.border[j - n], 1e-6)
+            } else {
+                (&mut moved.border[j - n], 1e-3)
+            };
+            *value += sign * h;
+            (model(&moved), h)
+        };
+        let ((up, h), (down, _)) = (step(1.0), step(-1.0));
+        let column: Vec<f64> = up
+            .iter()
+            .zip(&down)
+            .map(|(u, d)| (u - d) / (2.0 * h))
+            .collect();
+        let numeric_norm = column.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let numeric_gradient: f64 = column.iter().zip(&residual).map(|(c, r)| c * r).sum();
+        let size = residual.iter().map(|r| r * r).sum::<f64>().sqrt();
+        let name = if j < n {
+            format!("c{j}")
+        } else {
+            unknowns.border_name(j - n)
+        };
+        // Truncation: central differences of steps chosen for an error below 1e-6.
+        assert!(
+            (norm - numeric_norm).abs() < 1e-6 * norm,
+            "{name}: {norm} and {numeric_norm}"
+        );
+        assert!(
+            (gradient - numeric_gradient).abs() < 1e-6 * norm * size,
+            "{name}: {gradient} and {numeric_gradient}"
+        );
+    }
+}
+
+#[test]
+fn a_dense_method_finds_the_same_minimum() {
+    let (mut plan, basis) = spline_plan(7, 60, 0.05, 13);
+    plan.gamma_rad = 5e-3;
+    let (observations, _) = simulate(&plan, &[]).unwrap();
+    let solution = fit(&observations, &options(&basis, 42.0, Noise::Equal)).unwrap();
+    let channels = ChannelReadings::sort(&observations);
+    let unknowns = Unknowns::new(Channel::ALL.to_vec(), Convention::Seed, false, 10);
+    let axis = Axis::of(&channels).unwrap();
+    let lines = simultaneous::lines(&channels).unwrap();
+    let seed = simultaneous::tilts(&unknowns, &lines);
+    let start = simultaneous::start(&unknowns, &seed, &lines, 42.0);
+    let problem = Reversal::new(
+        &channels,
+        unknowns,
+        vec![basis; 3],
+        axis,
+        42.0,
+        vec![1.0; 4],
+    );
+    let dense = DenseReversal::new(&problem);
+    let found = errsep_solvers::fit(
+        &dense,
+        dense.parameters_of(&start),
+        &errsep_solvers::Options::default(),
+    )
+    .unwrap();
+    assert!(found.ending.is_converged(), "{}", found.ending);
+    let point = dense.point_of(&found.parameters);
+    let cost: f64 = 0.5 * solution.residuals.iter().map(|r| r * r).sum::<f64>();
+    // Truncation: both stop within 1e-12 of the cost or so.
+    assert!(
+        (found.cost - cost).abs() < 1e-10 * cost,
+        "{} and {cost}",
+        found.cost
+    );
+    for (j, t) in solution.tilts().iter().enumerate() {
+        let error = point.border[j] - t.angle.value;
+        assert!(error.abs() < 1e-5 * t.angle.std, "{}: {error:e}", t.name);
+    }
+}
+
+#[test]
+fn a_prediction_is_the_reading_less_its_residual() {
+    let (plan, basis) = spline_plan(9, 61, 0.05, 5);
+    let (observations, _) = simulate(&plan, &[]).unwrap();
+    let solution = fit(&observations, &options(&basis, 42.0, Noise::PerChannel)).unwrap();
+    for record in solution.records(&observations) {
+        let predicted = solution
+            .predict(record.reading.channel, record.reading.x)
+            .unwrap();
+        // Epsilons: readings of some hundred micrometres.
+        assert!((predicted.value - record.model).abs() < 1e-10, "{record:?}");
+    }
+    let jacobian = solution.jacobian(&observations).unwrap();
+    assert_eq!(jacobian.ncols(), solution.jacobian_names().len());
+    // At the minimum the weighted residuals are orthogonal to every column.
+    for (j, name) in solution.jacobian_names().iter().enumerate() {
+        let (mut product, mut squares, mut rest) = (0.0, 0.0, 0.0);
+        for (i, record) in solution.records(&observations).enumerate() {
+            let weight = record.standardised / record.residual;
+            let (d, r) = (jacobian[(i, j)] * weight, record.standardised);
+            product += d * r;
+            squares += d * d;
+            rest += r * r;
+        }
+        // Truncation: the fit stops within 1e-12 of the cost, whose root is 1e-6.
+        let cosine = product / f64::sqrt(squares * rest);
+        assert!(cosine.abs() < 2e-6, "{name}: {cosine:e}");
+    }
+}
+
+#[test]
+fn any_set_of_channels_gives_what_it_determines() {
+    use Channel::{C1A, C1B, C2A, C2B};
+    let (plan, basis) = spline_plan(8, 90, 0.0, 6);
+    let (all, truth) = simulate(&plan, &[]).unwrap();
+    let (a, b, g) = (truth.alpha_rad, truth.beta_rad, truth.gamma_rad);
+    let x = even_grid(0.0, LENGTH, 31);
+    type Case<'a> = (&'a [Channel], Vec<(&'a str, f64)>, Vec<&'a str>);
+    let cases: [Case; 5] = [
+        (
+            &[C1A, C1B, C2A],
+            vec![("alpha", a), ("beta", b), ("gamma", g)],
+            vec!["M", "S_A", "S_B"],
+        ),
+        (
+            &[C1A, C2B],
+            vec![("alpha", a), ("beta + gamma", b + g)],
+            vec!["M + S_A/2 + S_B/2", "S_A/2 - S_B/2"],
+        ),
+        (
+            &[C1A, C2A],
+            vec![("alpha + beta", a + b), ("gamma", g)],
+            vec!["M", "S_A"],
+        ),
+        (&[C2A, C2B], vec![], vec![]),
+        (&[C1B], vec![("alpha - beta + gamma", a - b + g)], vec![]),
+    ];
+    for (channels, tilts, forms) in cases {
+        let some = Observations {
+            readings: all
+                .readings
+                .iter()
+                .filter(|r| channels.contains(&r.channel))
+                .copied()
+                .collect(),
+        };
+        let solution = fit(&some, &options(&basis, 42.0, Noise::Equal)).unwrap();
+        assert!(solution.closure.is_none());
+        for (name, value) in tilts {
+            let error = tilt(&solution, name).value - value;
+            // Truncation: with the slide's form riding on the artefact's axis (fewer than both
+            // indicators on a side) a 1 µm form is shifted by 20 µm: 1e-9 rad.
+            assert!(error.abs() < 2e-9, "{channels:?} {name}: {error:e}");
+        }
+        let found = solution.forms(&x);
+        if !forms.is_empty() {
+            assert_eq!(
+                found.iter().map(|f| f.name.as_str()).collect::<Vec<_>>(),
+                forms
+            );
+        }
+        for profile in found {
+            for (x, value) in profile.x.iter().zip(&profile.values) {
+                let (m, sa, sb) = (truth.m.at(*x), truth.s_a.at(*x), truth.s_b.at(*x));
+                let expected = match profile.name.as_str() {
+                    "M" => m,
+                    "S_A" => sa,
+                    "S_B" => sb,
+                    "M + S_A/2 + S_B/2" => m + (sa + sb) / 2.0,
+                    "S_A/2 - S_B/2" => (sa - sb) / 2.0,
+                    _ => continue,
+                };
+                // Truncation: as above, a slope of 0.2 µm/mm times 20 µm.
+                assert!(
+                    (value - expected).abs() < 0.02,
+                    "{} at {x}: {value} {expected}",
+                    profile.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn uneven_traces_gaps_repeats_and_unequal_noise_stay_within_the_stated_uncertainty() {
+    let (mut plan, basis) = spline_plan(10, 100, 0.02, 7);
+    plan.repeats = 2;
+    plan.both_directions = true;
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    for (c, trace) in plan.traces.iter_mut().enumerate() {
+        trace.noise = [0.01, 0.02, 0.05, 0.1][c];
+        trace.positions = even_grid(0.0, LENGTH, 80 + 13 * c);
+        for x in &mut trace.positions {
+            *x += rng.random_range(0.0..0.5);
+        }
+        if c == 1 {
+            trace.positions.retain(|x| !(100.0..160.0).contains(x));
+        }
+    }
+    let (observations, truth) = simulate(&plan, &[]).unwrap();
+    let solution = fit(&observations, &options(&basis, 42.0, Noise::PerChannel)).unwrap();
+    for (name, value) in truths(&truth) {
+        let found = tilt(&solution, name);
+        // k·u: four standard uncertainties of a fixed seed.
+        assert!(
+            (found.value - value).abs() < 4.0 * found.std,
+            "{name}: {found:?} {value}"
+        );
+    }
+    for (noise, trace) in solution.noise.iter().zip(&plan.traces) {
+        let relative = noise.sigma / trace.noise - 1.0;
+        let limit = 4.0 / (2.0 * noise.degrees_of_freedom).sqrt();
+        assert!(relative.abs() < limit, "{noise:?}");
+    }
+    let freedom: f64 = solution.noise.iter().map(|n| n.degrees_of_freedom).sum();
+    // Traces of the hat matrix add up to the unknowns: 3 × 11 coefficients, 3 tilts, 4 offsets.
+    let unknowns = observations.readings.len() as f64 - freedom;
+    assert!((unknowns - 40.0).abs() < 1e-6, "{unknowns}");
+    for (profile, form) in solution
+        .forms(&even_grid(2.0, 298.0, 40))
+        .iter()
+        .zip(true_forms(&truth))
+    {
+        for ((x, value), u) in profile.x.iter().zip(&profile.values).zip(&profile.std) {
+            // k·u: 120 comparisons with one seed.
+            assert!(
+                (value - form.at(*x)).abs() < 5.0 * u,
+                "{} at {x}",
+                profile.name
+            );
+        }
+    }
+}
+
+#[test]
+fn the_thickness_is_found_where_tilt_and_form_are_large() {
+    let (mut plan, basis) = spline_plan(20, 200, 0.01, 8);
+    plan.gamma_rad = 30e-3;
+    let (observations, _) = simulate(&plan, &[]).unwrap();
+    let mut options = options(&basis, 0.0, Noise::PerChannel);
+    options.thickness = Thickness::Fitted(20.0);
+    let found = fit(&observations, &options).unwrap().thickness();
+    // k·u.
+    assert!((found.value - 42.0).abs() < 4.0 * found.std, "{found:?}");
+    assert!(found.std < 2.0, "{found:?}");
+}
+
+#[test]
+fn a_far_start_ends_at_the_same_minimum() {
+    let (plan, basis) = spline_plan(10, 120, 0.02, 9);
+    let (observations, _) = simulate(&plan, &[]).unwrap();
+    let mut options = options(&basis, 42.0, Noise::Equal);
+    let near = fit(&observations, &options).unwrap();
+    options.start_tilts_rad = Some(vec![0.05, -0.1, 0.09]);
+    let far = fit(&observations, &options).unwrap();
+    for (a, b) in near.tilts().iter().zip(far.tilts()) {
+        // Truncation: both stop within 1e-12 of the cost, a millionth of the uncertainty and √m.
+        assert!((a.angle.value - b.angle.value).abs() < 1e-4 * a.angle.std);
+    }
+}
+
+#[test]
+fn outliers_do_not_count_under_a_robust_loss() {
+    let (mut plan, basis) = spline_plan(10, 200, 0.02, 10);
+    plan.outlier_share = 0.03;
+    plan.outlier_size = 50.0;
+    let (observations, truth) = simulate(&plan, &[]).unwrap();
+    assert!(!truth.outliers.is_empty());
+    let mut options = options(&basis, 42.0, Noise::PerChannel);
+    let plain = fit(&observations, &options).unwrap();
+    options.loss = Loss::Huber { scale: 1.345 };
+    let robust = fit(&observations, &options).unwrap();
+    let worst = |solution: &Simultaneous| {
+        solution
+            .forms(&even_grid(0.0, LENGTH, 60))
+            .iter()
+            .zip(true_forms(&truth))
+            .flat_map(|(p, f)| {
+                p.x.iter()
+                    .zip(&p.values)
+                    .map(|(x, v)| (v - f.at(*x)).abs())
+                    .collect::<Vec<_>>()
+            })
+            .fold(0.0, f64::max)
+    };
+    let (with, without) = (worst(&plain), worst(&robust));
+    assert!(without < 0.5 * with, "{without} and {with}");
+    for noise in &robust.noise {
+        // The median sees the 97 % that are no outliers: a few per cent more than their 0.02.
+        assert!((0.018..0.025).contains(&noise.sigma), "{noise:?}");
+    }
+}
+
+#[test]
+fn trials_give_the_uncertainty_of_the_covariance() {
+    let (plan, basis) = spline_plan(8, 60, 0.05, 11);
+    let (observations, _) = simulate(&plan, &[]).unwrap();
+    let solution = fit(&observations, &options(&basis, 42.0, Noise::PerChannel)).unwrap();
+    let x = [0.0, 77.0, 150.0, 300.0];
+    let trials = 400;
+    let spread = monte_carlo(&solution, &observations, &x, trials, 5).unwrap();
+    // k·u: the standard deviation of n trials has a relative deviation of 1/√(2n); four of them.
+    let limit = 4.0 / (2.0 * trials as f64).sqrt();
+    for (found, stated) in spread.tilts.iter().zip(solution.tilts()) {
+        assert!(
+            (found.std / stated.angle.std - 1.0).abs() < limit,
+            "{found:?} {stated:?}"
+        );
+    }
+    for (found, stated) in spread.forms.iter().zip(solution.forms(&x)) {
+        for (found, stated) in found.iter().zip(&stated.std) {
+            assert!(
+                (found.std / stated - 1.0).abs() < limit,
+                "{found:?} {stated}"
+            );
+        }
+    }
+}
+
+#[test]
+fn over_many_seeds_errors_are_as_large_as_stated() {
+    let seeds = 150;
+    let (mut squares, mut inside, mut count) = (0.0, 0.0, 0.0);
+    for seed in 0..seeds {
+        let (plan, basis) = spline_plan(6, 50, 0.05, 1000 + seed);
+        let (observations, truth) = simulate(&plan, &[]).unwrap();
+        let solution = fit(&observations, &options(&basis, 42.0, Noise::PerChannel)).unwrap();
+        for (name, value) in truths(&truth) {
+            let found = tilt(&solution, name);
+            let z = (found.value - value) / found.std;
+            squares += z * z;
+            inside += f64::from(u8::from(z.abs() < 1.959_964));
+            count += 1.0;
+        }
+    }
+    // k·u: 450 independent values; four standard deviations of their mean square and of a share.
+    let rms = f64::sqrt(squares / count);
+    assert!((rms - 1.0).abs() < 4.0 / f64::sqrt(2.0 * count), "{rms}");
+    let share = inside / count;
+    assert!(
+        (share - 0.95).abs() < 4.0 * f64::sqrt(0.95 * 0.05 / count),
+        "{share}"
+    );
+}
+
+#[test]
+fn the_number_of_knots_follows_the_forms() {
+    let (plan, _) = spline_plan(16, 400, 0.02, 12);
+    let (observations, _) = simulate(&plan, &[]).unwrap();
+    let chosen = Options {
+        thickness: Thickness::Known(42.0),
+        ..Options::default()
+    };
+    let solution = fit(&observations, &chosen).unwrap();
+    assert!(
+        (16..=32).contains(&solution.knots.cells()),
+        "{:?}",
+        solution.knots.table
+    );
+    assert!(solution.knots.neighbour_z < 4.0);
+    let few = fit(
+        &observations,
+        &Options {
+            knots: Knots::Cells(4),
+            ..chosen
+        },
+    )
+    .unwrap();
+    assert_eq!(
+        few.knots.verdict,
+        errsep_models::reversal::simultaneous::KnotVerdict::TooFew
+    );
+}
+
+#[test]
+fn what_cannot_be_fitted_is_said() {
+    let reading = |channel, x, value| Reading {
+        channel,
+        repeat: 1,
+        direction: Direction::Forward,
+        time: None,
+        x,
+        value,
+    };
+    let of = |readings| Observations { readings };
+    let plain = Options::default();
+    assert_eq!(
+        fit(&of(vec![]), &plain).unwrap_err(),
+        ReversalError::NoReadings
+    );
+    let one_place = of((0..30)
+        .map(|i| reading(Channel::C1A, 5.0, i as f64))
+        .collect());
+    assert!(matches!(
+        fit(&one_place, &plain),
+        Err(ReversalError::OnePosition { channel: "1A", .. })
+    ));
+    let two = of(vec![
+        reading(Channel::C1A, 0.0, 0.0),
+        reading(Channel::C1A, 1.0, 0.0),
+    ]);
+    assert!(matches!(
+        fit(&two, &plain),
+        Err(ReversalError::TooFewReadings { .. })
+    ));
+    let nan = of(vec![reading(Channel::C1A, f64::NAN, 0.0)]);
+    assert!(matches!(
+        fit(&nan, &plain),
+        Err(ReversalError::NotUsable { .. })
+    ));
+    // 60°: 1732 µm on 1 mm.
+    let steep = of((0..50)
+        .map(|i| reading(Channel::C1A, i as f64, 1_732.0 * i as f64))
+        .collect());
+    assert!(matches!(
+        fit(&steep, &plain),
+        Err(ReversalError::NoStart(_))
+    ));
+    let flat = of((0..50)
+        .map(|i| reading(Channel::C1A, i as f64, 0.0))
+        .collect());
+    let negative = Options {
+        thickness: Thickness::Known(-3.0),
+        ..Options::default()
+    };
+    let message = fit(&flat, &negative).unwrap_err().to_string();
+    assert!(message.contains("thickness is -3"), "{message}");
+    // All zero: nothing to find, but an answer all the same.
+    let zero = fit(&flat, &plain).unwrap();
+    assert_eq!(zero.tilts()[0].angle.value, 0.0);
+    // Too many knots for the readings of one trace.
+    let dense = Options {
+        knots: Knots::At(even_grid(0.0, 49.0, 200)),
+        ..Options::default()
+    };
+    assert!(matches!(
+        fit(&flat, &dense),
+        Err(ReversalError::TooFewReadings { .. })
+    ));
+}

@@ -1,0 +1,93 @@
+//! Traces from an artefact that turns while the slide feeds, on runs whose truth is known.
+
+use errsep_models::reversal::staged::{Options, solve};
+use errsep_models::reversal::turning::{NoTraces, Sample, find_turning, traces};
+use errsep_models::reversal::{Channel, Contrast};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+use std::f64::consts::TAU;
+
+const FREQUENCY: f64 = 0.0427;
+const ALPHA: f64 = 30e-6;
+
+/// A bar that runs out by 12 µm at one end and 20 µm at the other while 200 mm pass.
+fn run(sigma: f64, seed: u64) -> Vec<Sample> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let noise = Normal::new(0.0, sigma).unwrap();
+    (0..16_000)
+        .map(|k| {
+            let time = 0.21 * f64::from(k) + 3.0;
+            let x = 0.0595 * (time - 3.0);
+            let wave = (12.0 + 0.04 * x) * (TAU * FREQUENCY * time + 0.7).cos();
+            let second = 0.8 * (2.0 * TAU * FREQUENCY * time + 2.0).cos();
+            Sample {
+                time,
+                x,
+                value: 40.0 + ALPHA * 1e3 * x + wave + second + noise.sample(&mut random),
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn the_wave_tells_how_the_spindle_turned() {
+    for seed in 0..2 {
+        let turning = find_turning(&run(0.5, seed), None).unwrap();
+        // k·u: four standard uncertainties.
+        let error = turning.frequency - FREQUENCY;
+        assert!(error.abs() < 4.0 * turning.frequency_std, "{turning:?}");
+        assert!(turning.frequency_std < 1e-7);
+        // 12 + 0.04 × 100 µm in the middle; k·u of 0.5 √(2/16000) = 5.6 nm.
+        assert!(
+            (turning.amplitude - 15.998).abs() < 0.03,
+            "{}",
+            turning.amplitude
+        );
+        let phase = (TAU * FREQUENCY * turning.highest_at + 0.7).rem_euclid(TAU);
+        let angle = (phase + 1.0).rem_euclid(TAU) - 1.0;
+        assert!(angle.abs() < 5.0 * turning.angle_std_rad, "{angle}");
+    }
+}
+
+#[test]
+fn two_opposite_angles_give_the_tilt_of_the_slide() {
+    for (seed, degrees) in [(1, 0.0_f64), (2, 37.0), (3, 90.0)] {
+        let samples = run(0.5, seed);
+        let turning = find_turning(&samples, Some(0.0425)).unwrap();
+        let data = traces(&samples, &turning, degrees.to_radians(), 20f64.to_radians()).unwrap();
+        assert_eq!(data.channels(), [Channel::C1A, Channel::C2B]);
+        let solution = solve(&data, &Options::default()).unwrap();
+        let alpha = solution.tilt(Contrast::Alpha).unwrap();
+        // k·u: four standard uncertainties, which must themselves be that of 143 turns of some 14
+        // samples with 0.5 µm over 200 mm.
+        assert!((alpha.value - ALPHA).abs() < 4.0 * alpha.std, "{alpha:?}");
+        assert!((0.1e-6..0.6e-6).contains(&alpha.std), "{alpha:?}");
+        // At its highest the run-out grows by 0.04 µm/mm: 40 µrad; a quarter turn on it does not.
+        let mount = solution.tilts[1].angle;
+        let expected = 40e-6 * degrees.to_radians().cos();
+        assert!(
+            (mount.value - expected).abs() < 4.0 * mount.std + 0.01 * 40e-6,
+            "{mount:?}"
+        );
+    }
+}
+
+#[test]
+fn refuses_what_does_not_turn() {
+    let still = (0..500)
+        .map(|k| Sample {
+            time: f64::from(k),
+            x: f64::from(k),
+            value: 0.0,
+        })
+        .collect::<Vec<_>>();
+    assert_eq!(find_turning(&still, None), Err(NoTraces::NoWave));
+    assert_eq!(
+        find_turning(&still[..9], None),
+        Err(NoTraces::TooFew { samples: 9 })
+    );
+    let mut back = still.clone();
+    back[7].time = 1.0;
+    assert_eq!(find_turning(&back, None), Err(NoTraces::Time { index: 7 }));
+}

@@ -1,0 +1,154 @@
+//! Covariances of a bordered system, without a dense inverse.
+//!
+//! With unit noise, y has the covariance C_y = (MᵀM)⁻¹ of the small problem and
+//!
+//! ```text
+//!     c = R_cc⁻¹ [ (I − QQᵀ)(−t_c) + (−R_cy + Q B) y ] + const,
+//! ```
+//!
+//! where (I − QQᵀ)t_c is independent of y (which sees t_c through Qᵀt_c only). So
+//! cov(c) = Z − PPᵀ + U C_y Uᵀ and cov(c, y) = U C_y with Z = (R_ccᵀR_cc)⁻¹, P = R_cc⁻¹Q and
+//! U = R_cc⁻¹(−R_cy + Q B).
+
+use nalgebra::DMatrix;
+
+use super::{
+    assemble::{Bordered, Group},
+    solve::Solved,
+};
+use crate::linear::banded::{BandInverse, BandTriangle};
+
+/// Covariances for unit noise: multiply by the noise variance where rows are not in units of it.
+#[derive(Debug, Clone)]
+pub struct BorderedCovariance {
+    triangle: BandTriangle,
+    inverse: BandInverse,
+    /// P, n rows of p values.
+    p: DMatrix<f64>,
+    /// U, n rows of q values.
+    u: DMatrix<f64>,
+    border: DMatrix<f64>,
+}
+
+impl BorderedCovariance {
+    /// The covariance at a solution.
+    pub fn new(system: &Bordered, solved: &Solved) -> Self {
+        let (n, q) = (system.band_len(), system.border_len());
+        let solve_columns = |count: usize, value: &dyn Fn(usize, usize) -> f64| {
+            let mut columns = DMatrix::zeros(n, count);
+            for (j, mut column) in columns.column_iter_mut().enumerate() {
+                let mut x: Vec<f64> = (0..n).map(|i| value(i, j)).collect();
+                system.triangle.solve(&mut x);
+                column.copy_from_slice(&x);
+            }
+            columns
+        };
+        let p = solve_columns(solved.q.len(), &|i, j| solved.q[j][i]);
+        let u = solve_columns(q, &|i, j| {
+            let pulled: f64 = solved
+                .q
+                .iter()
+                .enumerate()
+                .map(|(l, c)| c[i] * solved.b[(l, j)])
+                .sum();
+            pulled - system.triangle.tail_row(i)[j]
+        });
+        Self {
+            triangle: system.triangle.clone(),
+            inverse: BandInverse::of(&system.triangle),
+            p,
+            u,
+            border: solved.border_covariance.clone(),
+        }
+    }
+
+    /// The covariance matrix of the border's unknowns, q × q; zero rows where held.
+    pub fn border(&self) -> &DMatrix<f64> {
+        &self.border
+    }
+
+    /// The covariance of two unknowns of the band no farther apart than its width; `None` beyond.
+    pub fn band(&self, i: usize, j: usize) -> Option<f64> {
+        (i.abs_diff(j) < self.triangle.width() && i.max(j) < self.triangle.len()).then(|| {
+            self.inverse.get(i, j) - self.p.row(i).dot(&self.p.row(j))
+                + (self.u.row(i) * &self.border * self.u.row(j).transpose())[0]
+        })
+    }
+
+    /// The covariance of an unknown of the band with one of the border.
+    pub fn mixed(&self, i: usize, j: usize) -> f64 {
+        self.u.row(i).transpose().dot(&self.border.column(j))
+    }
+
+    /// The variance of a linear combination Σ w_i c_i + Σ v_j y_j, any distance apart.
+    pub fn variance(&self, band: &[(usize, f64)], border: &[(usize, f64)]) -> f64 {
+        let lowest = band.iter().map(|b| b.0).min().unwrap_or(0);
+        let highest = band.iter().map(|b| b.0).max().unwrap_or(0);
+        let own = if highest - lowest < self.triangle.width() {
+            let mut sum = 0.0;
+            for (i, a) in band {
+                for (j, b) in band {
+                    sum += a * b * self.inverse.get(*i, *j);
+                }
+            }
+            sum
+        } else {
+            let mut x = vec![0.0; self.triangle.len()];
+            for (i, a) in band {
+                x[*i] += a;
+            }
+            self.triangle.solve_transposed(&mut x);
+            x.iter().map(|v| v * v).sum()
+        };
+        let combined =
+            |m: &DMatrix<f64>, k: usize| -> f64 { band.iter().map(|(i, a)| a * m[(*i, k)]).sum() };
+        let lost: f64 = (0..self.p.ncols())
+            .map(|k| combined(&self.p, k).powi(2))
+            .sum();
+        let mut seen: Vec<f64> = (0..self.border.nrows())
+            .map(|k| combined(&self.u, k))
+            .collect();
+        for (j, v) in border {
+            seen[*j] += v;
+        }
+        let mut through = 0.0;
+        for (j, a) in seen.iter().enumerate() {
+            for (k, b) in seen.iter().enumerate() {
+                through += a * b * self.border[(j, k)];
+            }
+        }
+        (own - lost + through).max(0.0)
+    }
+
+    /// The trace of J cov Jᵀ over the rows of a group: how many unknowns they use up.
+    pub fn hat_trace(&self, group: &Group, map: &DMatrix<f64>) -> f64 {
+        let columns = group.band.len() + map.nrows() + 1;
+        let mut band = Vec::with_capacity(group.band.len());
+        let mut border = Vec::with_capacity(self.border.nrows());
+        (0..columns - 1)
+            .map(|i| {
+                let row = &group.triangle[i * columns..(i + 1) * columns];
+                let (in_band, beside) = row.split_at(group.band.len());
+                band.clear();
+                band.extend(
+                    group
+                        .band
+                        .iter()
+                        .zip(in_band)
+                        .filter_map(|(unknown, value)| unknown.map(|j| (j, *value)))
+                        .filter(|(_, value)| *value != 0.0),
+                );
+                border.clear();
+                border.extend((0..self.border.nrows()).map(|j| {
+                    let value = beside[..map.nrows()]
+                        .iter()
+                        .enumerate()
+                        .map(|(l, v)| v * map[(l, j)])
+                        .sum::<f64>();
+                    (j, value)
+                }));
+                self.variance(&band, &border)
+            })
+            .sum()
+    }
+}

@@ -1,0 +1,432 @@
+//! The loop that every method shares, as an argmin `Solver`.
+//!
+//! One iteration: linearise, ask the strategy for steps until one lowers the cost by a fair share
+//! of what the linear model promised, and look whether a minimum is reached. Around a minimum
+//! the polish takes over.
+
+use argmin::core::{
+    IterState, KV, Problem as Counted, Solver, State, TerminationReason, TerminationStatus,
+};
+use argmin::kv;
+use nalgebra::DVector;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::rescue::Verdict;
+use super::restrict::{self, Proposal, Undamped, free_parameters};
+use super::strategy::{Strategy, Trial};
+use super::system::{Evaluation, System};
+use crate::linear::LinearModel;
+use crate::options::Options;
+use crate::outcome::{Convergence, Ending, FitError};
+
+/// The state that argmin's executor, observers and checkpoints see: parameters, cost, gradient.
+pub type FitState = IterState<DVector<f64>, DVector<f64>, (), (), DVector<f64>, f64>;
+
+/// Least share of the promised fall that makes a step worth taking.
+const LEAST_GAIN: f64 = 1e-4;
+
+/// Steps tried from one point before giving up: each failure shortens the step at least by half.
+const MOST_TRIALS: usize = 100;
+
+/// The least-squares loop with a strategy `S` and linear models `M`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(bound = "S: Serialize + DeserializeOwned")]
+pub struct Minimiser<S, M> {
+    pub(super) strategy: S,
+    pub(super) options: Options,
+    /// D: the largest norm that each column of the Jacobian has had (Moré 1978, eq. 6.3).
+    pub(super) scale: DVector<f64>,
+    /// The largest ‖N p‖ so far, N the column norms of the Jacobian at p.
+    longest: f64,
+    ending: Option<Ending>,
+    #[serde(skip)]
+    pub(crate) point: Option<Point<M>>,
+}
+
+/// A point at which the system has been evaluated and linearised.
+#[derive(Debug, Clone)]
+pub(crate) struct Point<M> {
+    pub parameters: DVector<f64>,
+    pub evaluation: Evaluation,
+    pub model: M,
+}
+
+/// How an iteration left things.
+enum Progress {
+    Moved(Trial),
+    Rescued,
+    Rest(Convergence),
+    NoDescent,
+}
+
+impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
+    /// A minimiser that has not begun.
+    pub fn new(strategy: S, options: Options) -> Self {
+        Self {
+            strategy,
+            options,
+            scale: DVector::zeros(0),
+            longest: 0.0,
+            ending: None,
+            point: None,
+        }
+    }
+
+    /// Why the minimiser ended; `None` while it has not, or when something else ended the run.
+    pub fn ending(&self) -> Option<&Ending> {
+        self.ending.as_ref()
+    }
+
+    /// Linearises at parameters whose evaluation is known.
+    pub(super) fn arrive<O: System<Model = M>>(
+        problem: &mut Counted<O>,
+        parameters: DVector<f64>,
+        evaluation: Evaluation,
+    ) -> Result<Point<M>, FitError> {
+        let mut made = None;
+        problem
+            .problem("jacobian_count", |system| {
+                made = Some(system.linearize(&parameters, &evaluation));
+                Ok(())
+            })
+            .map_err(broken_off)?;
+        let model = made.ok_or_else(no_answer)??;
+        Ok(Point {
+            parameters,
+            evaluation,
+            model,
+        })
+    }
+
+    /// Cost and residuals; `None` where the model has no value.
+    pub(super) fn evaluate<O: System<Model = M>>(
+        problem: &mut Counted<O>,
+        parameters: &DVector<f64>,
+    ) -> Result<Result<Evaluation, String>, FitError> {
+        problem
+            .problem("residual_count", |system| {
+                Ok(system.evaluate(parameters).map_err(|no| no.reason))
+            })
+            .map_err(broken_off)
+    }
+
+    fn start<O: System<Model = M>>(
+        problem: &mut Counted<O>,
+        parameters: DVector<f64>,
+    ) -> Result<Point<M>, FitError> {
+        let mut expected = parameters.len();
+        problem
+            .problem("name_count", |system| {
+                expected = system.parameter_count();
+                Ok(())
+            })
+            .map_err(broken_off)?;
+        if parameters.len() != expected {
+            return Err(FitError::StartLength {
+                expected,
+                found: parameters.len(),
+            });
+        }
+        match Self::evaluate(problem, &parameters)? {
+            Ok(evaluation) => Self::arrive(problem, parameters, evaluation),
+            Err(reason) => Err(FitError::NoValueAtStart { reason }),
+        }
+    }
+
+    /// Keeps D at the largest column norms seen; a column that has always been zero gets 1.
+    fn rescale(&mut self, point: &Point<M>) {
+        let norms = point.model.column_norms();
+        if self.scale.len() != norms.len() {
+            self.scale = norms.map(|norm| if norm > 0.0 { norm } else { 1.0 });
+        } else {
+            self.scale.zip_apply(norms, |d, norm| *d = d.max(norm));
+        }
+        self.longest = self.longest.max(felt_length(point, &point.parameters));
+    }
+
+    pub(super) fn scaled_length(&self, vector: &DVector<f64>) -> f64 {
+        vector.component_mul(&self.scale).norm()
+    }
+
+    pub(super) fn undamped(&self, point: &Point<M>) -> Result<Proposal, FitError> {
+        restrict::propose(
+            &point.model,
+            &self.scale,
+            &point.parameters,
+            self.options.bounds.as_ref(),
+            Undamped,
+        )
+    }
+
+    /// The strategy's step, with the geodesic correction where asked for.
+    fn propose<O: System<Model = M>>(
+        &mut self,
+        problem: &mut Counted<O>,
+        point: &Point<M>,
+    ) -> Result<Proposal, FitError> {
+        let bounds = self.options.bounds.as_ref();
+        let mut proposal = restrict::propose(
+            &point.model,
+            &self.scale,
+            &point.parameters,
+            bounds,
+            &mut self.strategy,
+        )?;
+        // On a face of the box the correction would have to be projected again: it is left out.
+        if self.options.geodesic_acceleration
+            && bounds.is_none()
+            && let Some(correction) = self.acceleration(problem, point, &proposal.step)?
+        {
+            proposal.parameters += correction;
+        }
+        Ok(proposal)
+    }
+
+    /// The rounding of the cost: that of the residuals times the residuals. A residual is a
+    /// difference whose terms are about as large as J p.
+    pub(super) fn cost_rounding(point: &Point<M>) -> f64 {
+        let size: f64 = point
+            .model
+            .column_norms()
+            .iter()
+            .zip(point.parameters.iter())
+            .map(|(norm, p)| norm * p.abs())
+            .sum();
+        let residual = (2.0 * point.evaluation.cost).sqrt();
+        f64::EPSILON * residual * (residual + size)
+    }
+
+    /// The largest cosine between the residuals and a column of a free parameter.
+    fn largest_cosine(&self, point: &Point<M>) -> f64 {
+        let residual = (2.0 * point.evaluation.cost).sqrt();
+        let gradient = point.model.gradient();
+        let norms = point.model.column_norms();
+        free_parameters(self.options.bounds.as_ref(), &point.parameters, gradient)
+            .into_iter()
+            .filter(|&j| norms[j] > 0.0)
+            .map(|j| gradient[j].abs() / (norms[j] * residual))
+            .fold(0.0, f64::max)
+    }
+
+    /// Whether the point is a minimum to rounding, and the fall that an undamped step promises.
+    fn at_rest(&self, point: &Point<M>) -> Result<(Option<Convergence>, f64), FitError> {
+        if point.evaluation.cost == 0.0 {
+            return Ok((Some(Convergence::Cost), 0.0));
+        }
+        if self.largest_cosine(point) <= self.options.gradient_tolerance {
+            return Ok((Some(Convergence::Gradient), 0.0));
+        }
+        let full = self.undamped(point)?.step;
+        let promised = point.model.predicted_reduction(&full);
+        if promised.abs() <= Self::cost_rounding(point) {
+            return Ok((Some(Convergence::Cost), promised));
+        }
+        if felt_length(point, &full) <= f64::EPSILON * self.longest {
+            return Ok((Some(Convergence::Step), promised));
+        }
+        Ok((None, promised))
+    }
+
+    /// One iteration: tries steps from `point` until one is worth taking.
+    fn descend<O: System<Model = M>>(
+        &mut self,
+        problem: &mut Counted<O>,
+        point: Point<M>,
+    ) -> Result<(Point<M>, Progress), FitError> {
+        let (rest, promised) = self.at_rest(&point)?;
+        if let Some(by) = rest {
+            return Ok((point, Progress::Rest(by)));
+        }
+        let cost = point.evaluation.cost;
+        let negligible = self.options.cost_tolerance * cost;
+        let parameter_length = felt_length(&point, &point.parameters);
+        for tried in 0..MOST_TRIALS {
+            let proposal = self.propose(problem, &point)?;
+            let step = &proposal.step;
+            let length = self.scaled_length(step);
+            if !length.is_finite() {
+                self.strategy.invalid(f64::MAX);
+                continue;
+            }
+            if length == 0.0 {
+                break;
+            }
+            let mut trial = Trial {
+                actual: f64::NEG_INFINITY,
+                predicted: point.model.predicted_reduction(step),
+                length,
+                slope: point.model.gradient().dot(step),
+            };
+            if trial.predicted <= 0.0 {
+                self.strategy.rejected(&trial);
+                continue;
+            }
+            let Ok(evaluation) = Self::evaluate(problem, &proposal.parameters)? else {
+                self.strategy.invalid(length);
+                continue;
+            };
+            trial.actual = cost - evaluation.cost;
+            let gain = trial.gain();
+            let settled = trial.actual.abs() <= negligible
+                && trial.predicted <= negligible
+                && gain <= 2.0
+                && promised <= self.options.cost_tolerance.sqrt() * cost;
+            if gain < LEAST_GAIN {
+                if settled {
+                    return Ok((point, Progress::Rest(Convergence::Cost)));
+                }
+                self.strategy.rejected(&trial);
+                continue;
+            }
+            self.strategy.accepted(&trial);
+            let short = tried == 0
+                && gain > 0.25
+                && felt_length(&point, step) <= self.options.step_tolerance * parameter_length;
+            let next = Self::arrive(problem, proposal.parameters, evaluation)?;
+            let progress = match (settled, short) {
+                (true, _) => Progress::Rest(Convergence::Cost),
+                (_, true) => Progress::Rest(Convergence::Step),
+                _ => Progress::Moved(trial),
+            };
+            return Ok((next, progress));
+        }
+        if promised <= negligible {
+            return Ok((point, Progress::Rest(Convergence::Cost)));
+        }
+        match self.rescue(problem, &point)? {
+            Verdict::Better(parameters, evaluation) => {
+                let next = Self::arrive(problem, parameters, evaluation)?;
+                Ok((next, Progress::Rescued))
+            }
+            Verdict::Flat => Ok((point, Progress::Rest(Convergence::Cost))),
+            Verdict::WrongJacobian => Ok((point, Progress::NoDescent)),
+        }
+    }
+
+    fn iterate<O: System<Model = M>>(
+        &mut self,
+        problem: &mut Counted<O>,
+        point: Point<M>,
+    ) -> Result<(Point<M>, KV), FitError> {
+        let (point, progress) = self.descend(problem, point)?;
+        self.rescale(&point);
+        match progress {
+            Progress::Moved(trial) => Ok((
+                point,
+                kv!(
+                    "step" => trial.length;
+                    "gain" => trial.gain();
+                    "damping" => self.strategy.damping();
+                ),
+            )),
+            Progress::Rescued => {
+                // The strategy's idea of a good step has failed: it starts afresh.
+                self.strategy.begin(self.scaled_length(&point.parameters));
+                Ok((point, KV::new()))
+            }
+            Progress::NoDescent => {
+                self.ending = Some(Ending::NoDescent);
+                Ok((point, KV::new()))
+            }
+            Progress::Rest(by) => {
+                let (point, by) = if self.options.polish {
+                    self.polish(problem, point, by)?
+                } else {
+                    (point, by)
+                };
+                self.ending = Some(self.at_minimum(problem, &point, by)?);
+                Ok((point, KV::new()))
+            }
+        }
+    }
+
+    fn show(&mut self, state: FitState, point: Point<M>) -> FitState {
+        let mut state = state
+            .param(point.parameters.clone())
+            .cost(point.evaluation.cost)
+            .gradient(point.model.gradient().clone());
+        self.point = Some(point);
+        state = match &self.ending {
+            Some(ending) if ending.is_minimum() => {
+                state.terminate_with(TerminationReason::SolverConverged)
+            }
+            Some(other) => state.terminate_with(TerminationReason::SolverExit(other.to_string())),
+            None => state,
+        };
+        state
+    }
+}
+
+impl<O, S, M> Solver<O, FitState> for Minimiser<S, M>
+where
+    O: System<Model = M>,
+    S: Strategy + Serialize + DeserializeOwned,
+    M: LinearModel,
+{
+    fn name(&self) -> &str {
+        self.strategy.name()
+    }
+
+    fn init(
+        &mut self,
+        problem: &mut Counted<O>,
+        mut state: FitState,
+    ) -> Result<(FitState, Option<KV>), argmin::core::Error> {
+        let start = state.take_param().ok_or(FitError::NoParameters)?;
+        let point = Self::start(problem, start)?;
+        self.rescale(&point);
+        self.strategy.begin(self.scaled_length(&point.parameters));
+        Ok((self.show(state, point), None))
+    }
+
+    fn next_iter(
+        &mut self,
+        problem: &mut Counted<O>,
+        mut state: FitState,
+    ) -> Result<(FitState, Option<KV>), argmin::core::Error> {
+        // A run continued from a checkpoint carries parameters only.
+        let point = match self.point.take() {
+            Some(point) => point,
+            None => {
+                let parameters = state.take_param().ok_or(FitError::NoParameters)?;
+                Self::start(problem, parameters)?
+            }
+        };
+        let (point, report) = self.iterate(problem, point)?;
+        Ok((self.show(state, point), Some(report)))
+    }
+
+    fn terminate(&mut self, _state: &FitState) -> TerminationStatus {
+        let raised = self
+            .options
+            .stop
+            .as_ref()
+            .is_some_and(|flag| flag.load(std::sync::atomic::Ordering::Relaxed));
+        if raised {
+            return TerminationStatus::Terminated(TerminationReason::Interrupt);
+        }
+        TerminationStatus::NotTerminated
+    }
+}
+
+/// ‖N v‖ with the column norms N of the Jacobian at the point: how far the residuals would be
+/// moved by each entry of v alone. A parameter that has lost its effect does not count.
+pub(super) fn felt_length<M: LinearModel>(point: &Point<M>, vector: &DVector<f64>) -> f64 {
+    vector.component_mul(point.model.column_norms()).norm()
+}
+
+/// An argmin error back as ours: either our own on its way through, or that of an observer.
+pub(crate) fn broken_off(error: argmin::core::Error) -> FitError {
+    error
+        .downcast::<FitError>()
+        .unwrap_or_else(|other| FitError::BrokenOff {
+            reason: other.to_string(),
+        })
+}
+
+fn no_answer() -> FitError {
+    FitError::BrokenOff {
+        reason: "the problem was taken away during the run".to_string(),
+    }
+}

@@ -1,0 +1,108 @@
+//! One pass over all rows: cost and triangle at a point.
+
+use rayon::prelude::*;
+
+use super::problem::{Parameters, StructuredProblem};
+use super::sink::Sink;
+use crate::linear::bordered::{Bordered, BorderedCovariance, Group};
+use crate::problem::NoValue;
+
+/// Tasks factorised together before their triangles are folded; bounds the memory at any number of
+/// knots.
+const TASKS_AT_ONCE: usize = 1024;
+
+/// Fewer tasks than this are not worth handing to another core.
+const TASKS_A_CORE: usize = 8;
+
+/// Cost and triangle of a problem at a point.
+#[derive(Debug, Clone)]
+pub struct Evaluation {
+    /// ½ Σ r², or ½ Σ ρ(r²) under a robust loss.
+    pub cost: f64,
+    /// The factorised system.
+    pub system: Bordered,
+}
+
+/// Factorises all rows at a point.
+///
+/// # Errors
+/// [`NoValue`] where the model is not defined.
+pub fn evaluate<P: StructuredProblem>(problem: &P, at: &Parameters) -> Result<Evaluation, NoValue> {
+    let prepared = problem.prepare(at)?;
+    let mut system = Bordered::new(
+        problem.band_count(),
+        problem.band_width(&prepared),
+        problem.border_count(),
+    );
+    let mut cost = 0.0;
+    for_each_group(problem, &prepared, |groups, part| {
+        cost += part;
+        for group in groups {
+            system.absorb(group, &problem.border_maps()[group.map]);
+        }
+    })?;
+    system.finish();
+    Ok(Evaluation { cost, system })
+}
+
+/// The trace of the hat matrix J cov Jᵀ, summed by border map: how many unknowns the rows of each
+/// map have used up. `covariance` is that of unit noise at the same point.
+///
+/// # Errors
+/// [`NoValue`] where the model is not defined.
+pub fn hat_traces<P: StructuredProblem>(
+    problem: &P,
+    at: &Parameters,
+    covariance: &BorderedCovariance,
+) -> Result<Vec<f64>, NoValue> {
+    let prepared = problem.prepare(at)?;
+    let maps = problem.border_maps();
+    let mut traces = vec![0.0; maps.len()];
+    for_each_group(problem, &prepared, |groups, _| {
+        let shares: Vec<f64> = groups
+            .par_iter()
+            .map(|group| covariance.hat_trace(group, &maps[group.map]))
+            .collect();
+        for (group, share) in groups.iter().zip(shares) {
+            traces[group.map] += share;
+        }
+    })?;
+    Ok(traces)
+}
+
+/// Runs the tasks on all cores and hands over their groups in order, the next tasks being worked
+/// on meanwhile.
+fn for_each_group<P: StructuredProblem>(
+    problem: &P,
+    prepared: &P::Prepared,
+    mut take: impl FnMut(&[Group], f64) + Send,
+) -> Result<(), NoValue> {
+    type Chunk = Result<Vec<(Vec<Group>, f64)>, NoValue>;
+    let count = problem.task_count(prepared);
+    let chunk = |from: usize| -> Chunk {
+        (from..count.min(from + TASKS_AT_ONCE))
+            .into_par_iter()
+            .with_min_len(TASKS_A_CORE)
+            .map_init(Sink::default, |sink, index| {
+                problem.task(prepared, index, sink)?;
+                Ok(sink.take())
+            })
+            .collect()
+    };
+    let mut ready = chunk(0)?;
+    let mut next = TASKS_AT_ONCE;
+    loop {
+        let mut hand_over = || {
+            for (groups, cost) in &ready {
+                take(groups, *cost);
+            }
+        };
+        if next >= count {
+            hand_over();
+            return Ok(());
+        }
+        let ((), following) = rayon::join(hand_over, || chunk(next));
+        ready = following?;
+        next += TASKS_AT_ONCE;
+    }
+}

@@ -1,0 +1,321 @@
+//! The loop: Gauss–Newton steps, damped where one fails.
+//!
+//! Levenberg (1944) and Marquardt (1963) with the gain ratio and damping schedule of Nielsen,
+//! "Damping parameter in Marquardt's method", IMM-REP-1999-05, begun without damping: a model
+//! whose many unknowns enter linearly needs none near its solution.
+
+use super::evaluate::{Evaluation, evaluate};
+use super::problem::{Parameters, StructuredProblem};
+use crate::linear::bordered::{Bordered, BorderedCovariance, Solved};
+use crate::outcome::{Combination, Convergence, Ending};
+use crate::problem::NoValue;
+
+/// When to stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Most factorisations of all rows.
+    pub max_iterations: usize,
+    /// Converged when a full step promises to lower the cost by less than this share of it. That
+    /// step is still taken.
+    pub cost_tolerance: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            max_iterations: 50,
+            cost_tolerance: 1e-12,
+        }
+    }
+}
+
+/// What one pass over the rows brought.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Iteration {
+    /// Cost at the best point so far.
+    pub cost: f64,
+    /// By how much the next step promises to lower it.
+    pub predicted: f64,
+    /// Damping of the step that led here; zero for a Gauss–Newton step.
+    pub damping: f64,
+    /// Whether that step was accepted.
+    pub accepted: bool,
+}
+
+/// Whether to go on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Progress {
+    /// Not there yet.
+    Continue,
+    /// Ended, and how.
+    Done(Ending),
+}
+
+/// The state between two steps. [`minimise`] drives it; so does the `argmin` solver of this module.
+#[derive(Debug, Clone)]
+pub struct Minimiser {
+    options: Options,
+    at: Parameters,
+    evaluation: Evaluation,
+    solved: Option<Solved>,
+    scales: Option<(Vec<f64>, Vec<f64>)>,
+    damping: f64,
+    growth: f64,
+    iterations: Vec<Iteration>,
+}
+
+/// The result of a minimisation.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The best point.
+    pub parameters: Parameters,
+    /// Cost there.
+    pub cost: f64,
+    /// How it ended.
+    pub ending: Ending,
+    /// One record a pass over the rows.
+    pub iterations: Vec<Iteration>,
+    evaluation: Evaluation,
+    solved: Option<Solved>,
+}
+
+impl Fit {
+    /// Whether the end is a minimum.
+    pub fn converged(&self) -> bool {
+        self.ending.is_converged()
+    }
+
+    /// Covariances for rows in units of their standard deviation; `None` where the fit did not
+    /// reach a minimum that determines everything.
+    pub fn covariance(&self) -> Option<BorderedCovariance> {
+        let solved = self.solved.as_ref().filter(|_| self.converged())?;
+        Some(BorderedCovariance::new(&self.evaluation.system, solved))
+    }
+
+    /// The value that held border unknowns would take if they were released too, to first order,
+    /// with its covariance for unit noise: is the model's fixed value right?
+    pub fn if_released<P: StructuredProblem>(
+        &self,
+        problem: &P,
+        release: usize,
+    ) -> Option<(f64, f64)> {
+        let mut held = problem.held().to_vec();
+        *held.get_mut(release)? = false;
+        let missing = problem
+            .constraints()
+            .missing(&self.parameters.band, &self.parameters.border);
+        let solved = self
+            .evaluation
+            .system
+            .solve(problem.constraints(), &missing, &held)
+            .ok()?;
+        if !solved.undetermined.is_empty() {
+            return None;
+        }
+        let variance =
+            BorderedCovariance::new(&self.evaluation.system, &solved).border()[(release, release)];
+        Some((
+            self.parameters.border[release] + solved.border[release],
+            variance,
+        ))
+    }
+}
+
+/// First damping after a failed Gauss–Newton step, relative to the squared column norms.
+const FIRST_DAMPING: f64 = 1e-4;
+/// Damping below this is none.
+const NO_DAMPING: f64 = 1e-9;
+/// Damping above this means that no step helps.
+const TOO_MUCH_DAMPING: f64 = 1e12;
+/// A step is accepted when the cost falls by this share of the promise.
+const ACCEPTED_GAIN: f64 = 1e-4;
+
+impl Minimiser {
+    /// Evaluates the start.
+    ///
+    /// # Errors
+    /// [`NoValue`] if the model is not defined there.
+    pub fn new<P: StructuredProblem>(
+        problem: &P,
+        start: Parameters,
+        options: Options,
+    ) -> Result<Self, NoValue> {
+        let evaluation = evaluate(problem, &start)?;
+        Ok(Self {
+            options,
+            at: start,
+            evaluation,
+            solved: None,
+            scales: None,
+            damping: 0.0,
+            growth: 2.0,
+            iterations: Vec::new(),
+        })
+    }
+
+    /// The best point so far.
+    pub fn parameters(&self) -> &Parameters {
+        &self.at
+    }
+
+    /// Cost at the best point so far.
+    pub fn cost(&self) -> f64 {
+        self.evaluation.cost
+    }
+
+    /// The records so far.
+    pub fn iterations(&self) -> &[Iteration] {
+        &self.iterations
+    }
+
+    /// Takes one step: one pass over the rows, or none where the step is the last.
+    pub fn advance<P: StructuredProblem>(&mut self, problem: &P) -> Progress {
+        let constraints = problem.constraints();
+        let missing = constraints.missing(&self.at.band, &self.at.border);
+        let system = &self.evaluation.system;
+        let solved = if self.damping == 0.0 {
+            system.solve(constraints, &missing, problem.held())
+        } else {
+            let scales = self.scales.get_or_insert_with(|| system.column_norms());
+            system.damped(self.damping, &scales.0, &scales.1).solve(
+                constraints,
+                &missing,
+                problem.held(),
+            )
+        };
+        let solved = match solved {
+            Ok(solved) => solved,
+            // A constraint that repeats another determines nothing.
+            Err(index) => {
+                return Progress::Done(Ending::NotIdentifiable {
+                    by: Convergence::Gradient,
+                    combinations: vec![Combination {
+                        terms: vec![(format!("constraint {index}"), 1.0)],
+                    }],
+                });
+            }
+        };
+        let predicted = system.predicted_reduction(&solved.band, &solved.border);
+        let cost = self.evaluation.cost;
+        let trial = self.at.stepped(&solved.band, &solved.border);
+        let settled = if predicted <= self.options.cost_tolerance * cost {
+            Some(Convergence::Cost)
+        } else if system.change_is_rounding(&solved, &self.at.band, &self.at.border) {
+            Some(Convergence::Step)
+        } else {
+            None
+        };
+        if let (Some(by), true) = (settled, self.damping == 0.0) {
+            let combinations = undetermined(problem, system, &solved);
+            self.at = trial;
+            self.evaluation.cost = (cost - predicted).max(0.0);
+            self.record(predicted, true);
+            self.solved = Some(solved);
+            return Progress::Done(if combinations.is_empty() {
+                Ending::Converged(by)
+            } else {
+                Ending::NotIdentifiable { by, combinations }
+            });
+        }
+        if self.iterations.len() >= self.options.max_iterations {
+            return Progress::Done(Ending::IterationLimit);
+        }
+        match evaluate(problem, &trial) {
+            Ok(next) if next.cost.is_finite() && cost - next.cost > ACCEPTED_GAIN * predicted => {
+                let gain = (cost - next.cost) / predicted;
+                self.at = trial;
+                self.evaluation = next;
+                self.record(predicted, true);
+                self.damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).max(0.1);
+                self.growth = 2.0;
+                if self.damping < NO_DAMPING {
+                    self.damping = 0.0;
+                }
+            }
+            _ => {
+                self.record(predicted, false);
+                self.damping = if self.damping == 0.0 {
+                    FIRST_DAMPING
+                } else {
+                    self.damping * self.growth
+                };
+                self.growth *= 2.0;
+                if self.damping > TOO_MUCH_DAMPING {
+                    return Progress::Done(Ending::NoDescent);
+                }
+            }
+        }
+        Progress::Continue
+    }
+
+    /// The result.
+    pub fn finish(self, ending: Ending) -> Fit {
+        Fit {
+            parameters: self.at,
+            cost: self.evaluation.cost,
+            ending,
+            iterations: self.iterations,
+            evaluation: self.evaluation,
+            solved: self.solved,
+        }
+    }
+
+    fn record(&mut self, predicted: f64, accepted: bool) {
+        self.iterations.push(Iteration {
+            cost: self.evaluation.cost,
+            predicted,
+            damping: self.damping,
+            accepted,
+        });
+    }
+}
+
+/// Minimises from a start that satisfies the constraints.
+///
+/// # Errors
+/// [`NoValue`] if the model is not defined at the start.
+pub fn minimise<P: StructuredProblem>(
+    problem: &P,
+    start: Parameters,
+    options: Options,
+) -> Result<Fit, NoValue> {
+    let mut minimiser = Minimiser::new(problem, start, options)?;
+    loop {
+        if let Progress::Done(ending) = minimiser.advance(problem) {
+            return Ok(minimiser.finish(ending));
+        }
+    }
+}
+
+/// Diagonals of the band below this share of the largest count as zero.
+const BAND_RANK_TOLERANCE: f64 = 1e-11;
+
+/// A share in an undetermined combination below this is rounding.
+const NEGLIGIBLE_SHARE: f64 = 1e-6;
+
+/// The combinations that the rows do not determine.
+fn undetermined<P: StructuredProblem>(
+    problem: &P,
+    system: &Bordered,
+    solved: &Solved,
+) -> Vec<Combination> {
+    let in_border = solved.undetermined.iter().map(|u| {
+        let largest = u.weights.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
+        let terms = u
+            .weights
+            .iter()
+            .enumerate()
+            .filter(|(_, w)| w.abs() > NEGLIGIBLE_SHARE * largest)
+            .map(|(j, w)| (problem.border_name(j), *w))
+            .collect();
+        Combination { terms }
+    });
+    let in_band = system
+        .triangle()
+        .undetermined(BAND_RANK_TOLERANCE)
+        .into_iter()
+        .map(|j| Combination {
+            terms: vec![(problem.band_name(j), 1.0)],
+        });
+    in_border.chain(in_band).collect()
+}

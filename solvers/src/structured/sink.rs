@@ -1,0 +1,73 @@
+//! Where a task puts its rows.
+
+use crate::linear::banded::{Tall, compress};
+use crate::linear::bordered::Group;
+
+/// Takes batches of rows, compresses each at once and keeps one small triangle a group.
+#[derive(Debug)]
+pub struct Sink {
+    batch: Tall,
+    open: Vec<f64>,
+    columns: usize,
+    groups: Vec<Group>,
+    cost: f64,
+}
+
+impl Default for Sink {
+    fn default() -> Self {
+        Self {
+            batch: Tall::new(16),
+            open: Vec::new(),
+            columns: 0,
+            groups: Vec::new(),
+            cost: 0.0,
+        }
+    }
+}
+
+impl Sink {
+    /// Begins a group whose rows have so many local columns, the residual included.
+    pub fn open(&mut self, columns: usize) {
+        self.columns = columns;
+        self.open.clear();
+        self.open.resize(columns * columns, 0.0);
+    }
+
+    /// The batch to fill with `rows` rows (at most [`Tall::CAPACITY`]) of the open group.
+    pub fn batch(&mut self, rows: usize) -> &mut Tall {
+        self.batch.reset(rows, self.columns);
+        &mut self.batch
+    }
+
+    /// Takes the filled batch; its part of the cost is half its sum of squares.
+    pub fn push(&mut self) {
+        let residual = self.batch.column(self.columns - 1);
+        let cost = 0.5 * residual.iter().map(|r| r * r).sum::<f64>();
+        self.push_with_cost(cost);
+    }
+
+    /// Takes the filled batch and its part of the cost, where rows have been weighted by a robust
+    /// loss and the cost is not half their sum of squares.
+    pub fn push_with_cost(&mut self, cost: f64) {
+        self.cost += cost;
+        compress(&mut self.batch, &mut self.open);
+    }
+
+    /// Ends the group: the unknown of each local band column (`None` where fixed at zero) and the
+    /// number of the border map.
+    pub fn close(&mut self, band: Vec<Option<usize>>, map: usize) {
+        self.groups.push(Group {
+            band,
+            map,
+            triangle: self.open.clone(),
+        });
+    }
+
+    /// What has come in since the last call: the groups and the cost.
+    pub(super) fn take(&mut self) -> (Vec<Group>, f64) {
+        (
+            std::mem::take(&mut self.groups),
+            std::mem::take(&mut self.cost),
+        )
+    }
+}

@@ -1,0 +1,7 @@
+//! Uncertainty where the covariance is not enough.
+//!
+//! [`profile`] follows the cost itself and is right where curvature makes an interval lopsided;
+//! [`bootstrap`] asks nothing of the distribution of the errors but that they are alike.
+
+pub mod bootstrap;
+pub mod profile;

@@ -1,0 +1,12 @@
+//! Nonlinear least-squares problems whose minima are certified or published.
+//!
+//! [`strd`] reads the certified regression problems of NIST from their own files; [`mgh`] holds
+//! the collection of Moré, Garbow & Hillstrom. Models are written once, over any [`Scalar`]; their
+//! derivatives come from the chain rule on [`Dual`] numbers and are exact to rounding.
+
+pub mod dual;
+pub mod mgh;
+pub mod separable;
+pub mod strd;
+
+pub use dual::{Dual, Scalar};

@@ -1,0 +1,332 @@
+//! `errsep anova`: what parts differ by against what their measurement scatters by.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use errsep_models::anova::recipe::{self, Recipe, Summary};
+use errsep_models::anova::{AnovaError, Group, Groups, OneWay, analyse};
+use serde_json::{Value, json};
+
+use super::{Answer, CommonArgs};
+use crate::io::replicates::{Replicates, read_replicates};
+use crate::io::units::{per_cent, symbol};
+use crate::io::{CsvTable, Message, Status};
+use crate::report::anova::{FeatureView, page};
+use crate::report::number;
+
+/// Analysis of variance of replicates: manufacturing against measurement.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The file has one reading a row, in the columns part and value, and where they apply replicate (1, 2,
+…), unit (um if absent) and any of feature, table, quantity, process, hole, axis, which together name
+a feature. Features are analysed one by one:
+
+    feature,part,replicate,value
+    hole 3 X,1,1,8.388
+    hole 3 X,1,2,6.124
+    hole 3 X,2,1,-3.861
+
+Example: errsep anova replicates.csv --out anova")]
+pub struct Args {
+    /// The readings.
+    #[arg(value_name = "REPLICATES.csv")]
+    replicates: PathBuf,
+    /// Coverage of the intervals.
+    #[arg(long, value_name = "P", default_value_t = 0.95)]
+    confidence: f64,
+    /// Adds the figures as NISTIR 6868 forms them.
+    #[arg(long, value_enum)]
+    recipe: Option<RecipeName>,
+    #[command(flatten)]
+    pub(super) common: CommonArgs,
+}
+
+/// The report's two ways.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum RecipeName {
+    /// Section 5.1: weighted by the number of readings (Tables B and C).
+    #[value(name = "section-5.1")]
+    Section51,
+    /// Plain mean of the part means (Tables G and H).
+    PartMeans,
+}
+
+impl From<RecipeName> for Recipe {
+    fn from(name: RecipeName) -> Self {
+        match name {
+            RecipeName::Section51 => Self::Section51,
+            RecipeName::PartMeans => Self::PartMeans,
+        }
+    }
+}
+
+/// A feature with everything found about it.
+struct Analysed {
+    feature: Replicates,
+    groups: Groups,
+    result: OneWay,
+    summary: Option<Summary>,
+}
+
+/// Analyses every feature of the table.
+///
+/// # Errors
+/// The table cannot be read, a feature cannot be analysed, a confidence outside 0 to 1.
+pub fn run(args: &Args) -> Result<Answer, Message> {
+    if !(args.confidence > 0.0 && args.confidence < 1.0) {
+        return Err(Message::bad_input(format!(
+            "--confidence {} is no probability",
+            args.confidence
+        ))
+        .remedy("give a number between 0 and 1, such as 0.95"));
+    }
+    let analysed = read_replicates(&args.replicates)?
+        .into_iter()
+        .map(|feature| analyse_feature(feature, args))
+        .collect::<Result<Vec<_>, _>>()?;
+    let open: Vec<&str> = analysed
+        .iter()
+        .filter(|a| a.result.groups > 1 && a.result.components.within.is_none())
+        .map(|a| a.feature.name.as_str())
+        .collect();
+    let mut text = format!("Analysis of variance of {}\n", args.replicates.display());
+    for one in &analysed {
+        describe(&mut text, one);
+    }
+    if !open.is_empty() {
+        let _ = writeln!(
+            text,
+            "\nNot determined for {}: no part was measured twice, so the scatter of the parts cannot \
+             be told from that of the measurement. Repeat the measurement of some parts.",
+            open.join(", ")
+        );
+    }
+    let views: Vec<FeatureView> = analysed
+        .iter()
+        .map(|a| FeatureView {
+            name: &a.feature.name,
+            unit: &a.feature.unit,
+            groups: &a.groups,
+            result: &a.result,
+            summary: a.summary.as_ref(),
+        })
+        .collect();
+    Ok(Answer {
+        page: page(&args.replicates.display().to_string(), &views, &open),
+        json: json!({
+            "schema": "errsep.anova/1",
+            "confidence": args.confidence,
+            "features": analysed.iter().map(as_json).collect::<Vec<_>>(),
+        }),
+        tables: vec![components_table(&analysed), parts_table(&analysed)],
+        inputs: vec![args.replicates.clone()],
+        seed: None,
+        status: if open.is_empty() {
+            Status::Done
+        } else {
+            Status::NotSolved
+        },
+        text,
+    })
+}
+
+fn analyse_feature(feature: Replicates, args: &Args) -> Result<Analysed, Message> {
+    let wrong = |error: AnovaError| {
+        Message::bad_input(format!("{}: {error}", feature.name))
+            .in_file(&args.replicates)
+            .remedy(match error {
+                AnovaError::Overflow => "write the readings in a larger unit",
+                AnovaError::NothingToCompare => {
+                    "leave --recipe out, or repeat the measurement of some parts"
+                }
+                _ => "give every feature two or more readings",
+            })
+    };
+    let groups = feature
+        .parts
+        .iter()
+        .map(|(name, readings)| Group {
+            name: name.clone(),
+            readings: readings.clone(),
+        })
+        .collect();
+    let groups = Groups::new(groups).map_err(wrong)?;
+    let result = analyse(&groups, &feature.unit, args.confidence).map_err(wrong)?;
+    let summary = match args.recipe {
+        Some(name) => Some(recipe::summarise(&groups, name.into()).map_err(wrong)?),
+        None => None,
+    };
+    Ok(Analysed {
+        feature,
+        groups,
+        result,
+        summary,
+    })
+}
+
+fn describe(text: &mut String, one: &Analysed) {
+    let (r, unit) = (&one.result, symbol(&one.feature.unit));
+    let _ = writeln!(
+        text,
+        "\n{} ({} parts, {} readings)",
+        one.feature.name, r.groups, r.readings
+    );
+    let mean = number::measured(r.mean.value, Some(r.mean.standard_uncertainty));
+    let _ = writeln!(
+        text,
+        "  mean              {mean} {unit} (standard uncertainty, {} degrees of freedom)",
+        r.mean.degrees_of_freedom
+    );
+    for (name, component) in [
+        ("between parts", &r.components.between),
+        ("one measurement", &r.components.within),
+    ] {
+        if let Some(c) = component {
+            let note = if c.variance < 0.0 {
+                ", no difference shows"
+            } else {
+                ""
+            };
+            let _ = writeln!(
+                text,
+                "  {name:17} {} {unit} (standard deviation, {} % from {} to {}{note})",
+                number::plain(c.standard_deviation, 4),
+                per_cent(r.components.confidence),
+                number::plain(c.lower.sqrt(), 4),
+                number::plain(c.upper.sqrt(), 4),
+            );
+        }
+    }
+    if let (Some(f), Some(p)) = (r.f, r.p_value) {
+        let _ = writeln!(
+            text,
+            "  F({}, {})         {}, p {}",
+            r.between.degrees_of_freedom,
+            r.within.degrees_of_freedom,
+            number::plain(f, 5),
+            number::probability(p)
+        );
+    }
+    if let Some(budget) = &r.future_reading {
+        let u = budget.result.standard_uncertainty;
+        let _ = writeln!(
+            text,
+            "  a future reading  ± {} {unit} (k = 1)",
+            number::plain(u, 3)
+        );
+    }
+    if let Some(s) = &one.summary {
+        let _ = writeln!(
+            text,
+            "  NISTIR 6868       mean {}, between {}, within {} {unit}², future {} and {} {unit}",
+            number::plain(s.mean, 4),
+            number::plain(s.variance_between, 6),
+            number::plain(s.variance_within, 6),
+            number::plain(s.future_measurement, 4),
+            number::plain(s.future_manufacturing, 4),
+        );
+    }
+}
+
+fn as_json(one: &Analysed) -> Value {
+    let keys: serde_json::Map<String, Value> = one
+        .feature
+        .keys
+        .iter()
+        .map(|(k, v)| (k.clone(), json!(v)))
+        .collect();
+    let parts: Vec<Value> = one
+        .groups
+        .groups()
+        .iter()
+        .map(|g| {
+            json!({"part": g.name, "readings": g.readings.len(), "mean": g.mean(),
+                   "std": g.standard_deviation()})
+        })
+        .collect();
+    let mut value = json!({
+        "name": one.feature.name,
+        "keys": keys,
+        "unit": one.feature.unit,
+        "analysis": one.result,
+        "parts": parts,
+    });
+    if let (Value::Object(object), Some(summary)) = (&mut value, &one.summary) {
+        object.insert("nistir6868".to_owned(), json!(summary));
+    }
+    value
+}
+
+fn components_table(analysed: &[Analysed]) -> CsvTable {
+    let texts = |f: fn(&Analysed) -> String| analysed.iter().map(f).collect::<Vec<_>>();
+    let numbers = |f: fn(&OneWay) -> Option<f64>| {
+        analysed
+            .iter()
+            .map(|a| f(&a.result).unwrap_or(f64::NAN))
+            .collect::<Vec<_>>()
+    };
+    CsvTable::new("components.csv")
+        .texts("feature", texts(|a| a.feature.name.clone()))
+        .texts("unit", texts(|a| a.feature.unit.clone()))
+        .numbers("mean", numbers(|r| Some(r.mean.value)))
+        .numbers("mean_std", numbers(|r| Some(r.mean.standard_uncertainty)))
+        .numbers("mean_square_between", numbers(|r| r.between.mean_square))
+        .numbers("mean_square_within", numbers(|r| r.within.mean_square))
+        .numbers("f", numbers(|r| r.f))
+        .numbers("p_value", numbers(|r| r.p_value))
+        .numbers(
+            "variance_between",
+            numbers(|r| r.components.between.map(|c| c.variance)),
+        )
+        .numbers(
+            "variance_between_lower",
+            numbers(|r| r.components.between.map(|c| c.lower)),
+        )
+        .numbers(
+            "variance_between_upper",
+            numbers(|r| r.components.between.map(|c| c.upper)),
+        )
+        .numbers(
+            "variance_within",
+            numbers(|r| r.components.within.map(|c| c.variance)),
+        )
+        .numbers(
+            "variance_within_lower",
+            numbers(|r| r.components.within.map(|c| c.lower)),
+        )
+        .numbers(
+            "variance_within_upper",
+            numbers(|r| r.components.within.map(|c| c.upper)),
+        )
+}
+
+fn parts_table(analysed: &[Analysed]) -> CsvTable {
+    let rows = || {
+        analysed
+            .iter()
+            .flat_map(|a| a.groups.groups().iter().map(move |g| (&a.feature, g)))
+    };
+    CsvTable::new("parts.csv")
+        .texts(
+            "feature",
+            rows().map(|(f, _)| f.name.clone()).collect::<Vec<_>>(),
+        )
+        .texts(
+            "part",
+            rows().map(|(_, g)| g.name.clone()).collect::<Vec<_>>(),
+        )
+        .numbers(
+            "readings",
+            rows()
+                .map(|(_, g)| g.readings.len() as f64)
+                .collect::<Vec<_>>(),
+        )
+        .numbers("mean", rows().map(|(_, g)| g.mean()).collect::<Vec<_>>())
+        .numbers(
+            "std",
+            rows()
+                .map(|(_, g)| g.standard_deviation().unwrap_or(f64::NAN))
+                .collect::<Vec<_>>(),
+        )
+}

@@ -1,0 +1,235 @@
+//! `errsep circle`: the circle through points, with uncertainty and circularity.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use errsep_models::circle::{
+    AlgebraicFit, Circle, CircleError, CircleFit, Circularity, Point, algebraic, circularity,
+    nistir_fit, orthogonal_fit,
+};
+use serde_json::{Value, json};
+
+use super::quantity::{quantity_json, unexpandable};
+use super::{Answer, CommonArgs};
+use crate::io::circle::read_points;
+use crate::io::{CsvTable, Message, Status};
+use crate::report::circle::{CircleView, page, zones};
+use crate::report::number;
+
+/// Circle through points: centre and radius with uncertainty, circularity by four references.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The file has the columns x and y, mm:
+
+    x,y
+    50.0012,0.0003
+    49.2391,8.6829
+
+Example: errsep circle points.csv --out circle")]
+pub struct Args {
+    /// The points.
+    #[arg(value_name = "POINTS.csv")]
+    points: PathBuf,
+    /// Standard deviation of a point's radial deviation, um; estimated from the residuals if absent.
+    #[arg(long, value_name = "UM")]
+    noise: Option<f64>,
+    /// Adds the fit as NISTIR 6868, appendix F, makes it.
+    #[arg(long)]
+    nistir: bool,
+    #[command(flatten)]
+    pub(super) common: CommonArgs,
+}
+
+/// Fits the circle.
+///
+/// # Errors
+/// The file is no table of points, no circle passes through them, or the fit did not converge.
+pub fn run(args: &Args) -> Result<Answer, Message> {
+    if let Some(noise) = args.noise.filter(|n| !(*n > 0.0 && n.is_finite())) {
+        return Err(
+            Message::bad_input(format!("--noise {noise} is no standard deviation"))
+                .remedy("give a number greater than zero, in µm"),
+        );
+    }
+    let points = read_points(&args.points)?;
+    let refused = |e: CircleError| refused(&e, args);
+    let fit = orthogonal_fit(&points, args.noise).map_err(refused)?;
+    let zones_found = circularity(&points, fit.circle).map_err(refused)?;
+    let mut others: Vec<(String, Circle)> = AlgebraicFit::ALL
+        .into_iter()
+        .filter_map(|kind| Some((kind.name().to_owned(), algebraic(&points, kind).ok()?)))
+        .collect();
+    let nistir = if args.nistir {
+        let start = centroid_start(&points);
+        let own = nistir_fit(&points, start).map_err(refused)?;
+        others.push(("nistir 6868 F".to_owned(), own.circle));
+        Some(own)
+    } else {
+        None
+    };
+    let mut json = as_json(&points, &fit, &zones_found, &others)?;
+    if let (Some(own), Value::Object(object)) = (nistir, &mut json) {
+        object.insert(
+            "nistir".to_owned(),
+            json!({
+                "centre": [own.circle.centre.x, own.circle.centre.y],
+                "radius": own.circle.radius,
+                "signed_radius": own.signed_radius,
+                "iterations": own.iterations,
+                "ending": own.ending,
+            }),
+        );
+    }
+    Ok(Answer {
+        text: in_words(args, &points, &fit, &zones_found, &others),
+        json,
+        page: page(&CircleView {
+            data: &args.points.display().to_string(),
+            points: &points,
+            circle: fit.circle,
+            std: fit.standard_uncertainties(),
+            residuals_um: &fit.residuals_um,
+            noise: (fit.noise_um, fit.noise_given),
+            circularity: &zones_found,
+            others: &others,
+        }),
+        tables: vec![
+            CsvTable::new("deviations.csv")
+                .numbers("x_mm", points.iter().map(|p| p.x).collect::<Vec<_>>())
+                .numbers("y_mm", points.iter().map(|p| p.y).collect::<Vec<_>>())
+                .numbers("deviation_um", fit.residuals_um.clone()),
+        ],
+        inputs: vec![args.points.clone()],
+        seed: None,
+        status: Status::Done,
+    })
+}
+
+fn refused(error: &CircleError, args: &Args) -> Message {
+    let message = match error {
+        CircleError::StraighterThanAnyCircle | CircleError::NotConverged { .. } => {
+            Message::not_solved(error.to_string()).remedy("measure a longer arc")
+        }
+        CircleError::NoRedundancy => {
+            Message::bad_input(error.to_string()).remedy("add points, or give --noise")
+        }
+        _ => Message::bad_input(error.to_string())
+            .remedy("give three or more different points that are not on one line"),
+    };
+    message.in_file(&args.points)
+}
+
+/// Centroid and mean distance: a start that needs no fit.
+fn centroid_start(points: &[Point]) -> Circle {
+    let n = points.len().max(1) as f64;
+    let centre = Point::new(
+        points.iter().map(|p| p.x).sum::<f64>() / n,
+        points.iter().map(|p| p.y).sum::<f64>() / n,
+    );
+    Circle {
+        centre,
+        radius: points.iter().map(|p| p.distance(centre)).sum::<f64>() / n,
+    }
+}
+
+fn in_words(
+    args: &Args,
+    points: &[Point],
+    fit: &CircleFit,
+    circularity: &Circularity,
+    others: &[(String, Circle)],
+) -> String {
+    let mut text = format!(
+        "Circle through {} ({} points)\n",
+        args.points.display(),
+        points.len()
+    );
+    let std = fit.standard_uncertainties();
+    let c = fit.circle;
+    for (name, value, std) in [
+        ("radius", c.radius, std[2]),
+        ("centre x", c.centre.x, std[0]),
+        ("centre y", c.centre.y, std[1]),
+    ] {
+        let _ = writeln!(
+            text,
+            "  {name:10} {} mm (standard uncertainty)",
+            number::measured(value, Some(std))
+        );
+    }
+    let _ = writeln!(
+        text,
+        "  deviation  {} µm (standard deviation of a point, {}, {} degrees of freedom)",
+        number::plain(fit.noise_um, 3),
+        if fit.noise_given {
+            "given"
+        } else {
+            "estimated"
+        },
+        fit.degrees_of_freedom
+    );
+    let _ = writeln!(text, "\nCircularity");
+    for (reference, zone) in zones(circularity) {
+        let _ = match zone {
+            Ok(z) => writeln!(
+                text,
+                "  {}       {} µm",
+                reference.name(),
+                number::plain(z.width_um, 4)
+            ),
+            Err(reason) => writeln!(text, "  {}       {reason}", reference.name()),
+        };
+    }
+    let _ = writeln!(text, "\nRadius of other fits less this one");
+    for (name, other) in others {
+        let _ = writeln!(
+            text,
+            "  {name:14} {} µm",
+            number::plain(1e3 * (other.radius - c.radius), 3)
+        );
+    }
+    text
+}
+
+fn as_json(
+    points: &[Point],
+    fit: &CircleFit,
+    circularity: &Circularity,
+    others: &[(String, Circle)],
+) -> Result<Value, Message> {
+    let [radius, centre_x, centre_y] = fit.quantities().map_err(unexpandable)?;
+    let covariance: Vec<Vec<f64>> = (0..3)
+        .map(|i| (0..3).map(|j| fit.covariance[(i, j)]).collect())
+        .collect();
+    Ok(json!({
+        "schema": "errsep.circle/1",
+        "points": points.len(),
+        "fit": {
+            "method": "orthogonal",
+            "radius": quantity_json(&radius)?,
+            "centre_x": quantity_json(&centre_x)?,
+            "centre_y": quantity_json(&centre_y)?,
+            "covariance": {"order": ["centre_x", "centre_y", "radius"], "value": covariance, "unit": "mm2"},
+            "noise": {"value": fit.noise_um, "unit": "um", "given": fit.noise_given},
+            "degrees_of_freedom": fit.degrees_of_freedom,
+        },
+        "algebraic": others.iter().filter(|o| !o.0.starts_with("nistir")).map(|(name, o)| json!({
+            "method": name,
+            "centre": [o.centre.x, o.centre.y],
+            "radius": o.radius,
+        })).collect::<Vec<_>>(),
+        "circularity": zones(circularity).into_iter().map(|(reference, zone)| match zone {
+            Ok(z) => json!({
+                "reference": reference.name(),
+                "deviation": {"value": z.width_um, "unit": "um"},
+                "centre": [z.centre.x, z.centre.y],
+                "radius": z.radius,
+                "inner_contacts": z.inner_contacts,
+                "outer_contacts": z.outer_contacts,
+            }),
+            Err(reason) => json!({"reference": reference.name(), "reason": reason}),
+        }).collect::<Vec<_>>(),
+        "residuals": {"value": fit.residuals_um, "unit": "um"},
+        "convergence": {"converged": true, "reason": fit.ending, "iterations": fit.iterations},
+    }))
+}

@@ -1,0 +1,189 @@
+//! `errsep four-sensor`: surface, straightness and tilt from four sensors.
+
+mod json;
+mod page;
+mod read;
+mod setup;
+mod words;
+
+use std::path::PathBuf;
+
+use errsep_models::four_sensor::{
+    Choice, FourSensorError, PublishedSeparation, PublishedSeparator, Separation, Separator,
+    separate_long,
+};
+use errsep_models::uncertainty::DegreesOfFreedom;
+
+use super::{Answer, CommonArgs};
+use crate::io::{CsvTable, Message, SetupFile, Status};
+use read::Measured;
+use setup::Setup;
+
+/// Straightness and tilt of a slide from four displacement sensors on one surface.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The file has one row a slide position with the outputs of the four sensors in um,
+
+    x,m1,m2,m3,m4
+    0,1.25,-0.31,2.07,11.48
+
+or one row a reading (sensor,x,reading); a column `repeat` numbers repeats, which are averaged. The
+set-up gives the distance of each sensor to the one before and, if known, the noise of one reading:
+
+    [sensors]
+    spacing = [5.0, 5.0, 25.0]   # mm, multiples of the step
+    noise = 0.1                  # um
+    [separation]                 # all optional
+    penalty = \"profile\"          # or slope, curvature
+    choice = \"l-curve\"           # or gcv, discrepancy; or lambda = 0.02
+    line = \"end-points\"          # or least-squares
+    [parabola]                   # optional, one of
+    tilt_slope = 1e-8            # rad/mm; surface_curvature, um/mm2; zero_adjustment, um
+
+Example: errsep four-sensor data.csv --setup setup.toml --out four-sensor")]
+pub struct Args {
+    /// The outputs.
+    #[arg(value_name = "DATA.csv")]
+    data: PathBuf,
+    /// The set-up.
+    #[arg(long, value_name = "SETUP.toml")]
+    setup: PathBuf,
+    #[command(flatten)]
+    pub(super) common: CommonArgs,
+}
+
+/// The most points of surface for which the system is decomposed whole; longer records go through
+/// the band, where the published way has no place.
+const LONGEST_DENSE: usize = 400;
+
+/// What the answer is written from.
+struct Found {
+    measured: Measured,
+    setup: Setup,
+    separation: Separation,
+    published: Option<PublishedSeparation>,
+    /// Condition number of the system that was solved, where it was decomposed.
+    condition_number: Option<f64>,
+}
+
+impl Found {
+    /// Whether the noise is that of the scatter of the repeats.
+    fn noise_from_repeats(&self) -> bool {
+        let noise = self.measured.noise;
+        noise.is_some() && noise == self.setup.settings.noise && !self.separation.noise_estimated
+    }
+
+    /// How well the noise is known.
+    fn degrees_of_freedom(&self) -> Option<DegreesOfFreedom> {
+        if self.noise_from_repeats() {
+            let further = self.measured.repeats.saturating_sub(1);
+            let readings = 4 * self.measured.outputs.readings().len();
+            DegreesOfFreedom::new((readings * further) as f64).ok()
+        } else {
+            self.separation.degrees_of_freedom
+        }
+    }
+}
+
+/// Separates the outputs.
+///
+/// # Errors
+/// The files are no outputs and set-up of four sensors, or the outputs cannot be separated.
+pub fn run(args: &Args) -> Result<Answer, Message> {
+    let mut setup = Setup::read(SetupFile::read(&args.setup)?)?;
+    let measured = read::read(&args.data, &setup)?;
+    if setup.settings.noise.is_none() {
+        setup.settings.noise = measured.noise;
+    }
+    let unsolved =
+        |error: FourSensorError| Message::not_solved(error.to_string()).in_file(&args.data);
+    let geometry = measured.outputs.geometry();
+    let found = if geometry.point_count() <= LONGEST_DENSE {
+        let separator = Separator::new(geometry, setup.penalised, setup.line).map_err(unsolved)?;
+        let separation = separator
+            .separate(&measured.outputs, &setup.settings)
+            .map_err(unsolved)?;
+        let published = PublishedSeparator::new(geometry)
+            .and_then(|way| way.separate(&measured.outputs, Choice::LCurve))
+            .map_err(unsolved)?;
+        Found {
+            published: Some(published),
+            condition_number: Some(separator.decomposition().condition_number()),
+            separation,
+            measured,
+            setup,
+        }
+    } else {
+        let separation = separate_long(
+            &measured.outputs,
+            setup.penalised,
+            setup.line,
+            &setup.settings,
+        )
+        .map_err(unsolved)?;
+        Found {
+            published: None,
+            condition_number: None,
+            separation,
+            measured,
+            setup,
+        }
+    };
+    Ok(Answer {
+        text: words::text(&found, &args.data),
+        json: json::json(&found)?,
+        page: page::page(&found, &args.data),
+        tables: tables(&found),
+        inputs: vec![args.data.clone(), args.setup.clone()],
+        seed: None,
+        status: Status::Done,
+    })
+}
+
+fn tables(found: &Found) -> Vec<CsvTable> {
+    let values = |v: &nalgebra::DVector<f64>| v.as_slice().to_vec();
+    let Separation {
+        surface,
+        straightness,
+        tilt,
+        ..
+    } = &found.separation;
+    let outputs = &found.measured.outputs;
+    let residuals = (0..4).fold(
+        CsvTable::new("residuals.csv").numbers("x_mm", outputs.slide_positions()),
+        |table, sensor| {
+            let column: Vec<f64> = found
+                .separation
+                .residuals
+                .iter()
+                .map(|row| row[sensor])
+                .collect();
+            table.numbers(format!("m{}_um", sensor + 1), column)
+        },
+    );
+    let curve = &found.separation.chosen.curve.points;
+    let column = |value: fn(&errsep_solvers::regularization::Point) -> f64| -> Vec<f64> {
+        curve.iter().map(value).collect()
+    };
+    vec![
+        CsvTable::new("surface.csv")
+            .numbers("x_mm", outputs.surface_positions())
+            .numbers("f_um", values(&surface.values))
+            .numbers("f_std_um", values(&surface.std))
+            .numbers("f_bias_um", values(&surface.bias)),
+        CsvTable::new("slide.csv")
+            .numbers("x_mm", outputs.slide_positions())
+            .numbers("S_um", values(&straightness.values))
+            .numbers("S_std_um", values(&straightness.std))
+            .numbers("S_bias_um", values(&straightness.bias))
+            .numbers("gamma_rad", values(&tilt.values))
+            .numbers("gamma_std_rad", values(&tilt.std))
+            .numbers("gamma_bias_rad", values(&tilt.bias)),
+        residuals,
+        CsvTable::new("l_curve.csv")
+            .numbers("lambda", column(|p| p.lambda))
+            .numbers("residual_norm_um", column(|p| p.residual_norm))
+            .numbers("seminorm_um", column(|p| p.seminorm))
+            .numbers("curvature", column(|p| p.curvature())),
+    ]
+}

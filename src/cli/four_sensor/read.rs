@@ -1,0 +1,248 @@
+//! Reading the outputs: tidy (`sensor,x,reading`) or wide (`x,m1,m2,m3,m4`), with repeats or without.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use errsep_models::four_sensor::{Geometry, Outputs};
+
+use super::setup::Setup;
+use crate::io::{Message, TableReader};
+
+/// Outputs and what their repeats say of the noise.
+#[derive(Debug)]
+pub(super) struct Measured {
+    pub outputs: Outputs,
+    /// Number of repeats that were averaged.
+    pub repeats: usize,
+    /// Standard deviation of the averaged reading from the scatter of the repeats, µm.
+    pub noise: Option<f64>,
+}
+
+/// One reading and its line.
+struct Reading {
+    sensor: usize,
+    repeat: u32,
+    x: f64,
+    value: f64,
+    line: usize,
+}
+
+pub(super) fn read(path: &Path, setup: &Setup) -> Result<Measured, Message> {
+    let mut table = TableReader::open(path)?;
+    let readings = if table.optional("sensor").is_some() {
+        tidy(&mut table)?
+    } else {
+        wide(&mut table)?
+    };
+    if readings.is_empty() {
+        return Err(table.no_rows());
+    }
+    let positions = positions(&readings);
+    let step = step(&table, &readings, &positions)?;
+    let (cells, repeats) = cells(&table, &readings, &positions)?;
+
+    let multiples = multiples(setup, step)?;
+    let geometry = Geometry::new(step, multiples, positions.len()).map_err(|error| {
+        Message::bad_input(error.to_string())
+            .in_file(path)
+            .remedy("measure at more slide positions, or check the spacing in the set-up")
+    })?;
+    let mean = |values: &Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+    let rows = cells
+        .iter()
+        .map(|cell| std::array::from_fn(|sensor| mean(&cell[sensor])))
+        .collect();
+    let noise = (repeats > 1).then(|| {
+        let squares: f64 = cells
+            .iter()
+            .flatten()
+            .map(|values| {
+                let mean = mean(values);
+                values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()
+            })
+            .sum();
+        let freedom = cells.len() * 4 * (repeats - 1);
+        (squares / freedom as f64 / repeats as f64).sqrt()
+    });
+    let outputs = Outputs::new(geometry, positions[0], rows)
+        .map_err(|error| Message::bad_input(error.to_string()).in_file(path))?;
+    Ok(Measured {
+        outputs,
+        repeats,
+        // Repeats that agree to the last digit say nothing of the noise.
+        noise: noise.filter(|noise| *noise > 0.0),
+    })
+}
+
+fn tidy(table: &mut TableReader) -> Result<Vec<Reading>, Message> {
+    table.only(&["sensor", "x", "reading", "repeat"])?;
+    let (sensor, at, value) = (
+        table.column("sensor")?,
+        table.column("x")?,
+        table.column("reading")?,
+    );
+    let repeat = table.optional("repeat");
+    let mut readings = Vec::new();
+    while let Some(row) = table.next_row()? {
+        let name = row.text(&sensor);
+        let Some(index) = ["1", "2", "3", "4"].iter().position(|known| *known == name) else {
+            return Err(row
+                .error(&sensor, format!("sensor is \"{name}\""))
+                .remedy("number the sensors 1, 2, 3 and 4"));
+        };
+        readings.push(Reading {
+            sensor: index,
+            repeat: repeat
+                .as_ref()
+                .map_or(Ok(1), |column| repeat_number(&row, column))?,
+            x: row.number(&at)?,
+            value: row.number(&value)?,
+            line: row.line(),
+        });
+    }
+    Ok(readings)
+}
+
+fn wide(table: &mut TableReader) -> Result<Vec<Reading>, Message> {
+    const SENSORS: [&str; 4] = ["m1", "m2", "m3", "m4"];
+    table.only(&["x", "m1", "m2", "m3", "m4", "repeat"])?;
+    let at = table.column("x")?;
+    let mut sensors = Vec::new();
+    for name in SENSORS {
+        sensors.push(table.column(name)?);
+    }
+    let repeat = table.optional("repeat");
+    let mut readings = Vec::new();
+    while let Some(row) = table.next_row()? {
+        let x = row.number(&at)?;
+        let repeat = repeat
+            .as_ref()
+            .map_or(Ok(1), |column| repeat_number(&row, column))?;
+        for (index, column) in sensors.iter().enumerate() {
+            readings.push(Reading {
+                sensor: index,
+                repeat,
+                x,
+                value: row.number(column)?,
+                line: row.line(),
+            });
+        }
+    }
+    Ok(readings)
+}
+
+fn repeat_number(row: &crate::io::Row<'_>, column: &crate::io::Column) -> Result<u32, Message> {
+    row.text(column)
+        .parse()
+        .ok()
+        .filter(|n| *n > 0)
+        .ok_or_else(|| {
+            row.error(column, format!("repeat is \"{}\"", row.text(column)))
+                .remedy("number the repeats 1, 2, 3 …")
+        })
+}
+
+fn positions(readings: &[Reading]) -> Vec<f64> {
+    let mut positions: Vec<f64> = readings.iter().map(|reading| reading.x).collect();
+    positions.sort_by(f64::total_cmp);
+    positions.dedup();
+    positions
+}
+
+/// The sampling interval: the outputs of one sensor have to meet the places of another.
+fn step(table: &TableReader, readings: &[Reading], positions: &[f64]) -> Result<f64, Message> {
+    let [first, .., last] = positions else {
+        return Err(table
+            .at_line(
+                readings.first().map_or(1, |r| r.line),
+                "all readings stand at one position",
+            )
+            .remedy("measure at equally spaced positions"));
+    };
+    let mut gaps: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    gaps.sort_by(f64::total_cmp);
+    // The usual gap names the place of the unusual one; the mean is the step to calculate with.
+    let usual = gaps[gaps.len() / 2];
+    if let Some(place) = positions
+        .windows(2)
+        .position(|pair| (pair[1] - pair[0] - usual).abs() > 1e-3 * usual)
+    {
+        let x = positions[place + 1];
+        let line = readings.iter().find(|r| r.x == x).map_or(1, |r| r.line);
+        return Err(table
+            .at_line(
+                line,
+                format!(
+                    "position {x} mm is {} mm from the one before, the others are {usual} mm apart",
+                    x - positions[place]
+                ),
+            )
+            .remedy("measure at equally spaced positions, without gaps"));
+    }
+    Ok((last - first) / (positions.len() - 1) as f64)
+}
+
+/// The repeated readings of each sensor at one position.
+type Cell = [Vec<f64>; 4];
+
+/// Readings of each position and sensor, and their common number of repeats.
+fn cells(
+    table: &TableReader,
+    readings: &[Reading],
+    positions: &[f64],
+) -> Result<(Vec<Cell>, usize), Message> {
+    let mut cells: Vec<Cell> = vec![Default::default(); positions.len()];
+    let mut seen = BTreeMap::new();
+    for reading in readings {
+        let Ok(place) = positions.binary_search_by(|x| x.total_cmp(&reading.x)) else {
+            continue;
+        };
+        if let Some(before) = seen.insert((place, reading.sensor, reading.repeat), reading.line) {
+            return Err(table
+                .at_line(
+                    reading.line,
+                    format!(
+                        "sensor {} at {} mm is given again, first on line {before}",
+                        reading.sensor + 1,
+                        reading.x
+                    ),
+                )
+                .remedy("remove one of the two, or number repeats in a column `repeat`"));
+        }
+        cells[place][reading.sensor].push(reading.value);
+    }
+    let repeats = cells.iter().flatten().map(Vec::len).max().unwrap_or(0);
+    for (x, cell) in positions.iter().zip(&cells) {
+        if let Some(sensor) = cell.iter().position(|values| values.len() < repeats) {
+            let line = readings.iter().find(|r| r.x == *x).map_or(1, |r| r.line);
+            return Err(table
+                .at_line(
+                    line,
+                    format!(
+                        "sensor {} has {} of {repeats} readings at {x} mm",
+                        sensor + 1,
+                        cell[sensor].len()
+                    ),
+                )
+                .remedy("give all four sensors the same number of readings at every position"));
+        }
+    }
+    Ok((cells, repeats))
+}
+
+fn multiples(setup: &Setup, step: f64) -> Result<[usize; 3], Message> {
+    let mut multiples = [0; 3];
+    for (multiple, spacing) in multiples.iter_mut().zip(setup.spacing.get_ref()) {
+        let steps = spacing / step;
+        // A millionth of the largest index is room enough for any real file.
+        if (steps - steps.round()).abs() > 0.01 || !(0.5..1e6).contains(&steps) {
+            return Err(setup.file.bad(
+                setup.spacing.span(),
+                format!("a spacing of {spacing} mm is no multiple of the step of {step} mm"),
+                "move the slide by a step that divides all spacings",
+            ));
+        }
+        *multiple = steps.round() as usize;
+    }
+    Ok(multiples)
+}

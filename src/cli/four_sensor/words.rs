@@ -1,0 +1,128 @@
+//! The answer in words.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use errsep_models::four_sensor::Parabola;
+use errsep_solvers::regularization::{CornerStatus, Discrepancy};
+use nalgebra::DVector;
+
+use super::Found;
+use crate::io::units::{arcsec_from_rad, urad_from_rad};
+
+pub(super) fn text(found: &Found, data: &Path) -> String {
+    let s = &found.separation;
+    let mut text = format!(
+        "Four-sensor separation of {} ({} slide positions, {} points of surface)\n",
+        data.display(),
+        found.measured.outputs.readings().len(),
+        s.surface.values.len()
+    );
+    let _ = writeln!(
+        text,
+        "  straightness S   {:.3} µm peak to valley, u up to {:.3} µm",
+        span(&s.straightness.values),
+        s.straightness.std.max()
+    );
+    let _ = writeln!(
+        text,
+        "  tilt gamma       {:.2} µrad ({:.2}″) peak to valley, u up to {:.2} µrad",
+        urad_from_rad(span(&s.tilt.values)),
+        arcsec_from_rad(span(&s.tilt.values)),
+        urad_from_rad(s.tilt.std.max())
+    );
+    let _ = writeln!(
+        text,
+        "  surface f        {:.3} µm peak to valley, u up to {:.3} µm",
+        span(&s.surface.values),
+        s.surface.std.max()
+    );
+    let _ = writeln!(
+        text,
+        "  noise            {:.4} µm ({})",
+        s.noise,
+        noise_source(found)
+    );
+    let _ = writeln!(
+        text,
+        "  lambda           {:.3e} by {}; penalty on the {}; {}",
+        s.chosen.point.lambda,
+        s.chosen.rule,
+        found.setup.penalised.name(),
+        status(s.chosen.curve.status)
+    );
+    if let Some(reason) = s.chosen.instead {
+        let _ = writeln!(
+            text,
+            "  {reason}; lambda was taken from {} instead",
+            s.chosen.rule
+        );
+    }
+    let _ = writeln!(
+        text,
+        "  penalty's pull   up to {:.3} µm on S if the truth is the estimate, at most {:.3} µm",
+        s.straightness.bias.amax(),
+        s.straightness.bias_bound.amax()
+    );
+    let _ = writeln!(text, "\nNot determined by these outputs:");
+    for sentence in not_determined(found) {
+        let _ = writeln!(text, "  - {sentence}");
+    }
+    text
+}
+
+pub(super) fn not_determined(found: &Found) -> Vec<String> {
+    let mut sentences = vec![
+        found.setup.settings.parabola.statement(),
+        "A straight line of surface and straightness: it fixes the axes, and was chosen by `line`."
+            .to_owned(),
+    ];
+    if !matches!(found.setup.settings.parabola, Parabola::ZeroAdjustment(_)) {
+        sentences.push(
+            "The level of the tilt: it goes with the zero-adjustment of sensor 4, taken as zero."
+                .to_owned(),
+        );
+    }
+    sentences
+}
+
+pub(super) fn noise_source(found: &Found) -> &'static str {
+    if found.separation.noise_estimated {
+        "estimated from the residuals"
+    } else if found.noise_from_repeats() {
+        "from the scatter of the repeats"
+    } else {
+        "stated"
+    }
+}
+
+pub(super) const fn status(status: CornerStatus) -> &'static str {
+    match status {
+        CornerStatus::Corner => "the L-curve has one corner",
+        CornerStatus::NoCorner => "the L-curve has no corner",
+        CornerStatus::AtEdge => "the L-curve bends most at the end of its range",
+        CornerStatus::MultipleCorners => "the L-curve has several corners",
+    }
+}
+
+pub(super) const fn status_key(status: CornerStatus) -> &'static str {
+    match status {
+        CornerStatus::Corner => "corner",
+        CornerStatus::NoCorner => "no-corner",
+        CornerStatus::AtEdge => "at-edge",
+        CornerStatus::MultipleCorners => "multiple-corners",
+    }
+}
+
+pub(super) const fn discrepancy_key(discrepancy: &Discrepancy) -> &'static str {
+    match discrepancy {
+        Discrepancy::Found(_) => "found",
+        Discrepancy::NoiseTooSmall(_) => "noise-too-small",
+        Discrepancy::NoiseTooLarge(_) => "noise-too-large",
+    }
+}
+
+/// Peak to valley.
+pub(super) fn span(values: &DVector<f64>) -> f64 {
+    values.max() - values.min()
+}

@@ -1,0 +1,224 @@
+//! Measured parts against the prediction.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use errsep_models::machine::{Axis, PartReading, PartResidual, part_residuals};
+use serde_json::{Value, json};
+
+use super::{Context, PropagationArgs};
+use crate::cli::{Answer, CommonArgs};
+use crate::io::machine::read_points;
+use crate::io::parts::read_parts;
+use crate::io::{CsvTable, Message, Status};
+use crate::report::plot::{Axis as PlotAxis, Chart, Series};
+use crate::report::{Cell, Figure, Page, Section, Standing, Table, number};
+
+/// Measured parts against the prediction of the machine: is its uncertainty enough?
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The readings have the columns part, point, axis (x, y or z), value (measured less nominal, um) and
+where it applies replicate. The machine is not fitted to them.
+
+Example: errsep machine machine.toml parts readings.csv --points holes.csv --out parts")]
+pub(super) struct Args {
+    /// The measured parts.
+    #[arg(value_name = "READINGS.csv")]
+    readings: PathBuf,
+    /// The points (columns point, x, y and z, mm).
+    #[arg(long, value_name = "POINTS.csv")]
+    points: PathBuf,
+    #[command(flatten)]
+    pub(super) propagation: PropagationArgs,
+    #[command(flatten)]
+    pub(super) common: CommonArgs,
+}
+
+/// The residuals at one point along one axis.
+struct Feature<'a> {
+    name: String,
+    axis: Axis,
+    residuals: Vec<&'a PartResidual>,
+}
+
+impl Feature<'_> {
+    fn mean(&self) -> f64 {
+        self.residuals.iter().map(|r| r.residual).sum::<f64>() / self.residuals.len() as f64
+    }
+
+    fn rms(&self) -> f64 {
+        let squares: f64 = self.residuals.iter().map(|r| r.residual.powi(2)).sum();
+        (squares / self.residuals.len() as f64).sqrt()
+    }
+
+    fn predicted(&self) -> (f64, f64) {
+        self.residuals.first().map_or((f64::NAN, f64::NAN), |r| {
+            (r.predicted, r.standard_uncertainty)
+        })
+    }
+
+    /// Root mean square residual in units of the predicted uncertainty.
+    fn ratio(&self) -> f64 {
+        self.rms() / self.predicted().1
+    }
+}
+
+pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
+    let points = read_points(&args.points)?;
+    let readings: Vec<PartReading> = read_parts(&args.readings, &points)?;
+    let residuals =
+        part_residuals(&context.machine, &readings).map_err(|error| context.wrong(&error))?;
+    let mut features: Vec<Feature> = Vec::new();
+    for residual in &residuals {
+        let r = &residual.reading;
+        match features
+            .iter_mut()
+            .find(|f| f.name == r.feature && f.axis == r.axis)
+        {
+            Some(feature) => feature.residuals.push(residual),
+            None => features.push(Feature {
+                name: r.feature.clone(),
+                axis: r.axis,
+                residuals: vec![residual],
+            }),
+        }
+    }
+    let inside = residuals
+        .iter()
+        .filter(|r| r.normalized().is_some_and(|z| z.abs() <= 2.0))
+        .count();
+    let share = inside as f64 / residuals.len() as f64;
+    let sentence = format!(
+        "{} of {} readings lie within two predicted standard uncertainties.",
+        number::percent(share),
+        residuals.len()
+    );
+    let standing = if share >= 0.9 {
+        Standing::Good
+    } else {
+        Standing::Caution
+    };
+    let machine = context.args.model.display().to_string();
+    let mut text = format!(
+        "Parts of {} against {machine}\n\n{sentence}\n\n",
+        args.readings.display()
+    );
+    let _ = writeln!(
+        text,
+        "point axis   predicted µm   mean residual µm   rms µm   rms / predicted u"
+    );
+    for f in &features {
+        let (value, u) = f.predicted();
+        let _ = writeln!(
+            text,
+            "{:5} {:4} {:>14} {:>18} {:>8} {:>19}",
+            f.name,
+            f.axis.letter(),
+            number::measured(value, Some(u)),
+            number::fixed(f.mean(), 2),
+            number::fixed(f.rms(), 2),
+            number::plain(f.ratio(), 3)
+        );
+    }
+    Ok(Answer {
+        text,
+        json: json!({
+            "schema": "errsep.machine/1",
+            "action": "parts",
+            "chain": context.machine.chain().to_string(),
+            "readings": residuals.len(),
+            "within_two_standard_uncertainties": share,
+            "points": features.iter().map(as_json).collect::<Vec<_>>(),
+        }),
+        page: page(&machine, &sentence, standing, &features),
+        tables: vec![csv(&residuals)],
+        inputs: [
+            context.inputs(Some(&args.points)),
+            vec![args.readings.clone()],
+        ]
+        .concat(),
+        seed: None,
+        status: Status::Done,
+    })
+}
+
+fn as_json(f: &Feature) -> Value {
+    let (value, u) = f.predicted();
+    json!({
+        "point": f.name,
+        "axis": f.axis.letter().to_string(),
+        "predicted": {"value": value, "std": u, "unit": "um"},
+        "mean_residual": f.mean(),
+        "rms_residual": f.rms(),
+        "ratio": f.ratio(),
+        "readings": f.residuals.len(),
+    })
+}
+
+fn page(machine: &str, sentence: &str, standing: Standing, features: &[Feature]) -> Page {
+    let chart = Chart::new(
+        PlotAxis::new("point and axis, in the order of the file", "").whole(),
+        PlotAxis::new("residual", "µm"),
+    );
+    let (mut at, mut value) = (Vec::new(), Vec::new());
+    for (i, f) in features.iter().enumerate() {
+        for r in &f.residuals {
+            at.push(i as f64 + 1.0);
+            value.push(r.residual);
+        }
+    }
+    let numbers: Vec<f64> = (1..=features.len()).map(|i| i as f64).collect();
+    let limits = features.iter().map(|f| 2.0 * f.predicted().1).collect();
+    let chart = chart
+        .series(Series::line("prediction", numbers, vec![0.0; features.len()]).half_band(limits))
+        .series(Series::points("reading", at, value));
+    let table = features.iter().fold(
+        Table::new(
+            "By point and axis",
+            [
+                "point",
+                "axis",
+                "predicted (µm)",
+                "mean residual (µm)",
+                "rms (µm)",
+                "rms / predicted u",
+            ],
+        ),
+        |table, f| {
+            let (value, u) = f.predicted();
+            table.row([
+                f.name.as_str().into(),
+                f.axis.letter().to_string().into(),
+                Cell::measured(value, u),
+                Cell::number(f.mean()),
+                Cell::number(f.rms()),
+                Cell::number(f.ratio()),
+            ])
+        },
+    );
+    Page::new("Machine: measured parts", machine)
+        .summary(standing, sentence)
+        .section(
+            Section::new("Residuals")
+                .figure(Figure::new(
+                    "Measured less predicted",
+                    "Band: twice the predicted standard uncertainty.",
+                    chart,
+                ))
+                .table(table),
+        )
+}
+
+fn csv(residuals: &[PartResidual]) -> CsvTable {
+    let texts = |f: fn(&PartResidual) -> String| residuals.iter().map(f).collect::<Vec<_>>();
+    let numbers = |f: fn(&PartResidual) -> f64| residuals.iter().map(f).collect::<Vec<_>>();
+    CsvTable::new("residuals.csv")
+        .texts("part", texts(|r| r.reading.part.clone()))
+        .texts("point", texts(|r| r.reading.feature.clone()))
+        .texts("axis", texts(|r| r.reading.axis.letter().to_string()))
+        .numbers("replicate", numbers(|r| f64::from(r.reading.replicate)))
+        .numbers("value_um", numbers(|r| r.reading.value))
+        .numbers("predicted_um", numbers(|r| r.predicted))
+        .numbers("predicted_std_um", numbers(|r| r.standard_uncertainty))
+        .numbers("residual_um", numbers(|r| r.residual))
+}

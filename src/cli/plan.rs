@@ -1,0 +1,303 @@
+//! `errsep plan`: what a reversal could show of every effect, before any reading is taken.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use errsep_models::model::FittedModel;
+use errsep_models::reversal::Convention;
+use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::simulate::{Plan, TrueForm, simulate};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::Deserialize;
+use serde_json::json;
+
+use super::{Answer, CommonArgs};
+use crate::diagnosis::{Diagnosability, NoiseLaw, NoiseSource, Options, certificate};
+use crate::io::{Message, SetupFile, Status};
+use crate::report::{Cell, Page, Section, Table};
+
+/// What a planned reversal can show: visible part, smallest detectable and identifiable size,
+/// confusions and harm of every effect, and which change of the plan helps most.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The set-up says what is planned and what is expected:
+
+    noise = 0.02             # um, standard deviation of one reading
+    travel = 300.0           # mm
+    positions = 61
+    repeats = 2
+    both_directions = false
+    tilts = [50.0, 0.0, 20.0]   # alpha, beta, gamma expected, urad
+    forms = [1.0, 1.0]          # slide, artefact expected, um RMS
+
+Example: errsep plan plan.toml --out plan")]
+pub struct Args {
+    /// The plan.
+    #[arg(value_name = "SETUP.toml")]
+    plan: PathBuf,
+    #[command(flatten)]
+    pub(super) common: CommonArgs,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Planned {
+    noise: f64,
+    travel: f64,
+    positions: usize,
+    #[serde(default = "one")]
+    repeats: u32,
+    #[serde(default)]
+    both_directions: bool,
+    #[serde(default = "expected_tilts")]
+    tilts: [f64; 3],
+    #[serde(default = "expected_forms")]
+    forms: [f64; 2],
+    #[serde(default)]
+    convention: Convention,
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn expected_tilts() -> [f64; 3] {
+    [50.0, 0.0, 20.0]
+}
+
+fn expected_forms() -> [f64; 2] {
+    [1.0, 1.0]
+}
+
+/// Most readings of a plan.
+const MOST_READINGS: usize = 100_000;
+
+/// Draws behind the thresholds of a plan.
+const DRAWS: usize = 400;
+
+/// Works out the certificate and what extra measurements would add.
+///
+/// # Errors
+/// The set-up is bad, or the plan leaves nothing over to diagnose.
+pub fn run(args: &Args) -> Result<Answer, Message> {
+    let file = SetupFile::read(&args.plan)?;
+    let planned: Planned = file.parse()?;
+    let bad =
+        |what: &str, remedy: &str| Message::bad_input(what).in_file(&args.plan).remedy(remedy);
+    let directions = if planned.both_directions { 2 } else { 1 };
+    let readings = planned
+        .positions
+        .saturating_mul(4 * directions)
+        .saturating_mul(planned.repeats as usize);
+    if planned.positions < 5 || planned.repeats == 0 || readings > MOST_READINGS {
+        return Err(bad(
+            "the plan has too few or too many readings",
+            "give 5 or more positions and 1 or more repeats, 100000 readings at most",
+        ));
+    }
+    if !(planned.noise > 0.0
+        && planned.noise.is_finite()
+        && planned.travel > 0.0
+        && planned.travel.is_finite())
+    {
+        return Err(bad(
+            "noise and travel must be greater than zero",
+            "give noise in um and travel in mm",
+        ));
+    }
+    let rows = certified(&planned, args.common.seed).map_err(|m| m.in_file(&args.plan))?;
+    let extras = extras(&planned)
+        .into_iter()
+        .map(|(name, plan)| {
+            let with = certified(&plan, args.common.seed)?;
+            Ok((name, gain(&rows, &with), newly(&rows, &with)))
+        })
+        .collect::<Result<Vec<_>, Message>>()?;
+    Ok(answer(args, &rows, extras))
+}
+
+fn certified(planned: &Planned, seed: u64) -> Result<Vec<Diagnosability>, Message> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut form = |rms: f64| TrueForm::random_waves(&mut random, rms, 1.5 * planned.travel, 12);
+    let mut plan = Plan::even(0.0, planned.travel, planned.positions, 0.0);
+    plan.m = form(planned.forms[0]);
+    plan.s_a = form(planned.forms[1]);
+    plan.s_b = form(planned.forms[1]);
+    plan.alpha_rad = planned.tilts[0] * 1e-6;
+    plan.beta_rad = planned.tilts[1] * 1e-6;
+    plan.gamma_rad = planned.tilts[2] * 1e-6;
+    plan.repeats = planned.repeats;
+    plan.both_directions = planned.both_directions;
+    let (observations, _) = simulate(&plan, &[]).map_err(|e| {
+        Message::bad_input(e.to_string()).remedy("correct the expected tilts and forms")
+    })?;
+    let assumptions = Assumptions {
+        convention: planned.convention,
+        thickness: None,
+        noise: Some(planned.noise),
+    };
+    let model = FirstOrder::new(&observations, assumptions)
+        .map_err(|e| Message::bad_input(e.to_string()).remedy("plan more positions or repeats"))?;
+    let law = NoiseLaw::white(planned.noise, f64::INFINITY, NoiseSource::Stated);
+    let options = Options {
+        draws: DRAWS,
+        seed,
+        ..Options::default()
+    };
+    Ok(certificate(&model, &model.effects(), &law, &options))
+}
+
+/// Changes of a plan that a shop can make.
+fn extras(planned: &Planned) -> Vec<(&'static str, Planned)> {
+    let mut extras = Vec::new();
+    if !planned.both_directions {
+        extras.push((
+            "run every trace backward too",
+            Planned {
+                both_directions: true,
+                ..planned.clone()
+            },
+        ));
+    }
+    extras.push((
+        "take twice the repeats",
+        Planned {
+            repeats: 2 * planned.repeats,
+            ..planned.clone()
+        },
+    ));
+    extras.push((
+        "read twice the positions",
+        Planned {
+            positions: 2 * planned.positions - 1,
+            ..planned.clone()
+        },
+    ));
+    extras.push((
+        "tilt the artefact by a further 1 mrad",
+        Planned {
+            tilts: [
+                planned.tilts[0],
+                planned.tilts[1],
+                planned.tilts[2] + 1000.0,
+            ],
+            ..planned.clone()
+        },
+    ));
+    extras
+}
+
+/// Geometric mean of how much smaller the detectable sizes become.
+fn gain(before: &[Diagnosability], after: &[Diagnosability]) -> f64 {
+    let ratios: Vec<f64> = before
+        .iter()
+        .zip(after)
+        .filter_map(|(b, a)| Some((b.detectable? / a.detectable?).ln()))
+        .collect();
+    (ratios.iter().sum::<f64>() / ratios.len().max(1) as f64).exp()
+}
+
+/// Effects that become visible.
+fn newly(before: &[Diagnosability], after: &[Diagnosability]) -> Vec<String> {
+    before
+        .iter()
+        .zip(after)
+        .filter(|(b, a)| b.detectable.is_none() && a.detectable.is_some())
+        .map(|(b, _)| b.effect.clone())
+        .collect()
+}
+
+fn size(value: Option<f64>, unit: &str) -> String {
+    value.map_or_else(
+        || "never".to_owned(),
+        |v| {
+            if unit == "rad" {
+                format!("{:.3} urad", v * 1e6)
+            } else {
+                format!("{v:.3} {unit}")
+            }
+        },
+    )
+}
+
+fn answer(
+    args: &Args,
+    rows: &[Diagnosability],
+    mut extras: Vec<(&'static str, f64, Vec<String>)>,
+) -> Answer {
+    extras.sort_by(|a, b| {
+        (b.2.len(), b.1)
+            .partial_cmp(&(a.2.len(), a.1))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    let mut text = String::from(
+        "effect                   visible     seen from        told apart from   most like\n",
+    );
+    let mut table = Table::new(
+        "What the plan shows",
+        [
+            "effect",
+            "visible",
+            "seen from",
+            "told apart from",
+            "most like",
+        ],
+    );
+    for row in rows {
+        let (seen, told) = (
+            size(row.detectable, &row.unit),
+            size(row.identifiable, &row.unit),
+        );
+        let like = row
+            .confused_with
+            .as_ref()
+            .map_or(String::new(), |n| format!("{n} (cosine {:.2})", row.cosine));
+        let _ = writeln!(
+            text,
+            "{:<24} {:>6.1} %  {seen:>15}  {told:>15}   {like}",
+            row.effect,
+            100.0 * row.visible
+        );
+        table = table.row([
+            Cell::Text(row.effect.clone()),
+            Cell::Share(row.visible),
+            Cell::Text(seen),
+            Cell::Text(told),
+            Cell::Text(like),
+        ]);
+    }
+    text += "\nWhat would help most\n";
+    let mut help = Vec::new();
+    for (name, gain, new) in &extras {
+        let shows = if new.is_empty() {
+            String::new()
+        } else {
+            format!(", and shows {}", new.join(", "))
+        };
+        help.push(format!(
+            "{name}: sizes seen shrink by a factor of {gain:.2}{shows}"
+        ));
+    }
+    for line in &help {
+        let _ = writeln!(text, "  {line}");
+    }
+    let extras: Vec<_> = extras
+        .into_iter()
+        .map(|(name, gain, shows)| json!({"measure": name, "gain": gain, "shows": shows}))
+        .collect();
+    Answer {
+        text,
+        json: json!({"schema": "errsep.plan/1", "effects": rows, "extra_measurements": extras}),
+        page: Page::new("Plan", args.plan.display().to_string()).section(
+            Section::new("What the plan can show")
+                .table(table)
+                .paragraph("What would help most:")
+                .list(help),
+        ),
+        tables: Vec::new(),
+        inputs: vec![args.plan.clone()],
+        seed: Some(args.common.seed),
+        status: Status::Done,
+    }
+}

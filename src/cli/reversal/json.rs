@@ -1,0 +1,135 @@
+//! The answer for programs: schema `errsep.reversal/1`, documented in docs/json/reversal.md.
+
+use errsep_models::reversal::staged::Value as Measured;
+use errsep_models::reversal::{Convention, NOT_SHOWN};
+use serde_json::{Map, Value, json};
+
+use super::outcome::Outcome;
+use crate::io::reversal::ReversalData;
+
+pub fn json(data: &ReversalData, o: &Outcome) -> Value {
+    json!({
+        "schema": "errsep.reversal/1",
+        "method": o.method,
+        "convention": match o.convention {
+            Convention::Seed => "seed",
+            Convention::Rigid => "rigid",
+        },
+        "channels": data.observations.channels().iter().map(|c| c.name()).collect::<Vec<_>>(),
+        "readings": data.observations.readings.len(),
+        "input": data.in_words(),
+        "tilts": tilts(o),
+        "tilt_combinations": combinations(o),
+        "contrasts": contrasts(o),
+        "closure": match &o.closure {
+            Some(c) => json!({
+                "slope": angle(c.slope),
+                "rms": {"value": c.rms, "unit": "um"},
+                "expected_rms": {"value": c.expected_rms, "unit": "um"},
+                "x": c.x,
+                "profile": c.profile,
+            }),
+            None => Value::Null,
+        },
+        "forms": forms(o),
+        "form_combinations": form_combinations(o),
+        "straightness": straightness(o),
+        "residual": {
+            "rms": o.residual_rms,
+            "noise": o.noise,
+            "noise_source": o.noise_words,
+            "degrees_of_freedom": o.degrees_of_freedom,
+            "channels": o.channel_noise.iter().map(|(c, s)| (c.name().to_owned(), json!(s))).collect::<Map<_, _>>(),
+        },
+        "convergence": {
+            "converged": true,
+            "reason": o.convergence.reason,
+            "iterations": o.convergence.iterations,
+            "seconds": o.convergence.seconds,
+        },
+        "method_errors": o.method_errors.iter().map(|(name, rms, meaning)| json!({
+            "name": name, "rms": rms, "unit": "um", "meaning": meaning,
+        })).collect::<Vec<_>>(),
+        "warnings": o.warnings,
+        "not_shown": NOT_SHOWN.iter().map(|(name, _)| *name).collect::<Vec<_>>(),
+    })
+}
+
+fn angle(v: Measured) -> Value {
+    json!({"value": v.value, "std": v.std, "unit": "rad"})
+}
+
+/// Every tilt of the convention by its name; null where these channels do not determine it.
+fn tilts(o: &Outcome) -> Map<String, Value> {
+    o.convention
+        .tilts()
+        .into_iter()
+        .map(|contrast| {
+            let found = o.tilts.iter().find(|t| t.contrast == Some(contrast));
+            (
+                contrast.name(o.convention).replace('-', "_"),
+                found.map_or(Value::Null, |t| angle(t.angle)),
+            )
+        })
+        .collect()
+}
+
+fn combinations(o: &Outcome) -> Vec<Value> {
+    let together = o.tilts.iter().filter(|t| t.contrast.is_none());
+    together
+        .map(|t| json!({"name": t.name, "value": t.angle.value, "std": t.angle.std, "unit": "rad"}))
+        .collect()
+}
+
+fn contrasts(o: &Outcome) -> Vec<Value> {
+    o.contrasts
+        .iter()
+        .flatten()
+        .map(|(contrast, v)| {
+            json!({
+                "pattern": contrast.pattern(),
+                "name": contrast.name(o.convention),
+                "value": v.value,
+                "std": v.std,
+                "unit": "rad",
+                "meaning": contrast.meaning(o.convention),
+            })
+        })
+        .collect()
+}
+
+fn forms(o: &Outcome) -> Map<String, Value> {
+    let mut forms = Map::new();
+    forms.insert("x".to_owned(), json!(o.x));
+    for name in errsep_models::reversal::staged::FORMS {
+        let found = o.forms.iter().find(|f| f.is_single && f.name == name);
+        forms.insert(
+            name.to_owned(),
+            found.map_or(Value::Null, |f| json!(f.values)),
+        );
+        forms.insert(
+            format!("{name}_std"),
+            found.map_or(Value::Null, |f| json!(f.std)),
+        );
+    }
+    forms
+}
+
+fn form_combinations(o: &Outcome) -> Vec<Value> {
+    let together = o.forms.iter().filter(|f| !f.is_single);
+    together
+        .map(|f| json!({"name": f.name, "values": f.values, "std": f.std, "unit": "um"}))
+        .collect()
+}
+
+fn straightness(o: &Outcome) -> Map<String, Value> {
+    o.straightness()
+        .into_iter()
+        .map(|(name, lines)| {
+            let lines = lines
+                .into_iter()
+                .map(|(r, e)| (r.key().to_owned(), json!(e)));
+            (name.to_owned(), Value::Object(lines.collect()))
+        })
+        .collect()
+}

@@ -1,0 +1,109 @@
+//! `errsep reversal`: from the readings of a reversal to tilts and forms with their uncertainty.
+
+mod json;
+mod outcome;
+mod page;
+mod refusal;
+mod simultaneous;
+mod staged;
+mod tables;
+mod text;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::ValueEnum;
+use errsep_models::reversal::staged::Removal;
+
+use super::{Answer, CommonArgs};
+use crate::io::reversal::{ColumnMap, ReversalData, ReversalSetup, read};
+use crate::io::{Message, Status};
+use outcome::Outcome;
+
+/// Reversal: the tilt between slide and spindle, the form of the slide and of the artefact.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+DATA.csv has one row a reading (channel,x,reading; also repeat,direction,time) or one column a
+channel (x,1A,1B,2A,2B). Channels: 1A near indicator at 0 degrees, 1B far at 0, 2A far at 180,
+2B near at 180. x in mm, readings in um, positive towards the indicator. Any of the channels may be
+left out: the answer says what the rest determines.
+
+Examples:
+    errsep reversal data.csv
+    errsep reversal data.csv --setup setup.toml --simultaneous --out report
+    errsep reversal cad.csv --columns x=z_mm:mm,1A=I_0_0:mm,2B=I_0_180:mm")]
+pub struct Args {
+    /// The readings.
+    #[arg(value_name = "DATA.csv")]
+    data: PathBuf,
+    /// What is known beside the readings (TOML): [artefact] thickness, [indicator] noise,
+    /// [model] convention and interpolation, [columns].
+    #[arg(long, value_name = "SETUP.toml")]
+    setup: Option<PathBuf>,
+    /// How the tilt is taken out of the traces before the forms are separated.
+    #[arg(long, value_enum, default_value_t = Method::Auto, conflicts_with = "simultaneous")]
+    method: Method,
+    /// Solve tilts and forms in one least-squares fit with exact geometry.
+    #[arg(long)]
+    simultaneous: bool,
+    /// Names and units of the columns, as role=column:unit,...
+    #[arg(long, value_name = "ROLE=COLUMN:UNIT,...")]
+    columns: Option<ColumnMap>,
+    #[command(flatten)]
+    pub(super) common: CommonArgs,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// Subtract each channel's line.
+    Shear,
+    /// Rotate each channel back and interpolate.
+    Rotation,
+    /// Whichever has the smaller estimated error.
+    Auto,
+}
+
+/// Solves a reversal.
+///
+/// # Errors
+/// The readings or the set-up are wrong, or the readings determine no answer.
+pub fn run(args: &Args) -> Result<Answer, Message> {
+    let mut setup = match &args.setup {
+        Some(path) => ReversalSetup::read(path)?,
+        None => ReversalSetup::default(),
+    };
+    if let Some(columns) = &args.columns {
+        setup.columns = columns.clone();
+    }
+    let progress = super::progress("reading", None);
+    let data = read(&args.data, &setup.columns)?;
+    progress.set_message("solving");
+    let outcome = solve(args, &data, &setup)?;
+    progress.finish_and_clear();
+    let mut inputs = vec![args.data.clone()];
+    inputs.extend(args.setup.clone());
+    Ok(Answer {
+        text: text::text(&args.data, &data, &outcome),
+        json: json::json(&data, &outcome),
+        page: page::page(&args.data, &data, &setup, &outcome),
+        tables: tables::tables(&outcome),
+        inputs,
+        seed: None,
+        status: Status::Done,
+    })
+}
+
+fn solve(args: &Args, data: &ReversalData, setup: &ReversalSetup) -> Result<Outcome, Message> {
+    if args.simultaneous {
+        return simultaneous::solve(&args.data, data, setup);
+    }
+    let begin = Instant::now();
+    let removal = match args.method {
+        Method::Shear => Some(Removal::Shear),
+        Method::Rotation => Some(Removal::Rotation),
+        Method::Auto => None,
+    };
+    let mut outcome = staged::solve(&args.data, data, setup, removal)?;
+    outcome.convergence.seconds = begin.elapsed().as_secs_f64();
+    Ok(outcome)
+}

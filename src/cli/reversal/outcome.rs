@@ -1,0 +1,117 @@
+//! The answer of either solution, in one form for terminal, JSON, tables and report.
+
+use errsep_models::reversal::staged::Value;
+use errsep_models::reversal::{Channel, Contrast, Convention};
+use errsep_models::straightness::{ReferenceLine, straightness};
+
+use crate::report;
+
+/// A tilt, or a combination of tilts.
+pub struct Angle {
+    pub name: String,
+    /// Which tilt it is, if one by itself.
+    pub contrast: Option<Contrast>,
+    /// rad.
+    pub angle: Value,
+}
+
+/// A form, or a combination of forms, at [`Outcome::x`].
+pub struct Form {
+    pub name: String,
+    /// Whether it is M, S_A or S_B by itself.
+    pub is_single: bool,
+    /// µm.
+    pub values: Vec<f64>,
+    /// µm.
+    pub std: Vec<f64>,
+}
+
+pub struct Closure {
+    /// rad.
+    pub slope: Value,
+    pub x: Vec<f64>,
+    /// µm.
+    pub profile: Vec<f64>,
+    /// µm.
+    pub rms: f64,
+    /// What the noise alone would give, µm.
+    pub expected_rms: f64,
+}
+
+pub struct Convergence {
+    pub reason: String,
+    pub iterations: usize,
+    pub seconds: f64,
+    pub costs: Vec<f64>,
+}
+
+/// One residual of the model, µm.
+pub struct Residual {
+    pub channel: Channel,
+    pub repeat: u32,
+    pub backward: bool,
+    pub x: f64,
+    pub residual: f64,
+}
+
+pub struct Outcome {
+    pub method: &'static str,
+    pub convention: Convention,
+    pub tilts: Vec<Angle>,
+    pub contrasts: Option<[(Contrast, Value); 4]>,
+    pub x: Vec<f64>,
+    pub forms: Vec<Form>,
+    pub closure: Option<Closure>,
+    pub residuals: Vec<Residual>,
+    pub residual_rms: f64,
+    /// Standard deviation of one reading, µm.
+    pub noise: f64,
+    pub noise_words: String,
+    pub channel_noise: Vec<(Channel, f64)>,
+    pub degrees_of_freedom: f64,
+    /// Name, root mean square in µm, where it comes from.
+    pub method_errors: Vec<(String, f64, String)>,
+    pub convergence: Convergence,
+    pub knots: Option<report::reversal::Knots>,
+    /// What the reader has to weigh.
+    pub warnings: Vec<String>,
+}
+
+impl Outcome {
+    /// The length over which was measured, mm.
+    pub fn length(&self) -> f64 {
+        match (self.x.first(), self.x.last()) {
+            (Some(first), Some(last)) => last - first,
+            _ => 0.0,
+        }
+    }
+
+    /// What an angle means.
+    pub fn meaning(&self, angle: &Angle) -> String {
+        match angle.contrast {
+            Some(contrast) => contrast.meaning(self.convention).to_owned(),
+            None => "these channels determine the tilts together only".to_owned(),
+        }
+    }
+
+    /// The tilt between slide and spindle, where it is determined by itself.
+    pub fn alpha(&self) -> Option<Value> {
+        let is_alpha = |t: &&Angle| t.contrast == Some(Contrast::Alpha);
+        self.tilts.iter().find(is_alpha).map(|t| t.angle)
+    }
+
+    /// Straightness of each form against the three reference lines, µm.
+    pub fn straightness(&self) -> Vec<(&str, [(ReferenceLine, f64); 3])> {
+        self.forms
+            .iter()
+            .filter_map(|form| {
+                let of = |reference| {
+                    let s = straightness(&self.x, &form.values, reference).ok()?;
+                    Some((reference, s.error()))
+                };
+                let [a, b, c] = ReferenceLine::ALL.map(of);
+                Some((form.name.as_str(), [a?, b?, c?]))
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,229 @@
+//! The simultaneous solution as an outcome.
+
+use std::path::Path;
+
+use errsep_models::reversal::simultaneous::{
+    self, ChannelNoise, KnotVerdict, Knots, Noise, Options, ReversalError, Simultaneous, Thickness,
+};
+use errsep_models::reversal::{Channel, Contrast, Observations};
+
+use super::outcome::{Angle, Closure, Convergence, Form, Outcome, Residual};
+use crate::io::Message;
+use crate::io::reversal::{ReversalData, ReversalSetup};
+use crate::report::{self, number};
+
+/// More positions than this of a form are not seen apart.
+const MOST_POSITIONS: usize = 1001;
+
+pub fn solve(file: &Path, data: &ReversalData, setup: &ReversalSetup) -> Result<Outcome, Message> {
+    let options = Options {
+        convention: setup.convention,
+        thickness: match setup.thickness {
+            None => Thickness::NotKnown,
+            Some(d) if setup.fit_thickness => Thickness::Fitted(d),
+            Some(d) => Thickness::Known(d),
+        },
+        noise: setup.noise.map_or(Noise::PerChannel, Noise::Declared),
+        knots: setup.knots.map_or(Knots::Chosen, Knots::Cells),
+        ..Options::default()
+    };
+    let fit =
+        simultaneous::fit(&data.observations, &options).map_err(|why| refusal(&why, file, data))?;
+    Ok(outcome(&fit, &data.observations, setup))
+}
+
+fn refusal(why: &ReversalError, file: &Path, data: &ReversalData) -> Message {
+    let (message, remedy) = match why {
+        ReversalError::NotConverged { .. } | ReversalError::NoStart(_) => (
+            Message::not_solved(why.to_string()),
+            "solve in stages (without --simultaneous), or give fewer [model] knots",
+        ),
+        ReversalError::OnePosition { .. } => (
+            Message::bad_input(why.to_string()),
+            "read every channel at three or more different positions x",
+        ),
+        ReversalError::TooFewReadings { .. } => (
+            Message::bad_input(why.to_string()),
+            "take more readings, or give fewer [model] knots in the set-up",
+        ),
+        _ => (
+            Message::bad_input(why.to_string()),
+            "correct it in the data or the set-up",
+        ),
+    };
+    let place = match why {
+        ReversalError::OnePosition { channel, .. } => data.first_reading(channel),
+        _ => None,
+    };
+    match place {
+        Some(place) => message.at(place.clone()).remedy(remedy),
+        None => message.in_file(file).remedy(remedy),
+    }
+}
+
+/// The positions of the channel with the most of them, or as many even ones as are seen apart.
+fn positions(data: &Observations) -> Vec<f64> {
+    let of = |channel: Channel| {
+        let mut x = data.of(channel).map(|r| r.x).collect::<Vec<_>>();
+        x.sort_by(f64::total_cmp);
+        x.dedup();
+        x
+    };
+    let longest = data
+        .channels()
+        .into_iter()
+        .map(of)
+        .max_by_key(Vec::len)
+        .unwrap_or_default();
+    if longest.len() <= MOST_POSITIONS {
+        return longest;
+    }
+    let (first, last) = (longest[0], longest[longest.len() - 1]);
+    let step = (last - first) / (MOST_POSITIONS - 1) as f64;
+    (0..MOST_POSITIONS)
+        .map(|k| first + k as f64 * step)
+        .collect()
+}
+
+fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Outcome {
+    let names = fit.convention.tilts();
+    let tilts = fit
+        .tilts()
+        .into_iter()
+        .map(|t| Angle {
+            contrast: t.combination.single().map(|i| names[i]),
+            name: t.name,
+            angle: t.angle,
+        })
+        .collect::<Vec<_>>();
+    let x = positions(data);
+    let forms = fit
+        .forms(&x)
+        .into_iter()
+        .map(|f| Form {
+            is_single: errsep_models::reversal::staged::FORMS.contains(&f.name.as_str()),
+            name: f.name,
+            values: f.values,
+            std: f.std,
+        })
+        .collect();
+    let residuals = fit
+        .records(data)
+        .map(|r| Residual {
+            channel: r.reading.channel,
+            repeat: r.reading.repeat,
+            backward: r.reading.direction == errsep_models::reversal::Direction::Backward,
+            x: r.reading.x,
+            residual: r.residual,
+        })
+        .collect::<Vec<_>>();
+    let squares = residuals
+        .iter()
+        .map(|r| r.residual * r.residual)
+        .sum::<f64>();
+    let readings = fit.noise.iter().map(|n| n.readings as f64).sum::<f64>();
+    let variance = fit
+        .noise
+        .iter()
+        .map(|n| n.readings as f64 * n.sigma * n.sigma)
+        .sum::<f64>();
+    let closure = fit.closure.as_ref().map(|c| Closure {
+        slope: c.slope,
+        x: c.x.clone(),
+        profile: c.profile.clone(),
+        rms: c.rms,
+        expected_rms: expected_closure(fit, c.profile.len()),
+    });
+    let contrasts = closure.as_ref().map(|closure| {
+        Contrast::ALL.map(|contrast| {
+            let tilt = tilts.iter().find(|t| t.contrast == Some(contrast));
+            (contrast, tilt.map_or(closure.slope, |t| t.angle))
+        })
+    });
+    Outcome {
+        method: "simultaneous",
+        convention: fit.convention,
+        contrasts,
+        x,
+        forms,
+        residual_rms: (squares / residuals.len().max(1) as f64).sqrt(),
+        residuals,
+        noise: (variance / readings).sqrt(),
+        noise_words: match setup.noise {
+            Some(_) => "declared in the set-up".to_owned(),
+            None => format!(
+                "estimated for each channel, {:.0} degrees of freedom together",
+                fit.degrees_of_freedom
+            ),
+        },
+        channel_noise: fit.noise.iter().map(|n| (n.channel, n.sigma)).collect(),
+        degrees_of_freedom: fit.degrees_of_freedom,
+        method_errors: Vec::new(),
+        convergence: Convergence {
+            reason: fit.convergence.ending.to_string(),
+            iterations: fit.convergence.iterations(),
+            seconds: fit.convergence.seconds,
+            costs: fit.convergence.history.iter().map(|i| i.cost).collect(),
+        },
+        knots: Some(knots(fit, setup)),
+        warnings: warnings(fit, closure.as_ref(), setup),
+        closure,
+        tilts,
+    }
+}
+
+/// What the noise alone gives a closure of so many points, each the mean of its share of a channel's
+/// readings, µm.
+fn expected_closure(fit: &Simultaneous, points: usize) -> f64 {
+    let variance_of_mean = |n: &ChannelNoise| n.sigma * n.sigma * points as f64 / n.readings as f64;
+    fit.noise.iter().map(variance_of_mean).sum::<f64>().sqrt() / 4.0
+}
+
+fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
+    let cells = fit.knots.cells();
+    let how = match setup.knots {
+        Some(_) => "as the set-up says",
+        None => "chosen by the corrected information criterion",
+    };
+    let verdict = match fit.knots.verdict {
+        KnotVerdict::Enough => "neighbouring residuals are not correlated",
+        KnotVerdict::TooFew => {
+            "too few: neighbouring residuals go together, the forms have detail that the knots cannot follow"
+        }
+        KnotVerdict::TooMany => "too many: fewer describe the data as well",
+    };
+    report::reversal::Knots {
+        criterion: "corrected Akaike criterion".to_owned(),
+        tried: fit.knots.table.iter().map(|t| (t.cells, t.aicc)).collect(),
+        chosen: cells,
+        reason: format!("{cells} cells, {how}; {verdict}"),
+    }
+}
+
+fn warnings(fit: &Simultaneous, closure: Option<&Closure>, setup: &ReversalSetup) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if fit.knots.verdict == KnotVerdict::TooFew {
+        warnings.push(format!(
+            "residuals of neighbouring readings go together (correlation {}, {} standard deviations): \
+             the forms have more detail than {} cells, or the noise is not independent; the \
+             uncertainties are too small then",
+            number::plain(fit.knots.neighbour_correlation, 2),
+            number::plain(fit.knots.neighbour_z, 2),
+            fit.knots.cells()
+        ));
+    }
+    match closure {
+        Some(closure) => {
+            warnings.extend(super::staged::slope_warning(closure.slope, fit.convention))
+        }
+        None => warnings.push(super::staged::NOTHING_CLOSES.to_owned()),
+    }
+    if setup.fit_thickness {
+        let thickness = fit.thickness();
+        warnings.push(format!(
+            "the thickness was fitted: {} mm",
+            number::measured(thickness.value, Some(thickness.std))
+        ));
+    }
+    warnings
+}

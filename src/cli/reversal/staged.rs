@@ -1,0 +1,220 @@
+//! The staged solution as an outcome.
+
+use std::path::Path;
+
+use errsep_models::reversal::Convention;
+use errsep_models::reversal::staged::{self, NoiseSource, Options, Removal, Staged, Value};
+
+use super::outcome::{Angle, Closure, Convergence, Form, Outcome, Residual};
+use super::refusal;
+use crate::io::Message;
+use crate::io::reversal::{ReversalData, ReversalSetup};
+use crate::io::units::urad_from_rad;
+use crate::report::number;
+
+pub fn solve(
+    file: &Path,
+    data: &ReversalData,
+    setup: &ReversalSetup,
+    removal: Option<Removal>,
+) -> Result<Outcome, Message> {
+    let options = Options {
+        removal,
+        interpolation: setup.interpolation,
+        convention: setup.convention,
+        thickness: setup.thickness,
+        noise: setup.noise,
+    };
+    let solution = staged::solve(&data.observations, &options)
+        .map_err(|why| refusal::message(&why, file, data))?;
+    Ok(outcome(solution, setup))
+}
+
+fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
+    let contrasts = s.convention.tilts();
+    let tilts = s
+        .tilts
+        .iter()
+        .map(|t| Angle {
+            name: t.name.clone(),
+            contrast: t.combination.single().map(|i| contrasts[i]),
+            angle: t.angle,
+        })
+        .collect();
+    let residuals = s
+        .residuals()
+        .into_iter()
+        .flat_map(|(channel, values)| {
+            s.x.iter().zip(values).map(move |(&x, residual)| Residual {
+                channel,
+                repeat: 1,
+                backward: false,
+                x,
+                residual,
+            })
+        })
+        .collect();
+    Outcome {
+        method: s.removal.name(),
+        convention: s.convention,
+        tilts,
+        contrasts: s.contrasts,
+        closure: s.closure.as_ref().map(|c| Closure {
+            slope: c.slope,
+            x: s.x.clone(),
+            profile: c.profile.clone(),
+            rms: c.rms,
+            expected_rms: c.expected_rms,
+        }),
+        residuals,
+        residual_rms: s.residual.rms,
+        noise: s.noise.sigma,
+        noise_words: noise_words(&s),
+        channel_noise: Vec::new(),
+        degrees_of_freedom: s.residual.degrees_of_freedom as f64,
+        method_errors: method_errors(&s),
+        convergence: Convergence {
+            reason: "solved in stages, without iteration".to_owned(),
+            iterations: 0,
+            seconds: 0.0,
+            costs: Vec::new(),
+        },
+        knots: None,
+        warnings: warnings(&s, setup),
+        forms: s
+            .forms
+            .into_iter()
+            .map(|f| Form {
+                is_single: f.combination.single().is_some(),
+                name: f.name,
+                values: f.values,
+                std: f.std,
+            })
+            .collect(),
+        x: s.x,
+    }
+}
+
+fn noise_words(s: &Staged) -> String {
+    let freedom = match s.noise.degrees_of_freedom {
+        Some(n) => format!(", {n:.0} degrees of freedom"),
+        None => String::new(),
+    };
+    let mut words = format!("{}{freedom}", s.noise.source.name());
+    for other in s.noise_figures.iter().skip(1) {
+        words += &format!(
+            "; {} {} µm",
+            other.source.name(),
+            number::plain(other.sigma, 3)
+        );
+    }
+    words
+}
+
+fn method_errors(s: &Staged) -> Vec<(String, f64, String)> {
+    let e = s.error_rms();
+    let mut errors = vec![
+        (
+            "shear",
+            e.shear,
+            "what subtracting a line instead of rotating misses",
+        ),
+        (
+            "interpolation",
+            e.interpolation,
+            "what bringing rotated points back to the grid misses",
+        ),
+        (
+            "shear, as the source document has it",
+            e.shear_as_printed,
+            "-S theta^2/2: leaves out the sideways shift",
+        ),
+        (
+            "interpolation, as the source document has it",
+            e.interpolation_as_printed,
+            "(S theta)^2/8 |S''|: leaves out the spacing of the grid",
+        ),
+    ];
+    if let Some(thickness) = e.thickness {
+        errors.push((
+            "thickness",
+            thickness,
+            "near and far probes on different places of the tilted artefact; shear leaves it in",
+        ));
+    }
+    errors
+        .into_iter()
+        .map(|(name, rms, meaning)| (name.to_owned(), rms, meaning.to_owned()))
+        .collect()
+}
+
+/// A contrast or closure beyond this many standard uncertainties is told.
+const SIGNIFICANT: f64 = 4.0;
+
+pub const NOTHING_CLOSES: &str = "with fewer than four channels nothing closes: drift, a poor reversal \
+     and other errors of the method go unnoticed";
+
+/// Slopes that do not close.
+pub fn slope_warning(slope: Value, convention: Convention) -> Option<String> {
+    let contrast = convention.closure();
+    (slope.value.abs() > SIGNIFICANT * slope.std).then(|| {
+        format!(
+            "the slopes do not close: {} µrad in the contrast {} ({})",
+            number::measured(urad_from_rad(slope.value), Some(urad_from_rad(slope.std))),
+            contrast.pattern(),
+            contrast.meaning(convention)
+        )
+    })
+}
+
+fn warnings(s: &Staged, setup: &ReversalSetup) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if !s.one_grid {
+        warnings.push(
+            "the traces have different positions: they were interpolated onto the coarsest grid; \
+             --simultaneous uses them as they are"
+                .to_owned(),
+        );
+    }
+    match &s.closure {
+        Some(closure) => {
+            warnings.extend(slope_warning(closure.slope, s.convention));
+            let known =
+                s.noise.source == NoiseSource::Declared || s.noise.source == NoiseSource::Repeats;
+            if known && closure.rms > 1.5 * closure.expected_rms {
+                warnings.push(format!(
+                    "the closure profile, {} µm, is larger than the noise explains, {} µm: the model lacks something",
+                    number::plain(closure.rms, 2),
+                    number::plain(closure.expected_rms, 2)
+                ));
+            }
+        }
+        None => warnings.push(NOTHING_CLOSES.to_owned()),
+    }
+    if s.noise.source == NoiseSource::Neighbours {
+        warnings.push(
+            "the noise is taken from each reading against its neighbours; declare it in the set-up \
+             or take repeats for a firmer uncertainty"
+                .to_owned(),
+        );
+    }
+    if s.removal == Removal::Rotation && setup.thickness.is_none() {
+        warnings.push(
+            "the artefact's thickness is not given: rotation is about its surface, and near and far \
+             probe points are taken as opposite"
+                .to_owned(),
+        );
+    }
+    for line in &s.lines {
+        if let Some(d) = line.direction_difference
+            && d.abs() > SIGNIFICANT * s.noise.sigma * (2.0 / line.positions as f64).sqrt()
+        {
+            warnings.push(format!(
+                "channel {} reads {} µm more backward than forward: the mean of both is used",
+                line.channel.name(),
+                number::plain(d, 3)
+            ));
+        }
+    }
+    warnings
+}

@@ -1,0 +1,86 @@
+//! `errsep simulate circle`.
+
+use errsep_models::circle::{CircleSimulation, Point, simulate};
+use serde_json::json;
+
+use crate::cli::{Answer, CommonArgs};
+use crate::io::{CsvTable, Message};
+
+/// Points of a circle with form and noise.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Example: errsep simulate circle --radius 50 --arc 45 --noise 20 > points.csv")]
+pub struct Args {
+    /// Radius, mm.
+    #[arg(long, default_value_t = 50.0, value_name = "MM")]
+    radius: f64,
+    /// Centre x, mm.
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        value_name = "MM",
+        allow_negative_numbers = true
+    )]
+    centre_x: f64,
+    /// Centre y, mm.
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        value_name = "MM",
+        allow_negative_numbers = true
+    )]
+    centre_y: f64,
+    /// Number of points.
+    #[arg(long, default_value_t = 36, value_name = "N")]
+    points: usize,
+    /// Arc covered, degrees.
+    #[arg(long, default_value_t = 360.0, value_name = "DEG")]
+    arc: f64,
+    /// Standard deviation of each coordinate, um.
+    #[arg(long, default_value_t = 1.0, value_name = "UM")]
+    noise: f64,
+    /// A lobe of the form as undulations:amplitude in um, such as 3:2.5; may be given several times.
+    #[arg(long, value_name = "N:UM", value_parser = parse_lobe)]
+    lobe: Vec<(u32, f64)>,
+    #[command(flatten)]
+    pub(in crate::cli) common: CommonArgs,
+}
+
+fn parse_lobe(text: &str) -> Result<(u32, f64), String> {
+    text.split_once(':')
+        .and_then(|(order, size)| Some((order.parse().ok()?, size.parse().ok()?)))
+        .ok_or_else(|| "write undulations:amplitude, such as 3:2.5".to_owned())
+}
+
+/// Makes the points.
+///
+/// # Errors
+/// A radius that is not positive, fewer than three points.
+pub fn run(args: &Args) -> Result<Answer, Message> {
+    let what = CircleSimulation {
+        centre: Point::new(args.centre_x, args.centre_y),
+        radius: args.radius,
+        count: args.points,
+        start: 0.0,
+        arc: args.arc.to_radians(),
+        noise_um: args.noise,
+        lobes: args.lobe.iter().map(|&(n, a)| (n, a, 0.0)).collect(),
+    };
+    let seed = args.common.seed;
+    let points = simulate(&what, seed).map_err(|e| {
+        Message::bad_input(e.to_string()).remedy("change --radius, --points or --noise")
+    })?;
+    let table = CsvTable::new("points.csv")
+        .numbers("x", points.iter().map(|p| p.x).collect::<Vec<_>>())
+        .numbers("y", points.iter().map(|p| p.y).collect::<Vec<_>>());
+    super::answer(
+        "circle",
+        table,
+        json!({
+            "centre": [args.centre_x, args.centre_y],
+            "radius": args.radius,
+            "noise": {"value": args.noise, "unit": "um"},
+        }),
+        seed,
+    )
+}

@@ -1,0 +1,157 @@
+//! `errsep simulate`: data with known truth, one file a kind.
+
+pub mod anova;
+pub mod circle;
+pub mod four_sensor;
+pub mod fourier;
+pub mod machine;
+pub mod reversal;
+pub mod step_diagonal;
+
+use std::fmt::Write;
+
+use clap::Subcommand;
+use serde_json::{Value, json};
+
+use super::{Answer, CommonArgs};
+use crate::io::output::Values;
+use crate::io::{CsvTable, Message, Status};
+use crate::report::{Page, Section};
+
+/// Makes data with known truth.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    kind: Kind,
+}
+
+#[derive(Debug, Subcommand)]
+enum Kind {
+    Anova(anova::Args),
+    Circle(circle::Args),
+    FourSensor(four_sensor::Args),
+    Fourier(fourier::Args),
+    Machine(machine::Args),
+    Reversal(reversal::Args),
+    StepDiagonal(step_diagonal::Args),
+}
+
+impl Args {
+    pub(super) fn common(&self) -> &CommonArgs {
+        match &self.kind {
+            Kind::Anova(args) => &args.common,
+            Kind::Circle(args) => &args.common,
+            Kind::FourSensor(args) => &args.common,
+            Kind::Fourier(args) => &args.common,
+            Kind::Machine(args) => &args.common,
+            Kind::Reversal(args) => &args.common,
+            Kind::StepDiagonal(args) => &args.common,
+        }
+    }
+}
+
+/// Simulates the kind that was asked for.
+///
+/// # Errors
+/// What makes no sense in the kind's options.
+pub fn run(args: &Args) -> Result<Answer, Message> {
+    let mut answer = match &args.kind {
+        Kind::Anova(args) => anova::run(args),
+        Kind::Circle(args) => circle::run(args),
+        Kind::FourSensor(args) => four_sensor::run(args),
+        Kind::Fourier(args) => fourier::run(args),
+        Kind::Machine(args) => machine::run(args),
+        Kind::Reversal(args) => reversal::run(args),
+        Kind::StepDiagonal(args) => step_diagonal::run(args),
+    }?;
+    if args.common().out.is_some() {
+        answer.text = summary(&answer);
+    }
+    Ok(answer)
+}
+
+/// What was made, for people who find the data themselves in the folder.
+fn summary(answer: &Answer) -> String {
+    let kind = answer.json["kind"].as_str().unwrap_or_default();
+    let mut text = format!(
+        "Simulated {kind}, seed {}\n",
+        answer.seed.unwrap_or_default()
+    );
+    for table in &answer.tables {
+        let rows = match table.columns.first() {
+            Some((_, Values::Numbers(column))) => column.len(),
+            Some((_, Values::Texts(column))) => column.len(),
+            None => 0,
+        };
+        let _ = writeln!(text, "  {}: {rows} rows", table.file_name);
+    }
+    let truth = known_in_a_line(&answer.json["truth"]);
+    let _ = writeln!(text, "  truth: {truth} (whole in result.json)");
+    text
+}
+
+/// The single numbers of a truth with their units; the names alone of what is longer.
+fn known_in_a_line(truth: &Value) -> String {
+    let Value::Object(truth) = truth else {
+        return truth.to_string();
+    };
+    let parts: Vec<String> = truth
+        .iter()
+        .map(|(name, what)| match (what, &what["value"]) {
+            (Value::Number(number), _) => format!("{name} {number}"),
+            (_, Value::Number(number)) => {
+                let unit = what["unit"].as_str().unwrap_or_default();
+                format!("{name} {number} {unit}").trim_end().to_owned()
+            }
+            _ => name.clone(),
+        })
+        .collect();
+    parts.join(", ")
+}
+
+/// A simulation as every kind answers: the data as text in the form that the commands read, with its
+/// truth in comments; data and truth as JSON.
+pub(super) fn answer(
+    kind: &str,
+    data: CsvTable,
+    truth: Value,
+    seed: u64,
+) -> Result<Answer, Message> {
+    let unwritable = |e: String| Message::bad_input(format!("the data cannot be written: {e}"));
+    let mut bytes = Vec::new();
+    data.write(&mut bytes)
+        .map_err(|e| unwritable(e.to_string()))?;
+    let table = String::from_utf8(bytes).map_err(|e| unwritable(e.to_string()))?;
+    let columns = data
+        .columns
+        .iter()
+        .map(|(name, values)| {
+            let values = match values {
+                Values::Numbers(v) => json!(
+                    v.iter()
+                        .map(|x| if x.is_nan() { Value::Null } else { json!(x) })
+                        .collect::<Vec<_>>()
+                ),
+                Values::Texts(v) => json!(v),
+            };
+            (name.clone(), values)
+        })
+        .collect::<serde_json::Map<String, Value>>();
+    Ok(Answer {
+        text: format!("# errsep simulate {kind} --seed {seed}\n{table}"),
+        json: json!({
+            "schema": "errsep.simulation/1",
+            "kind": kind,
+            "seed": seed,
+            "truth": truth,
+            "data": columns,
+        }),
+        page: Page::new("Simulation", kind).section(
+            Section::new("Data").paragraph(format!("{} with seed {seed}.", data.file_name)),
+        ),
+        tables: vec![data],
+        inputs: Vec::new(),
+        seed: Some(seed),
+        status: Status::Done,
+    })
+}

@@ -1,0 +1,258 @@
+//! `errsep simulate reversal`: four traces of an artefact with known tilts and forms.
+
+use errsep_models::basis::bspline::CubicBSpline;
+use errsep_models::reversal::Direction;
+use errsep_models::reversal::exact_readings::Injection;
+use errsep_models::reversal::injected::{Injected, Undisturbed};
+use errsep_models::reversal::simulate::{
+    Disturbance, Plan, PlanError, TrueForm, Truth, even_grid, simulate,
+};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+
+use crate::cli::{Answer, CommonArgs};
+use crate::io::{CsvTable, Message};
+
+/// Most readings that are simulated.
+const MOST_READINGS: usize = 20_000_000;
+
+/// Positions at which the truth of the forms is given.
+const TRUTH_POSITIONS: usize = 201;
+
+/// Microradians in a radian, as the options are given.
+const URAD: f64 = 1e-6;
+
+/// Readings of a reversal in exact geometry, with known tilts and forms.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example: errsep simulate reversal --alpha 40 --thickness 42 --noise 0.02 --seed 7 --out data"
+)]
+pub struct Args {
+    /// Tilt between slide and spindle axis, urad.
+    #[arg(
+        long,
+        value_name = "URAD",
+        default_value_t = 40.0,
+        allow_hyphen_values = true
+    )]
+    alpha: f64,
+    /// Second tilt (sign of the spindle position), urad.
+    #[arg(
+        long,
+        value_name = "URAD",
+        default_value_t = 0.0,
+        allow_hyphen_values = true
+    )]
+    beta: f64,
+    /// Third tilt (sign of the artefact's side), urad.
+    #[arg(long, value_name = "URAD", default_value_t = -150.0, allow_hyphen_values = true)]
+    gamma: f64,
+    /// Thickness of the artefact, mm.
+    #[arg(long, value_name = "MM", default_value_t = 0.0)]
+    thickness: f64,
+    /// Travel, mm.
+    #[arg(long, value_name = "MM", default_value_t = 300.0)]
+    length: f64,
+    /// Positions of each trace.
+    #[arg(long, value_name = "N", default_value_t = 301)]
+    positions: usize,
+    /// How often each trace is taken.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    repeats: u32,
+    /// Take each repeat forward and backward.
+    #[arg(long)]
+    both_directions: bool,
+    /// Seconds from one reading to the next.
+    #[arg(long, value_name = "S", default_value_t = 0.5)]
+    interval: f64,
+    /// Standard deviation of a reading, um: one figure, or four for 1A,1B,2A,2B.
+    #[arg(
+        long,
+        value_name = "UM,...",
+        value_delimiter = ',',
+        default_value = "0.02"
+    )]
+    noise: Vec<f64>,
+    /// Root mean square of the slide's form and of the artefact's, um.
+    #[arg(
+        long,
+        value_name = "UM,UM",
+        value_delimiter = ',',
+        default_value = "1,1"
+    )]
+    forms: Vec<f64>,
+    /// Make the forms cubic splines of so many cells in place of waves.
+    #[arg(long, value_name = "CELLS")]
+    spline: Option<usize>,
+    /// Share of readings that are outliers, of twenty times the noise.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    outliers: f64,
+    /// Switch on an effect of the diagnosis's catalogue at a size, in its exact form; may be given
+    /// several times. Sizes are in um, mm or rad as the catalogue gives them.
+    #[arg(long = "effect", value_name = "NAME=VALUE")]
+    effects: Vec<String>,
+    #[command(flatten)]
+    pub(super) common: CommonArgs,
+}
+
+pub(super) fn run(args: &Args) -> Result<Answer, Message> {
+    let plan = plan(args)?;
+    let refused = |error: PlanError| {
+        Message::bad_input(error.to_string()).remedy("correct the options of the simulation")
+    };
+    let undisturbed = Undisturbed::of(&plan).map_err(refused)?;
+    let effects = effects(args, &undisturbed)?;
+    let placed: Vec<Injected> = effects
+        .iter()
+        .map(|(_, effect)| Injected::new(*effect, &undisturbed))
+        .collect();
+    let disturbances: Vec<&dyn Disturbance> =
+        placed.iter().map(|d| d as &dyn Disturbance).collect();
+    let (observations, truth) = simulate(&plan, &disturbances).map_err(refused)?;
+    let readings = &observations.readings;
+    let column = |of: &dyn Fn(&errsep_models::reversal::Reading) -> f64| -> Vec<f64> {
+        readings.iter().map(of).collect()
+    };
+    let direction = |d: Direction| match d {
+        Direction::Forward => "forward",
+        Direction::Backward => "backward",
+    };
+    let table = CsvTable::new("readings.csv")
+        .texts(
+            "channel",
+            readings
+                .iter()
+                .map(|r| r.channel.name().to_owned())
+                .collect::<Vec<_>>(),
+        )
+        .numbers("repeat", column(&|r| f64::from(r.repeat)))
+        .texts(
+            "direction",
+            readings
+                .iter()
+                .map(|r| direction(r.direction).to_owned())
+                .collect::<Vec<_>>(),
+        )
+        .numbers("time", column(&|r| r.time.unwrap_or(f64::NAN)))
+        .numbers("x", column(&|r| r.x))
+        .numbers("reading", column(&|r| r.value));
+    super::answer(
+        "reversal",
+        table,
+        known(args, &truth, &effects),
+        args.common.seed,
+    )
+}
+
+fn plan(args: &Args) -> Result<Plan, Message> {
+    let refuse = |what: &str, remedy: &str| Err(Message::bad_input(what).remedy(remedy));
+    let directions = if args.both_directions { 2 } else { 1 };
+    let readings = args
+        .positions
+        .checked_mul(4 * directions)
+        .and_then(|n| n.checked_mul(args.repeats as usize));
+    if readings.is_none_or(|n| n > MOST_READINGS) || args.positions < 2 || args.repeats < 1 {
+        return refuse(
+            "that number of readings is not simulated",
+            "give two or more --positions, one or more --repeats, twenty million readings at most",
+        );
+    }
+    if !(args.length > 0.0) || !args.length.is_finite() {
+        return refuse(
+            "the travel must be greater than zero",
+            "give --length in mm",
+        );
+    }
+    if ![1, 4].contains(&args.noise.len()) {
+        return refuse(
+            "noise is one figure or four",
+            "give --noise as 0.02 or as 0.01,0.02,0.03,0.02",
+        );
+    }
+    let [of_slide, of_artefact] = args.forms[..] else {
+        return refuse(
+            "--forms takes two figures",
+            "give it as 1,0.5: slide, artefact",
+        );
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(args.common.seed);
+    let mut form = |rms: f64| -> Result<TrueForm, Message> {
+        match args.spline {
+            None => Ok(TrueForm::random_waves(&mut rng, rms, 1.5 * args.length, 12)),
+            Some(cells) => {
+                let basis = CubicBSpline::uniform(0.0, args.length, cells).map_err(|e| {
+                    Message::bad_input(e.to_string()).remedy("give --spline one cell or more")
+                })?;
+                Ok(TrueForm::random_spline(&mut rng, basis, rms))
+            }
+        }
+    };
+    let mut plan = Plan::even(0.0, args.length, args.positions, 0.0);
+    plan.m = form(of_slide)?;
+    plan.s_a = form(of_artefact)?;
+    plan.s_b = form(of_artefact)?;
+    plan.alpha_rad = args.alpha * URAD;
+    plan.beta_rad = args.beta * URAD;
+    plan.gamma_rad = args.gamma * URAD;
+    plan.thickness_mm = args.thickness;
+    for (c, trace) in plan.traces.iter_mut().enumerate() {
+        trace.noise = args.noise[c % args.noise.len()];
+    }
+    plan.repeats = args.repeats;
+    plan.both_directions = args.both_directions;
+    plan.seconds_a_reading = args.interval;
+    plan.outlier_share = args.outliers;
+    // Another stream than that of the forms.
+    plan.seed = args.common.seed.wrapping_add(1 << 32);
+    Ok(plan)
+}
+
+/// The effects asked for; what a name and a size leave open is drawn from the seed.
+fn effects(args: &Args, undisturbed: &Undisturbed) -> Result<Vec<(String, Injection)>, Message> {
+    let mut random = ChaCha8Rng::seed_from_u64(args.common.seed.wrapping_add(2 << 32));
+    args.effects
+        .iter()
+        .map(|text| {
+            let bad = |what: String| {
+                Message::bad_input(what)
+                    .remedy("give --effect as NAME=VALUE, such as --effect taper=5e-6")
+            };
+            let (name, value) = text
+                .split_once('=')
+                .ok_or_else(|| bad(format!("`{text}` is not NAME=VALUE")))?;
+            let size: f64 = value
+                .trim()
+                .parse()
+                .ok()
+                .filter(|v: &f64| v.is_finite())
+                .ok_or_else(|| bad(format!("`{value}` is not a number")))?;
+            let effect = Injection::named(name.trim(), size, &undisturbed.frame, &mut random)
+                .ok_or_else(|| bad(format!("there is no effect `{name}`")))?;
+            Ok((name.trim().to_owned(), effect))
+        })
+        .collect()
+}
+
+fn known(args: &Args, truth: &Truth, effects: &[(String, Injection)]) -> Value {
+    let x = even_grid(0.0, args.length, TRUTH_POSITIONS);
+    let at = |form: &errsep_models::reversal::simulate::GaugedForm| -> Vec<f64> {
+        x.iter().map(|x| form.at(*x)).collect()
+    };
+    let angle = |rad: f64| json!({"value": rad, "unit": "rad"});
+    json!({
+        "tilts": {
+            "alpha": angle(truth.alpha_rad),
+            "beta": angle(truth.beta_rad),
+            "gamma": angle(truth.gamma_rad),
+        },
+        "thickness": {"value": args.thickness, "unit": "mm"},
+        "noise": {"std": args.noise, "unit": "um"},
+        "forms": {"M": at(&truth.m), "S_A": at(&truth.s_a), "S_B": at(&truth.s_b), "x": x},
+        "outliers": truth.outliers,
+        "effects": effects
+            .iter()
+            .map(|(name, effect)| json!({"effect": name, "exact": format!("{effect:?}")}))
+            .collect::<Vec<_>>(),
+    })
+}

@@ -1,0 +1,176 @@
+//! `errsep simulate step-diagonal`.
+
+use clap::ValueEnum;
+use errsep_models::diagonal::{
+    Component, Diagonal, DiagonalSimulation, Location, Sequence, Target, WorkZone, simulate,
+};
+use serde_json::{Value, json};
+
+use crate::cli::{Answer, CommonArgs};
+use crate::io::{CsvTable, Message};
+
+/// Diagonals of the test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Which {
+    /// The four body diagonals.
+    Body,
+    /// The two face diagonals of the bottom plane.
+    Face,
+}
+
+/// What the tool carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum On {
+    /// A mirror.
+    Mirror,
+    /// A retro-reflector.
+    RetroReflector,
+    /// One after the other.
+    Both,
+}
+
+/// Step-diagonal readings of a machine with all 21 errors, by exact geometry.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Example: errsep simulate step-diagonal --steps 5 --sequence XYZ --sequence ZYX > readings.csv")]
+pub struct Args {
+    /// Travel of X, Y, Z, mm.
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], default_values_t = [600.0, 500.0, 400.0])]
+    travel: Vec<f64>,
+    /// Steps on each axis.
+    #[arg(long, default_value_t = 5, value_name = "N")]
+    steps: usize,
+    /// Diagonals.
+    #[arg(long, value_enum, default_value_t = Which::Body)]
+    diagonals: Which,
+    /// Target.
+    #[arg(long, value_enum, default_value_t = On::Mirror)]
+    target: On,
+    /// Sequence (XYZ, …, together); may be given several times (default: all six).
+    #[arg(long, value_name = "SEQ", value_parser = parse_sequence)]
+    sequence: Vec<Sequence>,
+    /// Size of the translational errors, um.
+    #[arg(long, default_value_t = 5.0, value_name = "UM")]
+    translation: f64,
+    /// Size of the angular and squareness errors, rad.
+    #[arg(long, default_value_t = 20e-6, value_name = "RAD")]
+    rotation: f64,
+    /// Standard deviation of the mirror's misalignment, rad.
+    #[arg(long, default_value_t = 50e-6, value_name = "RAD")]
+    mirror: f64,
+    /// Standard deviation of a reading, um.
+    #[arg(long, default_value_t = 0.2, value_name = "UM")]
+    noise: f64,
+    #[command(flatten)]
+    pub(in crate::cli) common: CommonArgs,
+}
+
+fn parse_sequence(text: &str) -> Result<Sequence, String> {
+    Sequence::from_name(text)
+        .ok_or_else(|| "write XYZ, XZY, YXZ, YZX, ZXY, ZYX or together".to_owned())
+}
+
+/// Makes the readings.
+///
+/// # Errors
+/// A work zone without volume or steps.
+pub fn run(args: &Args) -> Result<Answer, Message> {
+    let [x, y, z] = args.travel[..] else {
+        return Err(Message::bad_input("--travel needs three numbers").remedy("--travel X Y Z"));
+    };
+    let travel = [x, y, z];
+    let sizes = [args.translation, args.rotation, args.mirror, args.noise];
+    if args.steps == 0
+        || travel.iter().any(|t| !(*t > 0.0 && t.is_finite()))
+        || sizes.iter().any(|s| !s.is_finite())
+    {
+        return Err(
+            Message::bad_input("the work zone or the sizes make no machine")
+                .remedy("give positive travels, at least one step and finite sizes"),
+        );
+    }
+    let what = DiagonalSimulation {
+        zone: WorkZone {
+            travel,
+            steps: args.steps,
+        },
+        diagonals: match args.diagonals {
+            Which::Body => Diagonal::BODY.to_vec(),
+            Which::Face => Diagonal::FACE.to_vec(),
+        },
+        targets: match args.target {
+            On::Mirror => vec![Target::Mirror],
+            On::RetroReflector => vec![Target::RetroReflector],
+            On::Both => vec![Target::Mirror, Target::RetroReflector],
+        },
+        sequences: match (&args.sequence[..], args.diagonals) {
+            ([], Which::Body) => Sequence::STEPS.to_vec(),
+            ([], Which::Face) => vec![Sequence::XYZ, Sequence::YXZ],
+            (some, _) => some.to_vec(),
+        },
+        repeats: 1,
+        translation: args.translation,
+        rotation: args.rotation,
+        mirror: args.mirror,
+        noise: args.noise,
+    };
+    let seed = args.common.seed;
+    let (readings, errors, mirrors) = simulate(&what, seed);
+    let position = |a: usize| -> Vec<f64> {
+        readings
+            .iter()
+            .map(|r| what.zone.position(r.at)[a])
+            .collect()
+    };
+    let text = |of: &dyn Fn(usize) -> String| (0..readings.len()).map(of).collect::<Vec<_>>();
+    let table = CsvTable::new("readings.csv")
+        .texts(
+            "diagonal",
+            text(&|i| readings[i].diagonal.name().to_owned()),
+        )
+        .texts(
+            "sequence",
+            text(&|i| readings[i].sequence.name().to_owned()),
+        )
+        .texts(
+            "target",
+            text(&|i| match readings[i].target {
+                Target::Mirror => "mirror".to_owned(),
+                Target::RetroReflector => "retro-reflector".to_owned(),
+            }),
+        )
+        .numbers("x", position(0))
+        .numbers("y", position(1))
+        .numbers("z", position(2))
+        .numbers(
+            "reading",
+            readings.iter().map(|r| r.value).collect::<Vec<_>>(),
+        );
+    let functions: serde_json::Map<String, Value> = Component::all()
+        .map(|c| (c.name(), json!(errors.of(c))))
+        .collect();
+    let squareness: serde_json::Map<String, Value> = Location::ALL
+        .into_iter()
+        .map(|l| {
+            let value = l.iso_sign() * errors.squareness_of(l);
+            (l.name().to_owned(), json!(value))
+        })
+        .collect();
+    let misaligned: Vec<Value> = mirrors
+        .iter()
+        .map(|((diagonal, target), m)| {
+            json!({"diagonal": diagonal, "target": target, "rotation": [m.x, m.y, m.z], "unit": "rad"})
+        })
+        .collect();
+    super::answer(
+        "step-diagonal",
+        table,
+        json!({
+            "simulation": what,
+            "functions": functions,
+            "squareness": squareness,
+            "mirrors": misaligned,
+        }),
+        seed,
+    )
+}

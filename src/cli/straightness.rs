@@ -1,0 +1,119 @@
+//! `errsep straightness`: a profile against the three reference lines.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use errsep_models::straightness::{ReferenceLine, Straightness, straightness};
+use serde_json::json;
+
+use super::{Answer, CommonArgs};
+use crate::io::{CsvTable, Message, Status, TableReader};
+use crate::report::{Page, Section};
+
+/// Straightness of a profile: least-squares, end-point and minimum-zone reference lines.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The file has the columns x (position, mm) and deviation (um):
+
+    x,deviation
+    0,-0.3
+    100,0.9
+
+Example: errsep straightness profile.csv --out straightness")]
+pub struct Args {
+    /// The profile.
+    #[arg(value_name = "PROFILE.csv")]
+    profile: PathBuf,
+    #[command(flatten)]
+    pub(super) common: CommonArgs,
+}
+
+/// Works out the three straightness errors.
+///
+/// # Errors
+/// The file is no table of positions and deviations.
+pub fn run(args: &Args) -> Result<Answer, Message> {
+    let (x, y) = read(&args.profile)?;
+    let results = ReferenceLine::ALL
+        .into_iter()
+        .map(|reference| straightness(&x, &y, reference))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|e| {
+            Message::bad_input(e.to_string())
+                .in_file(&args.profile)
+                .remedy("give readings at two or more positions")
+        })?;
+    let mut text = format!(
+        "Straightness of {} ({} points)\n",
+        args.profile.display(),
+        x.len()
+    );
+    for s in &results {
+        let _ = writeln!(text, "  {}", in_words(s));
+    }
+    let table = results.iter().fold(
+        CsvTable::new("deviations.csv").numbers("x_mm", x.clone()),
+        |table, s| {
+            let deviations = x.iter().zip(&y).map(|(&x, &y)| s.deviation(x, y));
+            table.numbers(
+                format!("{}_um", s.reference.key()),
+                deviations.collect::<Vec<_>>(),
+            )
+        },
+    );
+    let section = results
+        .iter()
+        .fold(Section::new("Straightness"), |section, s| {
+            section.paragraph(in_words(s))
+        });
+    Ok(Answer {
+        text,
+        json: json!({
+            "schema": "errsep.straightness/1",
+            "points": x.len(),
+            "reference_lines": results.iter().map(as_json).collect::<Vec<_>>(),
+        }),
+        page: Page::new("Straightness", args.profile.display().to_string()).section(section),
+        tables: vec![table],
+        inputs: vec![args.profile.clone()],
+        seed: None,
+        status: Status::Done,
+    })
+}
+
+fn read(path: &Path) -> Result<(Vec<f64>, Vec<f64>), Message> {
+    let mut table = TableReader::open(path)?;
+    table.only(&["x", "deviation"])?;
+    let (at, deviation) = (table.column("x")?, table.column("deviation")?);
+    let (mut x, mut y) = (Vec::new(), Vec::new());
+    while let Some(row) = table.next_row()? {
+        x.push(row.number(&at)?);
+        y.push(row.number(&deviation)?);
+    }
+    if x.is_empty() {
+        return Err(table.no_rows());
+    }
+    Ok((x, y))
+}
+
+fn in_words(s: &Straightness) -> String {
+    format!(
+        "{:13} {:.3} µm (from {:.3} to {:+.3}), slope of the line {:.3} µrad",
+        s.reference.name(),
+        s.error(),
+        s.lowest,
+        s.highest,
+        // µm/mm = mrad.
+        s.slope * 1e3
+    )
+}
+
+fn as_json(s: &Straightness) -> serde_json::Value {
+    json!({
+        "reference": s.reference.key(),
+        "error": {"value": s.error(), "unit": "um"},
+        "highest": s.highest,
+        "lowest": s.lowest,
+        "slope": {"value": s.slope * 1e-3, "unit": "rad"},
+    })
+}

@@ -1,0 +1,285 @@
+//! Which effect: a confidence set, not a winner.
+//!
+//! A cause is accepted when, refitted with everything else free, it leaves nothing that stands out
+//! of the noise: no other effect, no place. All causes that pass are the confidence set (the
+//! inversion of the test); significance alone names nothing. One cause is tried first, then two,
+//! then three; each further one must earn its place beside the others.
+
+use errsep_models::model::FittedModel;
+use nalgebra::DVector;
+
+use super::bench::{Bench, Cause, Remainder, finer};
+
+/// A set of causes whose remainder is less probable than this is not adequate.
+const ADEQUATE: f64 = 0.002;
+/// A further cause must stand out beside the others at this level.
+const EARNED: f64 = 0.002;
+/// A cause whose statistic is this much below the best cannot be adequate.
+const HOPELESS: f64 = 80.0;
+/// Causes whose misfits differ by less fit equally well: the one of more usual size goes first.
+const TIED: f64 = 9.2;
+/// Most rounds of fitting the state without the causes.
+const ROUNDS: usize = 8;
+/// Greatest number of effects in one verdict.
+const MOST: usize = 3;
+
+/// Causes that together explain the gap, and those that do it as well.
+pub(super) struct Answer {
+    /// The causes, by what each adds.
+    pub causes: Vec<Cause>,
+    /// For each cause the effects that these data cannot tell from it, itself first.
+    pub groups: Vec<Vec<usize>>,
+    /// Probability of the remainder.
+    pub adequacy: f64,
+    /// Whether the remainder is adequate.
+    pub complete: bool,
+}
+
+/// Seeks the causes of what stands out in readings.
+pub(super) fn attribute<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    first: &Remainder,
+) -> Option<Answer> {
+    let mut causes: Vec<Cause> = Vec::new();
+    let mut best_partial: Option<Answer> = None;
+    for size in 1..=MOST {
+        let remainder = if causes.is_empty() {
+            None
+        } else {
+            Some(bench.remainder(readings, &causes))
+        };
+        let here = remainder.as_ref().unwrap_or(first);
+        let Some(next) = strongest(bench, readings, here, &causes) else {
+            break;
+        };
+        causes.push(next);
+        if size > 1 {
+            polish(bench, readings, &mut causes);
+        }
+        let answer = confidence_set(bench, readings, &causes);
+        if answer.complete {
+            return Some(answer);
+        }
+        causes.clone_from(&answer.causes);
+        best_partial = Some(answer);
+    }
+    best_partial
+}
+
+/// The refined effect with the greatest statistic beside the causes.
+fn strongest<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    remainder: &Remainder,
+    causes: &[Cause],
+) -> Option<Cause> {
+    let mut ranked: Vec<(f64, usize)> = (0..bench.catalogue.len())
+        .filter(|effect| causes.iter().all(|c| c.effect != *effect))
+        .filter(|effect| bench.p_value(remainder, *effect) < EARNED)
+        .filter_map(|effect| {
+            let family = bench.family_of(effect)?;
+            Some((remainder.best[family].0, effect))
+        })
+        .collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranked
+        .into_iter()
+        .take(5)
+        .filter_map(|(_, effect)| {
+            let start = bench.start(remainder, effect)?;
+            let (cause, t) = bench.refine(bench.model, readings, effect, start, causes);
+            possible(bench, readings, causes, &cause).then_some((cause, t))
+        })
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(cause, _)| cause)
+}
+
+/// Whether a cause beside others has a physically possible size.
+fn possible<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    others: &[Cause],
+    cause: &Cause,
+) -> bool {
+    let mut all = others.to_vec();
+    all.push(cause.clone());
+    let Some((amplitudes, covariance)) = bench.amplitudes(readings, &all) else {
+        return false;
+    };
+    let own = cause.projected.ncols();
+    let from = amplitudes.len() - own;
+    let stds: Vec<f64> = (from..amplitudes.len())
+        .map(|k| covariance[(k, k)].max(0.0).sqrt())
+        .collect();
+    bench.plausible(cause, &amplitudes.as_slice()[from..], &stds)
+}
+
+/// Refines each cause beside the others, and swaps it for any effect that explains more.
+fn polish<M: FittedModel>(bench: &Bench<'_, M>, readings: &DVector<f64>, causes: &mut [Cause]) {
+    for _ in 0..3 {
+        let mut changed = false;
+        for k in 0..causes.len() {
+            let others = without(causes, k);
+            let start = finer(&causes[k].shape);
+            let (refined, t) =
+                bench.refine(bench.model, readings, causes[k].effect, &start, &others);
+            let remainder = bench.remainder(readings, &others);
+            let swapped = strongest(bench, readings, &remainder, &others)
+                .filter(|c| c.effect != refined.effect)
+                .map(|c| bench.refine(bench.model, readings, c.effect, &finer(&c.shape), &others));
+            match swapped {
+                Some((other, other_t)) if other_t > t + 1e-6 => {
+                    causes[k] = other;
+                    changed = true;
+                }
+                _ => {
+                    changed |= refined.shape.values != causes[k].shape.values;
+                    causes[k] = refined;
+                }
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+}
+
+fn without(causes: &[Cause], k: usize) -> Vec<Cause> {
+    let mut others = causes.to_vec();
+    others.remove(k);
+    others
+}
+
+/// One way to explain the gap: causes with one of them varied.
+struct Member {
+    effect: usize,
+    causes: Vec<Cause>,
+    misfit: f64,
+    adequacy: f64,
+    /// Size as a part of what is physically plausible.
+    size: f64,
+}
+
+/// All effects that could stand in place of each cause, the others kept.
+fn confidence_set<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> Answer {
+    let mut best = bench.relinearised(readings, causes, ROUNDS);
+    let mut adequacy = bench.remainder(readings, &best).global;
+    let mut groups = Vec::new();
+    for k in 0..causes.len() {
+        let members = alternatives(bench, readings, &best, k);
+        let group = if members.is_empty() {
+            vec![best[k].effect]
+        } else {
+            members.iter().map(|m| m.effect).collect()
+        };
+        groups.push(group);
+        if let Some(first) = members.into_iter().next() {
+            best = first.causes;
+            adequacy = first.adequacy;
+        }
+    }
+    let needed = best.len() == 1
+        || (0..best.len()).all(|k| {
+            let remainder = bench.remainder(readings, &without(&best, k));
+            bench.p_value(&remainder, best[k].effect) < EARNED
+        });
+    Answer {
+        causes: best,
+        groups,
+        adequacy,
+        complete: needed && adequacy > ADEQUATE,
+    }
+}
+
+/// The effects that are adequate in the place of cause `k`, the best fit first.
+fn alternatives<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    best: &[Cause],
+    k: usize,
+) -> Vec<Member> {
+    let others = without(best, k);
+    let remainder = bench.remainder(readings, &others);
+    let strength = |cause: &Cause| {
+        let mut all = others.clone();
+        all.push(cause.clone());
+        remainder.residual.norm_squared() - bench.misfit(readings, &all)
+    };
+    let own = strength(&best[k]);
+    let mut members = Vec::new();
+    for effect in 0..bench.catalogue.len() {
+        if others.iter().any(|c| c.effect == effect) {
+            continue;
+        }
+        let cause = if effect == best[k].effect {
+            best[k].clone()
+        } else {
+            if bench.p_value(&remainder, effect) > EARNED {
+                continue;
+            }
+            let Some(start) = bench.start(&remainder, effect) else {
+                continue;
+            };
+            bench
+                .refine(bench.model, readings, effect, start, &others)
+                .0
+        };
+        if strength(&cause) < own - HOPELESS - 0.1 * own
+            || !possible(bench, readings, &others, &cause)
+        {
+            continue;
+        }
+        let mut trial = others.clone();
+        trial.insert(k, cause);
+        let trial = bench.relinearised(readings, &trial, ROUNDS);
+        let left = bench.remainder(readings, &trial);
+        if left.global > ADEQUATE {
+            members.push(Member {
+                effect,
+                size: part_of_plausible(bench, readings, &trial, k),
+                causes: trial,
+                misfit: left.residual.norm_squared(),
+                adequacy: left.global,
+            });
+        }
+    }
+    let least = members
+        .iter()
+        .map(|m| m.misfit)
+        .fold(f64::INFINITY, f64::min);
+    members.sort_by(|a, b| {
+        let behind = |m: &Member| m.misfit > least + TIED;
+        let by_fit = a.misfit.total_cmp(&b.misfit);
+        let by_size = a.size.total_cmp(&b.size);
+        behind(a).cmp(&behind(b)).then(if behind(a) {
+            by_fit
+        } else {
+            by_size.then(by_fit)
+        })
+    });
+    members
+}
+
+/// The greatest amplitude of a cause as a part of the plausible one.
+fn part_of_plausible<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    k: usize,
+) -> f64 {
+    let Some((amplitudes, _)) = bench.amplitudes(readings, causes) else {
+        return f64::INFINITY;
+    };
+    let from: usize = causes[..k].iter().map(|c| c.projected.ncols()).sum();
+    bench.catalogue[causes[k].effect]
+        .amplitudes()
+        .iter()
+        .zip(amplitudes.iter().skip(from))
+        .map(|(p, a)| a.abs() / p.low.abs().max(p.high.abs()))
+        .fold(0.0, f64::max)
+}

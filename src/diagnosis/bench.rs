@@ -1,0 +1,344 @@
+//! The workbench of one pass: state of the model, noise, space, dictionary and their null law.
+
+use errsep_models::model::{Column, Effect, FittedModel, Shape};
+use nalgebra::{DMatrix, DVector};
+
+use rayon::prelude::*;
+
+use super::dictionary::{Dictionary, Entry, Meaning, products, statistic, surprise};
+use super::noise::NoiseLaw;
+use super::null::NullLaw;
+use super::search::compass;
+use super::space::{Space, orthonormal};
+
+/// Beside other causes a signature must keep this part of its visible length to be told apart.
+const SEPARABLE: f64 = 0.02;
+
+/// Relative change of the amplitudes at which refining stops.
+const AT_REST: f64 = 1e-4;
+
+/// Everything that is fixed while causes are sought.
+pub(super) struct Bench<'a, M: FittedModel> {
+    pub model: &'a M,
+    pub catalogue: &'a [Box<dyn Effect<M>>],
+    pub law: NoiseLaw,
+    pub space: Space,
+    pub dictionary: Dictionary,
+    pub null: NullLaw,
+}
+
+/// A cause at a shape, with its whitened, projected signature.
+#[derive(Clone)]
+pub(super) struct Cause {
+    pub effect: usize,
+    pub shape: Shape,
+    pub columns: Vec<Column>,
+    pub projected: DMatrix<f64>,
+}
+
+/// What remains beside some causes.
+pub(super) struct Remainder {
+    pub residual: DVector<f64>,
+    /// Greatest score of each family and the entry where it is.
+    pub best: Vec<(f64, Option<usize>)>,
+    /// Probability that any family stands out as much.
+    pub global: f64,
+}
+
+impl<'a, M: FittedModel> Bench<'a, M> {
+    pub fn new(
+        model: &'a M,
+        catalogue: &'a [Box<dyn Effect<M>>],
+        law: NoiseLaw,
+        draws: usize,
+        seed: u64,
+    ) -> Self {
+        let space = Space::new(model, &law);
+        let dictionary = Dictionary::new(model, catalogue, &space, &law);
+        let null = NullLaw::simulate(&dictionary, &space, &law, draws, seed);
+        Self {
+            model,
+            catalogue,
+            law,
+            space,
+            dictionary,
+            null,
+        }
+    }
+
+    /// The whitened, projected residual of readings.
+    pub fn residual(&self, readings: &DVector<f64>) -> DVector<f64> {
+        self.space.forward_vector(readings)
+    }
+
+    /// A cause of the catalogue at a shape, by the signature at a state of the model.
+    pub fn cause(&self, state: &M, effect: usize, shape: Shape) -> Cause {
+        let columns = self.catalogue[effect].columns(state, &shape);
+        Cause {
+            effect,
+            shape,
+            projected: self.space.forward_columns(&columns).0,
+            columns,
+        }
+    }
+
+    /// Causes bend the state at which their signatures are taken: takes their change out of the
+    /// readings, fits the model again and refines each there, until the amplitudes rest.
+    pub fn relinearised(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+        rounds: usize,
+    ) -> Vec<Cause> {
+        let mut causes = causes.to_vec();
+        let mut last: Option<DVector<f64>> = None;
+        for _ in 0..rounds {
+            let Some((amplitudes, _)) = self.amplitudes(readings, &causes) else {
+                break;
+            };
+            let rests = last
+                .as_ref()
+                .is_some_and(|l| (l - &amplitudes).norm() < AT_REST * amplitudes.norm());
+            if rests {
+                break;
+            }
+            last = Some(amplitudes.clone());
+            let state = self
+                .model
+                .refit(readings - self.change(&causes, &amplitudes));
+            for k in 0..causes.len() {
+                let mut others = causes.clone();
+                let own = others.remove(k);
+                let start = finer(&own.shape);
+                causes[k] = self.refine(&state, readings, own.effect, &start, &others).0;
+            }
+        }
+        causes
+    }
+
+    /// Scores of everything beside some causes.
+    pub fn remainder(&self, readings: &DVector<f64>, causes: &[Cause]) -> Remainder {
+        let whole = self.residual(readings);
+        let basis = span(causes, self.space.readings());
+        let residual = &whole - &basis * basis.tr_mul(&whole);
+        let adjoint = column(self.space.adjoint(as_matrix(&residual)));
+        let directions: Vec<DVector<f64>> = self
+            .space
+            .adjoint(basis.clone())
+            .column_iter()
+            .map(|c| c.clone_owned())
+            .collect();
+        let surprise_of = |entry: &Entry| -> f64 {
+            let score = products(&entry.columns, &adjoint);
+            let t = if directions.is_empty() {
+                statistic(&entry.gram, &score, entry.positive)
+            } else {
+                let overlap = overlaps(entry, &directions);
+                let left = &entry.gram - &overlap * overlap.transpose();
+                if left.trace() < SEPARABLE * entry.gram.trace() {
+                    return 0.0;
+                }
+                statistic(&left, &score, entry.positive)
+            };
+            surprise(t, entry.columns.len())
+        };
+        let surprises: Vec<f64> = self
+            .dictionary
+            .entries
+            .par_iter()
+            .map(surprise_of)
+            .collect();
+        let best: Vec<(f64, Option<usize>)> = self
+            .dictionary
+            .families
+            .iter()
+            .map(|family| {
+                family
+                    .entries
+                    .clone()
+                    .filter(|k| surprises[*k] > 0.0)
+                    .max_by(|a, b| surprises[*a].total_cmp(&surprises[*b]))
+                    .map_or((0.0, None), |k| (surprises[k], Some(k)))
+            })
+            .collect();
+        let surprises: Vec<f64> = best.iter().map(|(s, _)| *s).collect();
+        Remainder {
+            residual,
+            global: self.null.global(&surprises),
+            best,
+        }
+    }
+
+    /// Square of what remains beside causes.
+    pub fn misfit(&self, readings: &DVector<f64>, causes: &[Cause]) -> f64 {
+        let whole = self.residual(readings);
+        let basis = span(causes, self.space.readings());
+        (&whole - &basis * basis.tr_mul(&whole)).norm_squared()
+    }
+
+    /// The best shape of an effect beside other causes, from a start, and the statistic there.
+    pub fn refine(
+        &self,
+        state: &M,
+        readings: &DVector<f64>,
+        effect: usize,
+        start: &Shape,
+        beside: &[Cause],
+    ) -> (Cause, f64) {
+        let whole = self.residual(readings);
+        let basis = span(beside, self.space.readings());
+        let residual = &whole - &basis * basis.tr_mul(&whole);
+        let model = &self.catalogue[effect];
+        let amplitudes = model.amplitudes();
+        let positive = amplitudes.len() == 1 && amplitudes[0].low >= 0.0;
+        let value = |shape: &Shape| {
+            let projected = self.space.forward_columns(&model.columns(state, shape)).0;
+            let clear = &projected - &basis * basis.tr_mul(&projected);
+            let gram = clear.tr_mul(&clear);
+            let score = clear.tr_mul(&residual);
+            (statistic(&gram, &score, positive), gram, score)
+        };
+        let mut shape = start.clone();
+        if shape.steps.iter().any(|s| *s != 0.0) {
+            let (values, _) = compass(&start.values, &start.steps, 5e-3, |values| {
+                let trial = Shape {
+                    values: values.to_vec(),
+                    ..start.clone()
+                };
+                if model.allowed(state, &trial) {
+                    -value(&trial).0
+                } else {
+                    f64::INFINITY
+                }
+            });
+            shape.values = values;
+        }
+        let (mut t, mut gram, mut score) = value(&shape);
+        for _ in 0..8 {
+            let Some(amplitude) = gram.clone().cholesky().map(|c| c.solve(&score)) else {
+                break;
+            };
+            let Some(next) = model.settled(&shape, amplitude.as_slice()) else {
+                break;
+            };
+            if next.values == shape.values {
+                break;
+            }
+            shape = next;
+            (t, gram, score) = value(&shape);
+        }
+        (self.cause(state, effect, shape), t)
+    }
+
+    /// The start of an effect's search beside other causes: the best entry of its family.
+    pub fn start(&self, remainder: &Remainder, effect: usize) -> Option<&Shape> {
+        let family = self.family_of(effect)?;
+        let entry = remainder.best[family].1?;
+        match &self.dictionary.entries[entry].meaning {
+            Meaning::Effect(shape) => Some(shape),
+            Meaning::Place(_) => None,
+        }
+    }
+
+    /// The family of an effect.
+    pub fn family_of(&self, effect: usize) -> Option<usize> {
+        let name = self.catalogue[effect].name();
+        self.dictionary
+            .families
+            .iter()
+            .position(|f| f.is_effect && f.name == name)
+    }
+
+    /// Tail probability of an effect's greatest score.
+    pub fn p_value(&self, remainder: &Remainder, effect: usize) -> f64 {
+        self.family_of(effect)
+            .map_or(1.0, |f| self.null.family(f, remainder.best[f].0))
+    }
+
+    /// Amplitudes of causes fitted together, with their covariance.
+    pub fn amplitudes(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let stacked = stack(causes, self.space.readings());
+        let covariance = stacked.tr_mul(&stacked).cholesky()?.inverse();
+        let score = stacked.tr_mul(&self.residual(readings));
+        Some((&covariance * score, covariance))
+    }
+
+    /// The readings' change by causes at given amplitudes.
+    pub fn change(&self, causes: &[Cause], amplitudes: &DVector<f64>) -> DVector<f64> {
+        let mut change = DVector::zeros(self.space.readings());
+        let mut at = 0;
+        for cause in causes {
+            for column in &cause.columns {
+                for (&row, value) in column.rows.iter().zip(&column.values) {
+                    change[row] += amplitudes[at] * value;
+                }
+                at += 1;
+            }
+        }
+        change
+    }
+
+    /// Whether amplitudes and shapes lie where the effect is physically possible.
+    pub fn plausible(&self, cause: &Cause, amplitudes: &[f64], stds: &[f64]) -> bool {
+        let effect = &self.catalogue[cause.effect];
+        let inside = effect
+            .amplitudes()
+            .iter()
+            .zip(amplitudes)
+            .zip(stds)
+            .all(|((p, a), u)| *a > p.low - 2.0 * u && *a < p.high + 2.0 * u);
+        inside
+            && effect
+                .shape_parameters()
+                .iter()
+                .zip(&cause.shape.values)
+                .all(|(p, v)| *v >= p.low && *v <= p.high)
+    }
+}
+
+fn overlaps(entry: &Entry, directions: &[DVector<f64>]) -> DMatrix<f64> {
+    let mut overlap = DMatrix::zeros(entry.columns.len(), directions.len());
+    for (j, direction) in directions.iter().enumerate() {
+        overlap.set_column(j, &products(&entry.columns, direction));
+    }
+    overlap
+}
+
+/// The same shape with the steps of a finer search.
+pub(super) fn finer(shape: &Shape) -> Shape {
+    Shape {
+        steps: shape.steps.iter().map(|s| 0.3 * s).collect(),
+        ..shape.clone()
+    }
+}
+
+/// Signatures of several causes side by side.
+pub(super) fn stack(causes: &[Cause], readings: usize) -> DMatrix<f64> {
+    let columns: Vec<DVector<f64>> = causes
+        .iter()
+        .flat_map(|c| c.projected.column_iter().map(|v| v.clone_owned()))
+        .collect();
+    if columns.is_empty() {
+        DMatrix::zeros(readings, 0)
+    } else {
+        DMatrix::from_columns(&columns)
+    }
+}
+
+fn span(causes: &[Cause], readings: usize) -> DMatrix<f64> {
+    let stacked = stack(causes, readings);
+    let sizes: Vec<f64> = stacked.column_iter().map(|c| c.norm()).collect();
+    orthonormal(&stacked, &sizes)
+}
+
+fn as_matrix(vector: &DVector<f64>) -> DMatrix<f64> {
+    DMatrix::from_column_slice(vector.len(), 1, vector.as_slice())
+}
+
+fn column(matrix: DMatrix<f64>) -> DVector<f64> {
+    matrix.column(0).clone_owned()
+}

@@ -1,0 +1,199 @@
+//! What the greatest score of each family does when nothing is there.
+//!
+//! Draws of a standard normal residual, seen through the same projection and the same signatures,
+//! give the law of the greatest score over every shape and place looked at (Westfall and Young's
+//! max-T); the smallest tail probability over the families gives one verdict (min-P). The variance
+//! of the noise is itself an estimate: each draw scales the statistics by a chi-squared factor of
+//! the degrees of freedom behind the parts of the noise that each signature sees.
+
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{ChiSquared, Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::dictionary::{Dictionary, Entry, statistic, surprise};
+use super::noise::NoiseLaw;
+use super::space::Space;
+
+/// Draws handled at once.
+const BATCH: usize = 50;
+
+/// The law of the greatest score of every family, and of the smallest tail probability.
+#[derive(Debug, Clone)]
+pub struct NullLaw {
+    families: Vec<Tail>,
+    smallest: Tail,
+}
+
+/// A sorted sample with an exponential tail fitted to its upper tenth.
+#[derive(Debug, Clone)]
+struct Tail {
+    sorted: Vec<f64>,
+    from: f64,
+    scale: f64,
+}
+
+impl Tail {
+    fn new(mut sample: Vec<f64>) -> Self {
+        sample.sort_by(f64::total_cmp);
+        let start = sample.len() * 9 / 10;
+        let from = sample.get(start).copied().unwrap_or(0.0);
+        let excess: f64 = sample[start..].iter().map(|s| s - from).sum();
+        let scale = (excess / (sample.len() - start).max(1) as f64).max(1e-9);
+        Self {
+            sorted: sample,
+            from,
+            scale,
+        }
+    }
+
+    fn beyond(&self, value: f64) -> f64 {
+        if self.sorted.is_empty() {
+            return 1.0;
+        }
+        if value > self.from {
+            return 0.1 * (-(value - self.from) / self.scale).exp();
+        }
+        let below = self.sorted.partition_point(|s| *s < value);
+        (self.sorted.len() - below) as f64 / self.sorted.len() as f64
+    }
+}
+
+impl NullLaw {
+    /// The law under a space and a dictionary, from a number of draws.
+    pub fn simulate(
+        dictionary: &Dictionary,
+        space: &Space,
+        law: &NoiseLaw,
+        draws: usize,
+        seed: u64,
+    ) -> Self {
+        let batches = draws.div_ceil(BATCH);
+        let all: Vec<Vec<Vec<f64>>> = (0..batches as u64)
+            .into_par_iter()
+            .map(|batch| greatest(dictionary, space, law, seed, batch))
+            .collect();
+        let rows: Vec<Vec<f64>> = all.into_iter().flatten().collect();
+        let families: Vec<Tail> = (0..dictionary.families.len())
+            .map(|family| Tail::new(rows.iter().map(|row| row[family]).collect()))
+            .collect();
+        let mut null = Self {
+            families,
+            smallest: Tail::new(vec![0.0]),
+        };
+        let smallest = rows
+            .iter()
+            .map(|row| -2.0 * null.smallest_of(row).ln())
+            .collect();
+        null.smallest = Tail::new(smallest);
+        null
+    }
+
+    /// Probability that the greatest score of a family would be as great with nothing there.
+    pub fn family(&self, family: usize, surprise: f64) -> f64 {
+        self.families
+            .get(family)
+            .map_or(1.0, |t| t.beyond(surprise))
+    }
+
+    /// The statistic of one degree of freedom whose surprise a family exceeds with a probability.
+    pub fn threshold(&self, family: usize, probability: f64) -> f64 {
+        let (mut low, mut high) = (0.0, 1e3);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if self.family(family, surprise(middle, 1)) > probability {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        high
+    }
+
+    fn smallest_of(&self, surprises: &[f64]) -> f64 {
+        surprises
+            .iter()
+            .enumerate()
+            .map(|(family, s)| self.family(family, *s))
+            .fold(1.0, f64::min)
+            .max(f64::MIN_POSITIVE)
+    }
+
+    /// Probability that any family would stand out as much, from the greatest scores of all.
+    pub fn global(&self, surprises: &[f64]) -> f64 {
+        self.smallest
+            .beyond(-2.0 * self.smallest_of(surprises).ln())
+    }
+}
+
+/// The greatest score of each family in each draw of one batch.
+fn greatest(
+    dictionary: &Dictionary,
+    space: &Space,
+    law: &NoiseLaw,
+    seed: u64,
+    batch: u64,
+) -> Vec<Vec<f64>> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(batch + 1);
+    let draws = DMatrix::from_fn(space.readings(), BATCH, |_, _| {
+        StandardNormal.sample(&mut random)
+    });
+    let adjoint = space.adjoint(draws).transpose();
+    let mut factor = |freedom: f64| -> Vec<f64> {
+        (0..BATCH)
+            .map(|_| match ChiSquared::new(freedom) {
+                Ok(law) if freedom < 1e6 => law.sample(&mut random) / freedom,
+                _ => 1.0,
+            })
+            .collect()
+    };
+    let (rest, shift) = (factor(law.freedom), factor(law.shift_freedom));
+    let mut rows: Vec<Vec<f64>> = vec![vec![0.0; dictionary.families.len()]; BATCH];
+    for (place, family) in dictionary.families.iter().enumerate() {
+        for entry in &dictionary.entries[family.entries.clone()] {
+            let products = batch_products(entry, &adjoint);
+            for (draw, row) in rows.iter_mut().enumerate() {
+                let known =
+                    entry.shift_share * shift[draw] + (1.0 - entry.shift_share) * rest[draw];
+                let t = match products.as_slice() {
+                    [only] if entry.positive && only[draw] <= 0.0 => 0.0,
+                    [only] => only[draw] * only[draw] / entry.gram[(0, 0)].max(f64::MIN_POSITIVE),
+                    several => {
+                        let score =
+                            DVector::from_iterator(several.len(), several.iter().map(|p| p[draw]));
+                        statistic(&entry.gram, &score, entry.positive)
+                    }
+                };
+                row[place] = row[place].max(t / known.max(1e-6));
+            }
+        }
+        // All entries of a family have the same number of columns.
+        let freedom = dictionary.entries[family.entries.clone()]
+            .first()
+            .map_or(1, |e| e.columns.len());
+        for row in &mut rows {
+            row[place] = surprise(row[place], freedom);
+        }
+    }
+    rows
+}
+
+/// Eᵀ a for each draw, one vector a column, from the transposed adjoints.
+fn batch_products(entry: &Entry, adjoint: &DMatrix<f64>) -> Vec<[f64; BATCH]> {
+    let draws = adjoint.as_slice();
+    entry
+        .columns
+        .iter()
+        .map(|column| {
+            let mut sum = [0.0; BATCH];
+            for (&row, &value) in column.rows.iter().zip(&column.values) {
+                for (s, a) in sum.iter_mut().zip(&draws[row * BATCH..(row + 1) * BATCH]) {
+                    *s += value * a;
+                }
+            }
+            sum
+        })
+        .collect()
+}

@@ -1,0 +1,204 @@
+//! A diagnosis that proves itself: sealed effects, and none, are put into the user's own readings
+//! and diagnosed blind.
+//!
+//! The noise of a trial is what the fit left of the user's own traces, dealt out anew among the
+//! traces and with random signs, so that its tails and its correlation are those of the data.
+//! Sizes are drawn so that what the fit cannot absorb is 0.7 to 3 times the noise of one reading.
+
+use std::collections::BTreeMap;
+
+use errsep_models::model::{Effect, FittedModel};
+use nalgebra::DVector;
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::attribute::attribute;
+use super::bench::Bench;
+use super::noise::{NoiseLaw, NoiseSource};
+use super::space::Space;
+use super::{Options, noise_of};
+
+/// Effects of which less than this part is visible are not put in.
+const SHOWN: f64 = 0.01;
+
+/// How often each truth got each answer.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Trials {
+    /// What was put in.
+    pub truths: Vec<String>,
+    /// What was said.
+    pub answers: Vec<String>,
+    /// Counts, truths × answers.
+    pub counts: Vec<Vec<usize>>,
+    /// Trials in which exactly what was put in was named, or nothing where nothing was.
+    pub right: usize,
+    /// Trials in which one effect was named and it was another.
+    pub wrong: usize,
+}
+
+/// Puts sealed effects into a model's readings and diagnoses them blind; one trial in ten holds
+/// none. The causes that were found in the readings are to be taken out of them beforehand.
+pub fn prove<M: FittedModel>(
+    model: &M,
+    catalogue: &[Box<dyn Effect<M>>],
+    options: &Options,
+    trials: usize,
+) -> Trials {
+    let readings = model.linearised();
+    let bench = Bench::new(
+        model,
+        catalogue,
+        noise_of(model, &readings),
+        options.draws,
+        options.seed,
+    );
+    let unit = NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated);
+    let plain = Space::new(model, &unit);
+    let residual = plain.forward_vector(&readings);
+    // The fit has taken a part of the noise with it.
+    let swell = (readings.len() as f64 / plain.degrees_of_freedom().max(1) as f64).sqrt();
+    let fitted = &readings - &residual;
+    let seen: Vec<usize> = (0..catalogue.len())
+        .filter(|k| {
+            bench
+                .family_of(*k)
+                .is_some_and(|f| bench.dictionary.families[f].visible > SHOWN)
+        })
+        .collect();
+    let outcomes: Vec<(String, String)> = (0..trials as u64)
+        .into_par_iter()
+        .map(|trial| {
+            let mut random = ChaCha8Rng::seed_from_u64(options.seed);
+            random.set_stream(trial + 1);
+            let mut sealed = &fitted + dealt(model, &(&residual * swell), &mut random);
+            let mut truth = "none".to_owned();
+            if trial % 10 != 0 && !seen.is_empty() {
+                let effect = seen[random.random_range(0..seen.len())];
+                if let Some(change) = sealed_change(&bench, &plain, effect, &mut random) {
+                    sealed += change;
+                    catalogue[effect].name().clone_into(&mut truth);
+                }
+            }
+            (truth, answer(&bench, &sealed, options))
+        })
+        .collect();
+    count(outcomes)
+}
+
+/// The residuals of the traces, each given to another trace of the same length with a random sign.
+fn dealt<M: FittedModel>(
+    model: &M,
+    residual: &DVector<f64>,
+    random: &mut ChaCha8Rng,
+) -> DVector<f64> {
+    let traces = model.traces();
+    let mut givers: Vec<usize> = (0..traces.len()).collect();
+    givers.shuffle(random);
+    let mut noise = residual.clone();
+    for (trace, giver) in traces.iter().zip(givers) {
+        let from = traces[giver].clone();
+        let giver = if from.len() == trace.len() {
+            from
+        } else {
+            trace.clone()
+        };
+        let sign = if random.random_bool(0.5) { 1.0 } else { -1.0 };
+        noise
+            .rows_mut(trace.start, trace.len())
+            .copy_from(&(sign * residual.rows(giver.start, giver.len())));
+    }
+    noise
+}
+
+/// An effect at a random shape and a size that shows.
+fn sealed_change<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    plain: &Space,
+    effect: usize,
+    random: &mut ChaCha8Rng,
+) -> Option<DVector<f64>> {
+    let description = &bench.catalogue[effect];
+    let grid = description.grid(bench.model);
+    let n = bench.space.readings();
+    for _ in 0..30 {
+        let mut shape = grid.get(random.random_range(0..grid.len().max(1)))?.clone();
+        for (value, step) in shape.values.iter_mut().zip(&shape.steps) {
+            *value += step * (2.0 * random.random::<f64>() - 1.0);
+        }
+        if !description.allowed(bench.model, &shape) {
+            continue;
+        }
+        let mut change = DVector::zeros(n);
+        for column in description.columns(bench.model, &shape) {
+            let positive = description
+                .amplitudes()
+                .first()
+                .is_some_and(|p| p.low >= 0.0);
+            let sign = if positive || random.random_bool(0.5) {
+                1.0
+            } else {
+                -1.0
+            };
+            change += column.dense(n) * sign * (0.5 + random.random::<f64>());
+        }
+        let left = plain.forward_vector(&change).norm() / (n as f64).sqrt();
+        let size = bench.law.sigma() * (0.7 + 2.3 * random.random::<f64>());
+        if left > 0.0 {
+            return Some(change * (size / left));
+        }
+    }
+    None
+}
+
+fn answer<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    options: &Options,
+) -> String {
+    let first = bench.remainder(readings, &[]);
+    if first.global > options.false_alarm {
+        return "none".to_owned();
+    }
+    match attribute(bench, readings, &first) {
+        Some(answer) if answer.complete && answer.groups.iter().all(|g| g.len() == 1) => {
+            let mut names: Vec<&str> = answer
+                .causes
+                .iter()
+                .map(|c| bench.catalogue[c.effect].name())
+                .collect();
+            names.sort_unstable();
+            names.join(" + ")
+        }
+        Some(answer) if answer.complete => "a group".to_owned(),
+        _ => "unknown".to_owned(),
+    }
+}
+
+fn count(outcomes: Vec<(String, String)>) -> Trials {
+    let mut table: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
+    let mut trials = Trials::default();
+    for (truth, answer) in outcomes {
+        trials.right += usize::from(truth == answer);
+        let named = !["none", "unknown", "a group"].contains(&answer.as_str());
+        trials.wrong += usize::from(named && truth != answer);
+        *table.entry(truth).or_default().entry(answer).or_default() += 1;
+    }
+    let mut answers: Vec<String> = table.values().flat_map(|row| row.keys().cloned()).collect();
+    answers.sort();
+    answers.dedup();
+    trials.counts = table
+        .values()
+        .map(|row| {
+            answers
+                .iter()
+                .map(|a| row.get(a).copied().unwrap_or(0))
+                .collect()
+        })
+        .collect();
+    trials.truths = table.into_keys().collect();
+    trials.answers = answers;
+    trials
+}

@@ -1,0 +1,109 @@
+//! Effects of the user's own: a signature in a table.
+
+use std::collections::BTreeMap;
+
+use errsep_models::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use serde::Deserialize;
+
+/// An effect given by its change of the readings over the positions, straight between them and
+/// zero outside, times a weight for each channel.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tabulated {
+    /// Name in the verdict.
+    pub name: String,
+    /// Pairs of position and change of the reading.
+    pub signature: Vec<[f64; 2]>,
+    /// Weight of each channel by its name; absent: 1 for all.
+    #[serde(default)]
+    pub channels: BTreeMap<String, f64>,
+    /// Whether the sign turns with the direction of travel.
+    #[serde(default)]
+    pub turns_with_direction: bool,
+    /// The only repeats in which it is there; absent: all.
+    #[serde(default)]
+    pub repeats: Vec<u32>,
+}
+
+/// The effects of a file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TabulatedEffects {
+    /// One table each.
+    pub effect: Vec<Tabulated>,
+}
+
+impl Tabulated {
+    fn at(&self, x: f64) -> f64 {
+        let right = self.signature.partition_point(|p| p[0] < x);
+        match (
+            right.checked_sub(1).and_then(|k| self.signature.get(k)),
+            self.signature.get(right),
+        ) {
+            (Some(a), Some(b)) => a[1] + (b[1] - a[1]) * (x - a[0]) / (b[0] - a[0]),
+            (None, Some(b)) if b[0] == x => b[1],
+            _ => 0.0,
+        }
+    }
+
+    /// What is wrong with the table, if anything.
+    pub fn fault(&self, channels: &[String]) -> Option<String> {
+        if self.signature.len() < 2 || self.signature.windows(2).any(|w| w[1][0] <= w[0][0]) {
+            return Some(format!(
+                "`{}` needs two or more growing positions",
+                self.name
+            ));
+        }
+        if self.signature.iter().flatten().any(|v| !v.is_finite()) {
+            return Some(format!("`{}` has a number that is not finite", self.name));
+        }
+        let unknown = self.channels.keys().find(|c| !channels.contains(c))?;
+        Some(format!(
+            "`{}` names the channel `{unknown}`, which has no readings",
+            self.name
+        ))
+    }
+}
+
+impl<M: FittedModel> Effect<M> for Tabulated {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn about(&self) -> About {
+        About {
+            physics: "an effect of the user's own",
+            confirm: "repeat the measurement without its cause",
+            source: "a table of its signature",
+        }
+    }
+
+    fn amplitudes(&self) -> Vec<Parameter> {
+        vec![Parameter {
+            name: "size",
+            unit: "1",
+            low: f64::MIN,
+            high: f64::MAX,
+        }]
+    }
+
+    fn columns(&self, model: &M, _shape: &Shape) -> Vec<Column> {
+        let names = model.channel_names();
+        let weights: Vec<f64> = names
+            .iter()
+            .map(|name| {
+                let missing = if self.channels.is_empty() { 1.0 } else { 0.0 };
+                self.channels.get(name).copied().unwrap_or(missing)
+            })
+            .collect();
+        vec![Column::from_places(model.places(), |_, place| {
+            let here = self.repeats.is_empty() || self.repeats.contains(&place.repeat);
+            let sign = if self.turns_with_direction {
+                place.direction
+            } else {
+                1.0
+            };
+            f64::from(u8::from(here)) * sign * weights[place.channel] * self.at(place.x)
+        })]
+    }
+}

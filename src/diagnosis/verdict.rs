@@ -1,0 +1,288 @@
+//! What the diagnosis says.
+
+use errsep_models::model::Estimate;
+use serde::Serialize;
+
+use super::localise::Item;
+use super::noise::NoiseLaw;
+
+/// The kind of verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Nothing stands out of the noise.
+    None,
+    /// One or several effects of the catalogue explain the gap.
+    Effect,
+    /// There is a gap that no effect of the catalogue explains.
+    Unknown,
+}
+
+/// The verdict.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// Its kind.
+    pub kind: Kind,
+    /// The effects, by what each adds.
+    pub effects: Vec<String>,
+    /// Groups of effects that these data cannot tell apart, the named one first.
+    pub indistinguishable: Vec<Vec<String>>,
+    /// Effects that explain a part of an unknown gap.
+    pub partial: Vec<String>,
+    /// One sentence for a person.
+    pub statement: String,
+    /// Probability of as much standing out with nothing there.
+    pub p_value: f64,
+    /// Probability of what remains.
+    pub adequacy: f64,
+}
+
+/// A root mean square with its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Size {
+    /// The value.
+    pub rms: f64,
+    /// Its 95 % interval.
+    pub ci95: [f64; 2],
+}
+
+/// Held-out repeats: found and fitted on some, the gap measured on the others.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// Before the effects are added.
+    pub before: f64,
+    /// After.
+    pub after: f64,
+    /// 1 − after / before.
+    pub shrink: f64,
+    /// What a perfect model would still show, fitted on that many readings.
+    pub floor: f64,
+}
+
+/// The gap between model and readings, in the unit of the readings.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gap {
+    /// Unit of the readings.
+    pub unit: &'static str,
+    /// Standard deviation of one reading.
+    pub noise: f64,
+    /// What the model misses.
+    pub before: Size,
+    /// What it still misses with the effects.
+    pub after: Size,
+    /// 1 − after / before.
+    pub shrink: f64,
+    /// `after / before` predicted by the score before refitting, as a shrink.
+    pub predicted_shrink: f64,
+    /// On repeats that were not used, where there are enough.
+    pub held_out: Option<HeldOut>,
+}
+
+/// A place where the gap lies.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Where {
+    /// The place.
+    pub axis: &'static str,
+    /// Which channel, pattern, direction …
+    pub value: String,
+    /// Where it begins.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from: Option<f64>,
+    /// Where it ends.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub to: Option<f64>,
+    /// Part of the gap that it explains.
+    pub share: f64,
+    /// 95 % interval of the share.
+    pub share_ci95: [f64; 2],
+    /// Corrected for every place looked at.
+    pub p_value: f64,
+}
+
+impl Where {
+    pub(super) fn new(item: &Item, share: f64, share_ci95: [f64; 2], p_value: f64) -> Self {
+        Self {
+            axis: item.axis,
+            value: item.value.clone(),
+            from: item.from,
+            to: item.to,
+            share,
+            share_ci95,
+            p_value,
+        }
+    }
+}
+
+/// One effect of the catalogue against these readings.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Candidate {
+    /// Its name.
+    pub effect: String,
+    /// Part of the gap that it alone explains.
+    pub explained: f64,
+    /// Corrected for every shape tried.
+    pub p_value: f64,
+    /// Log Bayes factor against no effect (Schwarz's approximation).
+    pub evidence: f64,
+    /// Part of the effect that the fit cannot absorb.
+    pub visible: f64,
+    /// Whether it is in the confidence set.
+    pub in_set: bool,
+    /// Variant in words, where it has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variant: Option<String>,
+    /// Its parameters.
+    pub parameters: Vec<ParameterOut>,
+    /// What happens physically.
+    pub physics: String,
+    /// What would confirm it.
+    pub confirm: String,
+}
+
+/// A parameter of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParameterOut {
+    /// Name.
+    pub name: String,
+    /// Value.
+    pub value: f64,
+    /// Standard uncertainty.
+    pub std: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+impl From<Estimate> for ParameterOut {
+    fn from(estimate: Estimate) -> Self {
+        Self {
+            name: estimate.name,
+            value: estimate.value,
+            std: estimate.std,
+            unit: estimate.unit,
+        }
+    }
+}
+
+/// How far a quantity moves when the effects are added.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Bias {
+    /// The quantity; a profile is given by its root mean square.
+    pub quantity: String,
+    /// Without the effects.
+    pub before: f64,
+    /// With them.
+    pub after: f64,
+    /// Root mean square of the difference of profiles, or the difference.
+    pub moved: f64,
+    /// Standard uncertainty of a value.
+    pub std: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// An effect that these readings show badly or not at all.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hidden {
+    /// Its name.
+    pub effect: String,
+    /// Part of the effect that the fit cannot absorb.
+    pub visible: f64,
+    /// Smallest amplitude that would be seen with 80 % probability.
+    pub detectable: Option<f64>,
+    /// Unit of that amplitude.
+    pub unit: String,
+    /// The quantity it biases most, per unit of its amplitude.
+    pub harm: Option<Harm>,
+}
+
+/// What an unseen effect does to a quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Harm {
+    /// The quantity.
+    pub quantity: String,
+    /// Bias per unit of the effect's amplitude.
+    pub per_unit: f64,
+    /// Unit of the quantity.
+    pub unit: String,
+}
+
+/// The whole diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// `errsep.diagnosis/1`.
+    pub schema: &'static str,
+    /// The model.
+    pub model: &'static str,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// How great the gap is.
+    pub gap: Gap,
+    /// The noise.
+    pub noise: NoiseOut,
+    /// Where the gap lies.
+    #[serde(rename = "where")]
+    pub places: Vec<Where>,
+    /// The effects, by what they explain.
+    pub candidates: Vec<Candidate>,
+    /// How far the quantities move.
+    pub bias: Vec<Bias>,
+    /// What could still hide.
+    pub hidden: Vec<Hidden>,
+    /// What the reader should know.
+    pub notes: Vec<String>,
+    /// For plots: what is left of every reading, and the profiles.
+    #[serde(skip)]
+    pub detail: Detail,
+}
+
+/// What is left of every reading, and the profiles, without and with the effects.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Detail {
+    /// Least-squares residuals without the effects.
+    pub before: Vec<f64>,
+    /// With them.
+    pub after: Vec<f64>,
+    /// Name, values without and values with the effects.
+    pub profiles: Vec<(String, Vec<f64>, Vec<f64>)>,
+    /// What the effects change in every reading.
+    pub change: Vec<f64>,
+}
+
+impl Detail {
+    /// What the effects change in every reading.
+    pub fn change(&self) -> nalgebra::DVector<f64> {
+        nalgebra::DVector::from_column_slice(&self.change)
+    }
+}
+
+/// The noise, as reported.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NoiseOut {
+    /// Standard deviation of the white part.
+    pub white: f64,
+    /// Of the part correlated along a trace.
+    pub correlated: f64,
+    /// Its correlation length, mm.
+    pub length: f64,
+    /// Of the shift of a whole trace.
+    pub shift: f64,
+    /// `repeats`, `stated` or `neighbours`.
+    pub source: &'static str,
+}
+
+impl From<&NoiseLaw> for NoiseOut {
+    fn from(law: &NoiseLaw) -> Self {
+        use super::noise::NoiseSource;
+        Self {
+            white: law.white.sqrt(),
+            correlated: law.correlated.sqrt(),
+            length: law.length,
+            shift: law.shift.sqrt(),
+            source: match law.source {
+                NoiseSource::Repeats => "repeats",
+                NoiseSource::Stated => "stated",
+                NoiseSource::Neighbours => "neighbours",
+            },
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! Readings of diagonal and step-diagonal tests and their set-up.
+
+use std::path::Path;
+
+use errsep_models::diagonal::{Component, Diagonal, DiagonalReading, Sequence, Target, WorkZone};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::message::list;
+use super::{Message, SetupFile, TableReader};
+
+/// The set-up of a step-diagonal test.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DiagonalSetup {
+    /// The instrument.
+    #[serde(default)]
+    pub test: TestSetup,
+    /// What is taken from elsewhere.
+    #[serde(default)]
+    pub assume: AssumeSetup,
+    /// Positioning slopes measured by other means.
+    #[serde(default)]
+    pub measured: Vec<MeasuredSetup>,
+}
+
+/// `[test]`.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TestSetup {
+    /// `mirror` or `retro-reflector`, for data without the column.
+    pub target: Option<Target>,
+    /// Standard deviation of one reading, µm.
+    pub noise: Option<f64>,
+}
+
+/// `[assume]`.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AssumeSetup {
+    /// ISO 230-1 names of errors taken as zero.
+    #[serde(default)]
+    pub zero: Vec<Spanned<String>>,
+}
+
+/// `[[measured]]`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeasuredSetup {
+    /// Axis.
+    pub axis: errsep_models::diagonal::Axis,
+    /// Positioning slope by end points, µm/mm.
+    pub slope: f64,
+    /// Its standard uncertainty, µm/mm.
+    pub std: f64,
+}
+
+impl DiagonalSetup {
+    /// Reads the set-up and the errors it takes as zero.
+    ///
+    /// # Errors
+    /// Those of [`SetupFile`]; a name that is no error function.
+    pub fn read(path: &Path) -> Result<(Self, Vec<Component>), Message> {
+        let file = SetupFile::read(path)?;
+        let setup: Self = file.parse()?;
+        let mut zero = Vec::new();
+        for name in &setup.assume.zero {
+            zero.push(Component::from_name(name.get_ref()).ok_or_else(|| {
+                let known: Vec<String> = Component::all().map(Component::name).collect();
+                file.bad(
+                    name.span(),
+                    format!("`{}` is no error function", name.get_ref()),
+                    format!("write one of {}", known.join(", ")),
+                )
+            })?);
+        }
+        Ok((setup, zero))
+    }
+}
+
+/// Reads the readings: columns `diagonal`, `sequence`, `x`, `y`, `reading`, and where they apply `z`,
+/// `repeat` and `target`; the work zone is the box that the positions fill.
+///
+/// # Errors
+/// The table cannot be read, a name is unknown, or the positions make no grid.
+pub fn read_readings(
+    path: &Path,
+    target: Option<Target>,
+) -> Result<(WorkZone, Vec<DiagonalReading>), Message> {
+    let mut table = TableReader::open(path)?;
+    table.only(&[
+        "diagonal", "sequence", "target", "repeat", "x", "y", "z", "reading",
+    ])?;
+    let diagonal = table.column("diagonal")?;
+    let sequence = table.column("sequence")?;
+    let (x, y) = (table.column("x")?, table.column("y")?);
+    let reading = table.column("reading")?;
+    let (z, repeat) = (table.optional("z"), table.optional("repeat"));
+    let own_target = table.optional("target");
+    let mut rows = Vec::new();
+    while let Some(row) = table.next_row()? {
+        let unknown = |column, what: &str, known: &[&str]| {
+            row.error(
+                column,
+                format!("{what} \"{}\" is not known", row.text(column)),
+            )
+            .remedy(format!("write one of {}", list(known)))
+        };
+        let along = Diagonal::from_name(row.text(&diagonal))
+            .ok_or_else(|| unknown(&diagonal, "diagonal", &Diagonal::ALL.map(Diagonal::name)))?;
+        let order = Sequence::from_name(row.text(&sequence)).ok_or_else(|| {
+            unknown(
+                &sequence,
+                "sequence",
+                &[
+                    "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "XY", "YX", "together",
+                ],
+            )
+        })?;
+        let on_tool = match &own_target {
+            Some(column) => match row.text(column) {
+                "mirror" => Target::Mirror,
+                "retro-reflector" => Target::RetroReflector,
+                _ => return Err(unknown(column, "target", &["mirror", "retro-reflector"])),
+            },
+            None => target.unwrap_or(Target::Mirror),
+        };
+        let position = [
+            row.number(&x)?,
+            row.number(&y)?,
+            z.as_ref().map_or(Ok(0.0), |z| row.number(z))?,
+        ];
+        let number = repeat.as_ref().map_or(Ok(1), |c| row.count(c))?;
+        let value = row.number(&reading)?;
+        rows.push((row.line(), position, along, on_tool, order, number, value));
+    }
+    if rows.is_empty() {
+        return Err(table.no_rows());
+    }
+    let mut travel = [0.0; 3];
+    let mut least = [0.0; 3];
+    let mut steps = 0;
+    for a in 0..3 {
+        let mut stops: Vec<f64> = rows.iter().map(|r| r.1[a]).collect();
+        stops.sort_by(f64::total_cmp);
+        let (low, high) = (
+            stops.first().copied().unwrap_or(0.0),
+            stops.last().copied().unwrap_or(0.0),
+        );
+        stops.dedup_by(|a, b| (*a - *b).abs() <= 1e-6 * (high - low));
+        travel[a] = high - low;
+        least[a] = low;
+        steps = steps.max(stops.len() - 1);
+    }
+    let zone = WorkZone { travel, steps };
+    let mut readings = Vec::with_capacity(rows.len());
+    for (line, position, diagonal, target, sequence, repeat, value) in rows {
+        let mut at = [0; 3];
+        for a in 0..3 {
+            if travel[a] > 0.0 {
+                let place = (position[a] - least[a]) / travel[a] * steps as f64;
+                if (place - place.round()).abs() > 1e-3 {
+                    let axis = ["x", "y", "z"][a];
+                    return Err(table
+                        .at_line(
+                            line,
+                            format!(
+                                "{axis} = {} mm is no stop of a grid of {steps} even steps",
+                                position[a]
+                            ),
+                        )
+                        .remedy("use the same number of even steps on every axis"));
+                }
+                at[a] = place.round() as usize;
+            }
+        }
+        readings.push(DiagonalReading {
+            diagonal,
+            target,
+            sequence,
+            repeat,
+            at,
+            value,
+        });
+    }
+    Ok((zone, readings))
+}

@@ -1,0 +1,162 @@
+//! How a table is written: byte-order mark, line ends, delimiter, decimal mark. Detected, and said.
+
+use std::fmt;
+
+/// How lines end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LineEnd {
+    /// `\n`
+    Lf,
+    /// `\r\n`
+    CrLf,
+    /// `\r` alone.
+    Cr,
+}
+
+/// What separates the fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Delimiter {
+    /// `,`
+    Comma,
+    /// `;`
+    Semicolon,
+    /// A tab.
+    Tab,
+}
+
+impl Delimiter {
+    /// The byte in the file.
+    pub const fn byte(self) -> u8 {
+        match self {
+            Self::Comma => b',',
+            Self::Semicolon => b';',
+            Self::Tab => b'\t',
+        }
+    }
+}
+
+/// What separates the whole part of a number from its fraction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Decimal {
+    /// `1.5`
+    Point,
+    /// `1,5`
+    Comma,
+    /// No number with a fraction was seen yet; the first one decides.
+    Undecided,
+}
+
+/// How a table is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Dialect {
+    /// The file begins with a UTF-8 byte-order mark.
+    pub byte_order_mark: bool,
+    /// Line ends.
+    pub line_end: LineEnd,
+    /// Field delimiter.
+    pub delimiter: Delimiter,
+    /// Decimal mark.
+    pub decimal: Decimal,
+}
+
+impl fmt::Display for Dialect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let delimiter = match self.delimiter {
+            Delimiter::Comma => "comma",
+            Delimiter::Semicolon => "semicolon",
+            Delimiter::Tab => "tab",
+        };
+        let decimal = match self.decimal {
+            Decimal::Comma => "decimal comma",
+            Decimal::Point | Decimal::Undecided => "decimal point",
+        };
+        let line_end = match self.line_end {
+            LineEnd::Lf => "LF",
+            LineEnd::CrLf => "CRLF",
+            LineEnd::Cr => "CR",
+        };
+        let mark = if self.byte_order_mark {
+            " with byte-order mark"
+        } else {
+            ""
+        };
+        write!(
+            f,
+            "UTF-8{mark}, {line_end} line ends, fields separated by {delimiter}, {decimal}"
+        )
+    }
+}
+
+pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
+/// Why the beginning of a file is not that of a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum NotATable {
+    Empty,
+    Utf16,
+    Binary { offset: usize, byte: u8 },
+}
+
+impl Dialect {
+    /// Reads the dialect off the beginning of a file (`whole`: it is all of the file).
+    pub(super) fn detect(head: &[u8], whole: bool) -> Result<Self, NotATable> {
+        if head.starts_with(b"\xFF\xFE") || head.starts_with(b"\xFE\xFF") {
+            return Err(NotATable::Utf16);
+        }
+        if let Some(offset) = head.iter().position(|&b| is_binary(b)) {
+            return Err(NotATable::Binary {
+                offset,
+                byte: head[offset],
+            });
+        }
+        if let Err(e) = std::str::from_utf8(head) {
+            // A character may be cut at the end of the head, not at the end of the file.
+            if whole || e.error_len().is_some() {
+                let offset = e.valid_up_to();
+                return Err(NotATable::Binary {
+                    offset,
+                    byte: head[offset],
+                });
+            }
+        }
+        let byte_order_mark = head.starts_with(BYTE_ORDER_MARK);
+        let text = if byte_order_mark { &head[3..] } else { head };
+        let line_end = match text.iter().position(|&b| b == b'\n' || b == b'\r') {
+            Some(i) if text[i] == b'\r' && text.get(i + 1) == Some(&b'\n') => LineEnd::CrLf,
+            Some(i) if text[i] == b'\r' && !text.contains(&b'\n') => LineEnd::Cr,
+            _ => LineEnd::Lf,
+        };
+        let mut lines = text
+            .split(|&b| b == b'\n' || b == b'\r')
+            .filter(|line| !is_skipped(line));
+        let header = lines.next().ok_or(NotATable::Empty)?;
+        let delimiter = if header.contains(&b'\t') {
+            Delimiter::Tab
+        } else if header.contains(&b';') {
+            Delimiter::Semicolon
+        } else {
+            Delimiter::Comma
+        };
+        let decimal = if delimiter == Delimiter::Comma {
+            Decimal::Point
+        } else {
+            Decimal::Undecided
+        };
+        Ok(Self {
+            byte_order_mark,
+            line_end,
+            delimiter,
+            decimal,
+        })
+    }
+}
+
+/// A control character that no text file holds.
+const fn is_binary(byte: u8) -> bool {
+    byte < b' ' && !matches!(byte, b'\t' | b'\n' | b'\r' | 0x0C | 0x1A)
+}
+
+/// Blank lines and comments.
+pub(super) fn is_skipped(line: &[u8]) -> bool {
+    matches!(line.trim_ascii().first(), None | Some(b'#'))
+}

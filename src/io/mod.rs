@@ -1,0 +1,21 @@
+//! The edge of the program: files in, files out, units and messages.
+
+pub mod circle;
+pub mod diagonal;
+pub mod dialect;
+pub mod fourier;
+pub mod machine;
+pub mod message;
+pub mod output;
+pub mod parts;
+pub mod provenance;
+pub mod replicates;
+pub mod reversal;
+pub mod setup;
+pub mod table;
+pub mod units;
+
+pub use message::{Message, Status};
+pub use output::{CsvTable, OutFolder};
+pub use setup::SetupFile;
+pub use table::{Column, Row, TableReader};

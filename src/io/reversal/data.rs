@@ -1,0 +1,314 @@
+//! Reading the readings of a reversal: tidy (one row a reading) or wide (one column a channel).
+
+use std::path::Path;
+
+use errsep_models::reversal::{Channel, Direction, Observations, Reading};
+
+use super::columns::{ColumnMap, ROLES};
+use crate::io::dialect::Dialect;
+use crate::io::message::{Place, list, nearest};
+use crate::io::units::LengthUnit;
+use crate::io::{Column, Message, Row, TableReader};
+
+/// How the readings are laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layout {
+    /// One row a reading, with the columns `channel` and `reading`.
+    Tidy,
+    /// One row a position, with a column for each channel.
+    Wide,
+}
+
+/// The readings of a file and what was found out about it.
+#[derive(Debug, Clone)]
+pub struct ReversalData {
+    /// The readings, in the order of the file.
+    pub observations: Observations,
+    /// How the file is written.
+    pub dialect: Dialect,
+    /// How the readings are laid out.
+    pub layout: Layout,
+    /// Columns that were not read (only where columns were renamed).
+    pub ignored: Vec<String>,
+    /// Empty fields of a wide table: positions at which a channel was not read.
+    pub gaps: usize,
+    first: [Option<Place>; 4],
+}
+
+impl ReversalData {
+    /// The channels that have no reading.
+    pub fn missing(&self) -> Vec<Channel> {
+        Channel::ALL
+            .into_iter()
+            .filter(|c| self.first[c.index()].is_none())
+            .collect()
+    }
+
+    /// Where the first reading of a channel stands.
+    pub fn first_reading(&self, channel: &str) -> Option<&Place> {
+        self.first[Channel::from_name(channel)?.index()].as_ref()
+    }
+
+    /// How the file was read, in words.
+    pub fn in_words(&self) -> String {
+        let layout = match self.layout {
+            Layout::Tidy => "one row a reading",
+            Layout::Wide => "one column a channel",
+        };
+        let mut text = format!("{}; {layout}", self.dialect);
+        if self.gaps > 0 {
+            text += &format!("; {} empty fields taken as positions not read", self.gaps);
+        }
+        if !self.ignored.is_empty() {
+            text += &format!("; columns not read: {}", self.ignored.join(", "));
+        }
+        text
+    }
+}
+
+struct Scales {
+    x_mm: f64,
+    /// µm in the unit of each channel's readings.
+    reading_um: [f64; 4],
+}
+
+struct Columns {
+    x: Column,
+    repeat: Option<Column>,
+    direction: Option<Column>,
+    time: Option<Column>,
+    readings: Readings,
+    scales: Scales,
+}
+
+enum Readings {
+    Tidy { channel: Column, reading: Column },
+    Wide(Vec<(Channel, Column)>),
+}
+
+/// Reads the readings of a reversal.
+///
+/// # Errors
+/// The file is no table, a column is unknown or missing, a field is not what its column holds, a
+/// reading is there twice, a channel's column is empty.
+pub fn read(path: &Path, map: &ColumnMap) -> Result<ReversalData, Message> {
+    let mut table = TableReader::open(path)?;
+    let columns = find_columns(&table, map)?;
+    let mut data = ReversalData {
+        observations: Observations::default(),
+        dialect: table.dialect(),
+        layout: match columns.readings {
+            Readings::Tidy { .. } => Layout::Tidy,
+            Readings::Wide(_) => Layout::Wide,
+        },
+        ignored: ignored(&table, map),
+        gaps: 0,
+        first: [const { None }; 4],
+    };
+    let mut lines: Vec<u32> = Vec::new();
+    let mut rows = 0_usize;
+    while let Some(row) = table.next_row()? {
+        rows += 1;
+        let before = data.observations.readings.len();
+        read_row(row, &columns, &mut data)?;
+        let line = u32::try_from(row.line()).unwrap_or(u32::MAX);
+        lines.extend((before..data.observations.readings.len()).map(|_| line));
+    }
+    if rows == 0 {
+        return Err(table.no_rows());
+    }
+    if let Readings::Wide(channels) = &columns.readings
+        && let Some((channel, column)) = channels
+            .iter()
+            .find(|(c, _)| data.first[c.index()].is_none())
+    {
+        return Err(table
+            .at_column(
+                column,
+                format!("channel {} has a column but no reading", channel.name()),
+            )
+            .remedy("fill the column, or remove it: the rest is then solved as far as it goes"));
+    }
+    refuse_duplicates(&table, &data.observations.readings, &lines)?;
+    data.dialect = table.dialect();
+    Ok(data)
+}
+
+fn find_columns(table: &TableReader, map: &ColumnMap) -> Result<Columns, Message> {
+    if map.is_empty() {
+        table.only(&ROLES)?;
+    }
+    let optional = |role: &str| map.column(role).and_then(|name| table.optional(name));
+    let needed = |role: &str| table.column(map.column(role).unwrap_or(role));
+    let mapped = |role: &str| !map.is_empty() && map.column(role).is_some();
+    let tidy = ["channel", "reading"]
+        .iter()
+        .any(|role| optional(role).is_some() || mapped(role));
+    let mut wide = Vec::new();
+    for channel in Channel::ALL {
+        if mapped(channel.name()) {
+            wide.push((channel, needed(channel.name())?));
+        } else if let Some(column) = optional(channel.name()) {
+            wide.push((channel, column));
+        }
+    }
+    let readings = match (tidy, wide.first()) {
+        (true, Some((channel, column))) => {
+            return Err(table
+                .at_column(
+                    column,
+                    format!(
+                        "column {} beside `channel` or `reading`: one row a reading, or one column a channel?",
+                        channel.name()
+                    ),
+                )
+                .remedy("keep channel,x,reading or x,1A,1B,2A,2B, not both"));
+        }
+        (false, Some(_)) => Readings::Wide(wide),
+        (_, None) => Readings::Tidy {
+            channel: needed("channel")?,
+            reading: needed("reading")?,
+        },
+    };
+    let reading_unit = |role: &str| map.unit(role).unwrap_or(LengthUnit::Um).in_um();
+    Ok(Columns {
+        x: needed("x")?,
+        repeat: optional("repeat"),
+        direction: optional("direction"),
+        time: optional("time"),
+        scales: Scales {
+            x_mm: map.unit("x").unwrap_or(LengthUnit::Mm).in_mm(),
+            reading_um: match readings {
+                Readings::Tidy { .. } => [reading_unit("reading"); 4],
+                Readings::Wide(_) => Channel::ALL.map(|c| reading_unit(c.name())),
+            },
+        },
+        readings,
+    })
+}
+
+fn ignored(table: &TableReader, map: &ColumnMap) -> Vec<String> {
+    if map.is_empty() {
+        return Vec::new();
+    }
+    let read = ROLES
+        .iter()
+        .filter_map(|role| map.column(role))
+        .collect::<Vec<_>>();
+    table
+        .names()
+        .filter(|name| !read.contains(name))
+        .map(str::to_owned)
+        .collect()
+}
+
+fn read_row(row: Row<'_>, columns: &Columns, data: &mut ReversalData) -> Result<(), Message> {
+    let x = row.number(&columns.x)? * columns.scales.x_mm;
+    let repeat = match &columns.repeat {
+        Some(column) => row.count(column)?,
+        None => 1,
+    };
+    let direction = match &columns.direction {
+        Some(column) => direction(row, column)?,
+        None => Direction::Forward,
+    };
+    let time = match &columns.time {
+        Some(column) => Some(row.number(column)?),
+        None => None,
+    };
+    let mut add = |channel: Channel, column: &Column| -> Result<(), Message> {
+        let value = row.number(column)? * columns.scales.reading_um[channel.index()];
+        data.first[channel.index()].get_or_insert_with(|| row.place(column));
+        data.observations.readings.push(Reading {
+            channel,
+            repeat,
+            direction,
+            time,
+            x,
+            value,
+        });
+        Ok(())
+    };
+    match &columns.readings {
+        Readings::Tidy { channel, reading } => add(channel_of(row, channel)?, reading),
+        Readings::Wide(channels) => {
+            for (channel, column) in channels {
+                if row.text(column).is_empty() {
+                    data.gaps += 1;
+                } else {
+                    add(*channel, column)?;
+                }
+            }
+            Ok(())
+        }
+    }
+}
+
+fn channel_of(row: Row<'_>, column: &Column) -> Result<Channel, Message> {
+    let text = row.text(column);
+    let names = Channel::ALL.map(Channel::name);
+    Channel::from_name(text).ok_or_else(|| {
+        if text.is_empty() {
+            return row
+                .error(column, "channel is missing: the field is empty")
+                .remedy(format!("write {}", list(&names)));
+        }
+        let remedy = match nearest(text, names) {
+            Some(near) if near.eq_ignore_ascii_case(text) => format!("write `{near}`"),
+            _ => format!(
+                "write {}: position 1 is 0°, 2 is 180°; A is the side that the near indicator sees at 0°",
+                list(&names)
+            ),
+        };
+        row.error(column, format!("unknown channel `{text}`"))
+            .remedy(remedy)
+    })
+}
+
+fn direction(row: Row<'_>, column: &Column) -> Result<Direction, Message> {
+    match row.text(column) {
+        "forward" => Ok(Direction::Forward),
+        "backward" => Ok(Direction::Backward),
+        other => Err(row
+            .error(column, format!("unknown direction `{other}`"))
+            .remedy("write forward (towards greater x) or backward")),
+    }
+}
+
+/// Two readings of the same channel, repeat, direction, time and position are one too many.
+fn refuse_duplicates(
+    table: &TableReader,
+    readings: &[Reading],
+    lines: &[u32],
+) -> Result<(), Message> {
+    let mut order = (0..u32::try_from(readings.len()).unwrap_or(u32::MAX)).collect::<Vec<_>>();
+    let compare = |a: &Reading, b: &Reading| {
+        a.channel
+            .cmp(&b.channel)
+            .then(a.repeat.cmp(&b.repeat))
+            .then(a.direction.cmp(&b.direction))
+            .then(a.x.total_cmp(&b.x))
+            .then(a.time.unwrap_or(0.0).total_cmp(&b.time.unwrap_or(0.0)))
+    };
+    order.sort_by(|&a, &b| compare(&readings[a as usize], &readings[b as usize]));
+    let twice = order
+        .windows(2)
+        .filter(|w| compare(&readings[w[0] as usize], &readings[w[1] as usize]).is_eq())
+        .map(|w| (w[0].max(w[1]) as usize, w[0].min(w[1]) as usize))
+        .min();
+    let Some((later, earlier)) = twice else {
+        return Ok(());
+    };
+    let r = &readings[later];
+    Err(table
+        .at_line(
+            lines[later] as usize,
+            format!(
+                "channel {} at x = {} mm was read in line {} already",
+                r.channel.name(),
+                r.x,
+                lines[earlier]
+            ),
+        )
+        .remedy("remove one of the two, or number repeats in a column `repeat`"))
+}

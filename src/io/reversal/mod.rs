@@ -1,0 +1,9 @@
+//! Readings and set-up of a reversal, as files hold them.
+
+mod columns;
+mod data;
+mod setup;
+
+pub use columns::ColumnMap;
+pub use data::{Layout, ReversalData, read};
+pub use setup::ReversalSetup;

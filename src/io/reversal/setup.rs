@@ -1,0 +1,151 @@
+//! The set-up of a reversal.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use errsep_models::reversal::Convention;
+use errsep_models::reversal::staged::Interpolation;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::ColumnMap;
+use crate::io::{Message, SetupFile};
+
+/// What is known beside the readings.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ReversalSetup {
+    /// Thickness (diameter) of the artefact, mm.
+    pub thickness: Option<f64>,
+    /// Whether the thickness is to be fitted by the simultaneous solution, from that value.
+    pub fit_thickness: bool,
+    /// Standard deviation of one reading, µm.
+    pub noise: Option<f64>,
+    /// How the slopes are read.
+    pub convention: Convention,
+    /// How rotated traces are brought back to the grid.
+    pub interpolation: Interpolation,
+    /// Cells between the knots of each form; absent: chosen from the data.
+    pub knots: Option<usize>,
+    /// Names and units of the columns.
+    pub columns: ColumnMap,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct File {
+    artefact: Artefact,
+    indicator: Indicator,
+    model: Model,
+    columns: BTreeMap<Spanned<String>, Spanned<String>>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct Artefact {
+    thickness: Option<Spanned<f64>>,
+    fit_thickness: bool,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct Indicator {
+    noise: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct Model {
+    convention: Convention,
+    interpolation: Interpolation,
+    knots: Option<Spanned<u32>>,
+}
+
+/// A thicker artefact is a slip of the unit, mm.
+const THICKEST: f64 = 1e5;
+
+impl ReversalSetup {
+    /// Reads a set-up.
+    ///
+    /// # Errors
+    /// No TOML, an unknown key (the nearest known one is named), a value that cannot be.
+    pub fn read(path: &Path) -> Result<Self, Message> {
+        let setup = SetupFile::read(path)?;
+        let file: File = setup.parse()?;
+        if let Some(d) = &file.artefact.thickness
+            && !(0.0..=THICKEST).contains(d.as_ref())
+        {
+            return Err(setup.bad(
+                d.span(),
+                format!("a thickness of {} mm cannot be", d.as_ref()),
+                "give the diameter of the artefact in mm, or leave it out",
+            ));
+        }
+        if let Some(s) = &file.indicator.noise
+            && !(*s.as_ref() > 0.0 && s.as_ref().is_finite())
+        {
+            return Err(setup.bad(
+                s.span(),
+                format!("a noise of {} um cannot be", s.as_ref()),
+                "give the standard deviation of one reading in um, or leave it out to have it estimated",
+            ));
+        }
+        if let Some(n) = &file.model.knots
+            && *n.as_ref() == 0
+        {
+            return Err(setup.bad(
+                n.span(),
+                "0 knots carry no form",
+                "give 1 or more cells, or leave it out to have their number chosen",
+            ));
+        }
+        let mut columns = ColumnMap::default();
+        for (role, column) in &file.columns {
+            columns
+                .add(role.as_ref(), column.as_ref())
+                .map_err(|(what, remedy)| setup.bad(role.span(), what, remedy))?;
+        }
+        Ok(Self {
+            thickness: file.artefact.thickness.map(Spanned::into_inner),
+            fit_thickness: file.artefact.fit_thickness,
+            noise: file.indicator.noise.map(Spanned::into_inner),
+            convention: file.model.convention,
+            interpolation: file.model.interpolation,
+            knots: file.model.knots.map(|n| n.into_inner() as usize),
+            columns,
+        })
+    }
+
+    /// The set-up as a file would hold it.
+    pub fn as_toml(&self) -> String {
+        let mut text = String::from("[artefact]\n");
+        match self.thickness {
+            Some(d) => text += &format!("thickness = {d:?}      # mm\n"),
+            None => text += "# thickness: not known, no thickness correction\n",
+        }
+        if self.fit_thickness {
+            text += "fit_thickness = true\n";
+        }
+        text += "\n[indicator]\n";
+        match self.noise {
+            Some(s) => {
+                text += &format!("noise = {s:?}      # um, standard deviation of one reading\n")
+            }
+            None => text += "# noise: estimated from the data\n",
+        }
+        let convention = match self.convention {
+            Convention::Seed => "seed",
+            Convention::Rigid => "rigid",
+        };
+        let interpolation = match self.interpolation {
+            Interpolation::Linear => "linear",
+            Interpolation::Cubic => "cubic",
+        };
+        text += &format!(
+            "\n[model]\nconvention = \"{convention}\"\ninterpolation = \"{interpolation}\"\n"
+        );
+        if let Some(n) = self.knots {
+            text += &format!("knots = {n}\n");
+        }
+        text
+    }
+}

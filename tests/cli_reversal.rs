@@ -1,0 +1,350 @@
+//! `errsep reversal` as a person and a script meet it.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn run(folder: &Path, args: &[&str]) -> (Option<i32>, String, String) {
+    let output = assert_cmd::Command::new(env!("CARGO_BIN_EXE_errsep"))
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .unwrap();
+    (
+        output.status.code(),
+        String::from_utf8(output.stdout).unwrap(),
+        String::from_utf8(output.stderr).unwrap(),
+    )
+}
+
+fn json(folder: &Path, args: &[&str]) -> Value {
+    let (code, out, err) = run(folder, &[args, &["--format", "json"]].concat());
+    assert_eq!(code, Some(0), "{err}");
+    serde_json::from_str(&out).unwrap()
+}
+
+/// Readings of one wave and four slopes at 41 positions, in µm to four decimals.
+fn readings() -> Vec<(f64, [f64; 4])> {
+    (0..41)
+        .map(|k| {
+            let x = f64::from(k) * 2.5;
+            let m = (x / 9.0).sin();
+            let wiggle = 0.01 * f64::from((k * 7919) % 13 - 6);
+            let value = |i: f64, slope: f64, s: f64| {
+                ((i * m + s + slope * x + wiggle * i * s) * 1e4).round() / 1e4
+            };
+            let (a, b) = ((x / 13.0).cos(), (x / 17.0).sin());
+            (
+                x,
+                [
+                    value(1.0, 0.05, a),
+                    value(-1.0, -0.04, b),
+                    value(-1.0, 0.03, a),
+                    value(1.0, -0.02, b),
+                ],
+            )
+        })
+        .collect()
+}
+
+fn wide(delimiter: &str, end: &str, decimal: &str, mark: &str) -> String {
+    let mut text = format!(
+        "{mark}# readings{end}{}{end}",
+        ["x", "1A", "1B", "2A", "2B"].join(delimiter)
+    );
+    for (x, values) in readings() {
+        let row = std::iter::once(x)
+            .chain(values)
+            .map(|v| v.to_string().replace('.', decimal));
+        text += &format!("{}{end}", row.collect::<Vec<_>>().join(delimiter));
+    }
+    text
+}
+
+fn tidy() -> String {
+    let mut text = String::from("reading,x,channel\n");
+    for (x, values) in readings().into_iter().rev() {
+        for (channel, value) in ["1A", "1B", "2A", "2B"].into_iter().zip(values) {
+            text += &format!("{value},{x},{channel}\n\n");
+        }
+    }
+    text
+}
+
+#[test]
+fn every_dialect_and_layout_is_the_same_data() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("plain.csv"), wide(",", "\n", ".", "")).unwrap();
+    let plain = json(folder.path(), &["reversal", "plain.csv"]);
+    for (name, text, said) in [
+        (
+            "semicolon",
+            wide(";", "\n", ".", ""),
+            "LF line ends, fields separated by semicolon, decimal point; one column",
+        ),
+        (
+            "german",
+            wide(";", "\r\n", ",", "\u{feff}"),
+            "UTF-8 with byte-order mark, CRLF line ends, fields separated by semicolon, decimal comma",
+        ),
+        (
+            "tab",
+            wide("\t", "\r\n", ".", ""),
+            "CRLF line ends, fields separated by tab, decimal point",
+        ),
+        (
+            "tab_comma",
+            wide("\t", "\n", ",", ""),
+            "fields separated by tab, decimal comma",
+        ),
+        ("old_mac", wide(",", "\r", ".", ""), "CR line ends"),
+        ("tidy", tidy(), "decimal point; one row a reading"),
+    ] {
+        fs::write(folder.path().join("other.csv"), text).unwrap();
+        let other = json(folder.path(), &["reversal", "other.csv"]);
+        assert!(
+            other["input"].as_str().unwrap().contains(said),
+            "{name}: {}",
+            other["input"]
+        );
+        // The same numbers in another order of rows: exactly the same result.
+        for key in ["tilts", "forms", "closure", "contrasts"] {
+            assert_eq!(other[key], plain[key], "{name} {key}");
+        }
+        let (_, text, _) = run(folder.path(), &["reversal", "other.csv"]);
+        assert!(text.contains(said), "{name}: not said");
+    }
+}
+
+#[test]
+fn json_is_what_the_documentation_says() {
+    let page =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/json/reversal.md"))
+            .unwrap();
+    let mut documented = page
+        .lines()
+        .filter_map(|l| l.strip_prefix("| `")?.split('`').next())
+        .collect::<Vec<_>>();
+    documented.sort_unstable();
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("data.csv"), wide(",", "\n", ".", "")).unwrap();
+    for method in [
+        &["--method", "shear"][..],
+        &["--method", "rotation"],
+        &["--simultaneous"],
+    ] {
+        let result = json(folder.path(), &[&["reversal", "data.csv"], method].concat());
+        let mut keys = result
+            .as_object()
+            .unwrap()
+            .keys()
+            .map(String::as_str)
+            .collect::<Vec<_>>();
+        keys.sort_unstable();
+        assert_eq!(keys, documented);
+        assert_eq!(result["schema"], "errsep.reversal/1");
+        assert_eq!(
+            result["method"],
+            *method.last().unwrap().trim_start_matches("--")
+        );
+        for tilt in ["alpha", "beta", "gamma"] {
+            assert!(
+                result["tilts"][tilt]["value"].is_f64() && result["tilts"][tilt]["std"].is_f64()
+            );
+            assert_eq!(result["tilts"][tilt]["unit"], "rad");
+        }
+        for form in ["M", "M_std", "S_A", "S_A_std", "S_B", "S_B_std"] {
+            let length = result["forms"]["x"].as_array().unwrap().len();
+            assert_eq!(
+                result["forms"][form].as_array().unwrap().len(),
+                length,
+                "{form}"
+            );
+        }
+        assert!(
+            result["closure"]["slope"]["std"].is_f64()
+                && result["closure"]["rms"]["value"].is_f64()
+        );
+        for key in ["rms", "noise", "degrees_of_freedom"] {
+            assert!(result["residual"][key].is_f64(), "{key}");
+        }
+        assert_eq!(result["convergence"]["converged"], true);
+        assert!(result["convergence"]["iterations"].is_u64());
+    }
+}
+
+#[test]
+fn two_channels_say_what_they_determine() {
+    let folder = TempDir::new().unwrap();
+    let mut text = String::from("x,1A,2B\n");
+    for (x, v) in readings() {
+        text += &format!("{x},{},{}\n", v[0], v[3]);
+    }
+    fs::write(folder.path().join("data.csv"), text).unwrap();
+    for method in [&[][..], &["--simultaneous"]] {
+        let result = json(folder.path(), &[&["reversal", "data.csv"], method].concat());
+        assert!(result["tilts"]["alpha"]["value"].is_f64());
+        assert!(result["tilts"]["beta"].is_null() && result["tilts"]["gamma"].is_null());
+        assert_eq!(result["tilt_combinations"][0]["name"], "beta + gamma");
+        assert!(result["closure"].is_null() && result["forms"]["M"].is_null());
+        let names = result["form_combinations"].as_array().unwrap().iter();
+        let names = names
+            .map(|f| f["name"].as_str().unwrap())
+            .collect::<Vec<_>>();
+        assert_eq!(names, ["M + S_A/2 + S_B/2", "S_A/2 - S_B/2"]);
+    }
+    let (code, text, _) = run(folder.path(), &["reversal", "data.csv"]);
+    assert_eq!(code, Some(0));
+    for said in [
+        "not read: 1B, 2A",
+        "beta + gamma",
+        "nothing closes",
+        "gravity-sag",
+    ] {
+        assert!(text.contains(said), "{said:?} is not in:\n{text}");
+    }
+}
+
+#[test]
+fn the_folder_holds_report_result_and_tables() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("data.csv"), wide(",", "\n", ".", "")).unwrap();
+    fs::create_dir(folder.path().join("there")).unwrap();
+    fs::write(folder.path().join("there/mine.txt"), "kept").unwrap();
+    for out in ["new/deep", "there"] {
+        let (code, stdout, err) = run(
+            folder.path(),
+            &["reversal", "data.csv", "--out", out, "--format", "json"],
+        );
+        assert_eq!(code, Some(0), "{err}");
+        let place = folder.path().join(out);
+        assert_eq!(
+            fs::read_to_string(place.join("result.json")).unwrap(),
+            stdout
+        );
+        let page = fs::read_to_string(place.join("report.html")).unwrap();
+        assert!(page.starts_with("<!DOCTYPE html>") && page.contains("<svg"));
+        let result: Value = serde_json::from_str(&stdout).unwrap();
+        let hash = result["provenance"]["inputs"][0]["sha256"]
+            .as_str()
+            .unwrap();
+        assert!(hash.len() == 64 && page.contains(hash));
+        let profiles = fs::read_to_string(place.join("profiles.csv")).unwrap();
+        let mut lines = profiles.lines();
+        assert_eq!(
+            lines.next(),
+            Some("x_mm,M_um,M_std_um,S_A_um,S_A_std_um,S_B_um,S_B_std_um")
+        );
+        // Numbers are written so that they read back the same.
+        let first = lines
+            .next()
+            .unwrap()
+            .split(',')
+            .map(|v| v.parse::<f64>().unwrap())
+            .collect::<Vec<_>>();
+        assert_eq!(Some(first[1]), result["forms"]["M"][0].as_f64());
+        assert_eq!(lines.count() + 1, readings().len());
+    }
+    assert_eq!(
+        fs::read_to_string(folder.path().join("there/mine.txt")).unwrap(),
+        "kept"
+    );
+    let left = fs::read_dir(folder.path().join("there")).unwrap().count();
+    assert_eq!(
+        left, 6,
+        "mine, report, result and three tables, nothing temporary"
+    );
+}
+
+#[test]
+fn renamed_columns_in_other_units_are_the_same_data() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("data.csv"), wide(",", "\n", ".", "")).unwrap();
+    let plain = json(folder.path(), &["reversal", "data.csv"]);
+    let mut text = String::from("note,z_m,near0,far0,far180,near180\n");
+    for (x, v) in readings() {
+        text += &format!(
+            "a,{},{},{},{},{}\n",
+            x / 1e3,
+            v[0] / 1e3,
+            v[1] / 1e3,
+            v[2] / 1e3,
+            v[3] / 1e3
+        );
+    }
+    fs::write(folder.path().join("odd.csv"), text).unwrap();
+    let names = [
+        ("x", "z_m:m"),
+        ("1A", "near0:mm"),
+        ("1B", "far0:mm"),
+        ("2A", "far180:mm"),
+        ("2B", "near180:mm"),
+    ];
+    let option = names
+        .map(|(role, column)| format!("{role}={column}"))
+        .join(",");
+    let setup = names
+        .map(|(role, column)| format!("{role} = \"{column}\"\n"))
+        .concat();
+    fs::write(
+        folder.path().join("setup.toml"),
+        format!("[columns]\n{setup}"),
+    )
+    .unwrap();
+    for args in [["--columns", option.as_str()], ["--setup", "setup.toml"]] {
+        let odd = json(
+            folder.path(),
+            &[&["reversal", "odd.csv"], &args[..]].concat(),
+        );
+        for tilt in ["alpha", "beta", "gamma"] {
+            let value = |r: &Value| r["tilts"][tilt]["value"].as_f64().unwrap();
+            // Epsilons: readings up to 6 µm over 100 mm, divided and multiplied by powers of ten.
+            assert!((value(&odd) - value(&plain)).abs() < 1e-15);
+        }
+        assert!(
+            odd["input"]
+                .as_str()
+                .unwrap()
+                .ends_with("columns not read: note")
+        );
+    }
+}
+
+#[test]
+fn help_has_an_example() {
+    let folder = TempDir::new().unwrap();
+    for command in ["reversal", "straightness", "traces"] {
+        let (code, text, _) = run(folder.path(), &[command, "--help"]);
+        assert_eq!(code, Some(0));
+        assert!(
+            text.contains(&format!("errsep {command} ")) && text.contains("Example"),
+            "{text}"
+        );
+    }
+}
+
+/// A million rows; ten million by `cargo run --release --example many_rows`.
+#[test]
+fn a_million_rows() {
+    use std::io::Write;
+    let rows = 1_000_000_u32;
+    let mut file = tempfile::NamedTempFile::new().unwrap();
+    {
+        let mut out = std::io::BufWriter::new(&mut file);
+        writeln!(out, "channel,x,reading").unwrap();
+        for k in 0..rows {
+            let channel = ["1A", "1B", "2A", "2B"][(k % 4) as usize];
+            writeln!(out, "{channel},{},{}", f64::from(k / 4) / 1e3, k % 7).unwrap();
+        }
+        out.flush().unwrap();
+    }
+    let data = errsep::io::reversal::read(file.path(), &Default::default()).unwrap();
+    assert_eq!(data.observations.readings.len(), rows as usize);
+    let last = data.observations.readings.last().unwrap();
+    assert_eq!(
+        (last.channel.name(), last.x, last.value),
+        ("2B", 249.999, f64::from((rows - 1) % 7))
+    );
+}

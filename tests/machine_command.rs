@@ -1,0 +1,406 @@
+//! `errsep machine`: the figures of NISTIR 6868 from its machine file, and every kind of wrong
+//! input with place and remedy.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+const ARCSEC: f64 = std::f64::consts::PI / 180.0 / 3600.0;
+
+fn fixture(name: &str) -> String {
+    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("fixtures/nistir6868")
+        .join(name);
+    path.to_str().unwrap().to_owned()
+}
+
+fn errsep(args: &[&str]) -> Output {
+    assert_cmd::Command::new(env!("CARGO_BIN_EXE_errsep"))
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+/// The JSON answer of an action on the report's machine.
+fn answer(action: &[&str]) -> Value {
+    let machine = fixture("machine.toml");
+    let output = errsep(&[&["machine", &machine], action, &["--format", "json"]].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{message}");
+    let value: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(value["schema"], "errsep.machine/1");
+    assert_eq!(value["action"], action[0]);
+    assert_eq!(value["chain"], "XYFZ");
+    value
+}
+
+fn near(found: &Value, expected: f64, tolerance: f64) {
+    let number = found
+        .as_f64()
+        .unwrap_or_else(|| panic!("{found} is no number"));
+    assert!(
+        (number - expected).abs() <= tolerance,
+        "{number} is not {expected}"
+    );
+}
+
+#[test]
+fn lengths_of_table_4() {
+    let found = answer(&[
+        "length",
+        &fixture("holes.csv"),
+        "--between",
+        "3:9",
+        "--between",
+        "9:15",
+        "--between",
+        "3:15",
+        "--independence",
+        "coordinates",
+    ]);
+    assert_eq!(found["independence"], "coordinates");
+    // Certified digits of print, and 0.002 of the recovered variances.
+    for (result, (error, u)) in found["results"].as_array().unwrap().iter().zip([
+        (-2.380, 6.72),
+        (-2.970, 6.47),
+        (-1.513, 6.38),
+    ]) {
+        near(&result["result"]["value"], error, 0.02);
+        near(&result["result"]["std"], u, 0.007);
+        assert!(result["expanded"]["coverage_factor"].as_f64().unwrap() > 1.96);
+        for key in [
+            "label",
+            "value",
+            "std",
+            "unit",
+            "sensitivity",
+            "contribution",
+            "share",
+        ] {
+            assert!(!result["contributions"][0][key].is_null(), "{key}");
+        }
+    }
+}
+
+#[test]
+fn squareness_of_tables_5_and_6() {
+    let found = answer(&[
+        "squareness",
+        &fixture("holes.csv"),
+        "--first",
+        "3,26,25,24,23,22,21",
+        "--second",
+        "3,4,5,6,7,8,9",
+        "--independence",
+        "coordinates",
+        "--trials",
+        "20000",
+    ]);
+    let result = &found["results"][0];
+    near(&result["result"]["value"], -5.103 * ARCSEC, 0.03 * ARCSEC);
+    near(&result["result"]["std"], 11.09 * ARCSEC, 0.007 * ARCSEC);
+    // k·u: 20 000 trials.
+    near(
+        &result["monte_carlo"]["mean"],
+        -5.103 * ARCSEC,
+        4.0 * 0.08 * ARCSEC,
+    );
+    near(
+        &result["monte_carlo"]["std"],
+        11.1 * ARCSEC,
+        4.0 * 0.056 * ARCSEC,
+    );
+    assert_eq!(result["monte_carlo"]["trials"], 20_000);
+}
+
+#[test]
+fn circularity_of_tables_7_and_8() {
+    let circle = |radius: &str, seed: &str| {
+        let found = answer(&[
+            "circularity",
+            "--centre",
+            "75,75",
+            "--radius",
+            radius,
+            "--independence",
+            "coordinates",
+            "--trials",
+            "20000",
+            "--seed",
+            seed,
+        ]);
+        found["results"][0].clone()
+    };
+    for (radius, mean, std, alone) in [("44.5", 17.87, 3.12, 1.06), ("55.5", 18.01, 3.16, 1.33)] {
+        let result = circle(radius, "1");
+        near(&result["monte_carlo"]["mean"], mean, 4.0 * 0.024 + 0.005);
+        near(&result["monte_carlo"]["std"], std, 4.0 * 0.018 + 0.005);
+        near(&result["without_scatter"], alone, 0.015);
+    }
+    // The seed makes the answer.
+    assert_eq!(circle("44.5", "7"), circle("44.5", "7"));
+    assert_ne!(
+        circle("44.5", "7")["monte_carlo"],
+        circle("44.5", "8")["monte_carlo"]
+    );
+}
+
+#[test]
+fn predictions_of_table_a1_and_their_folder() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("out");
+    let found = answer(&[
+        "predict",
+        &fixture("holes.csv"),
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    let points = found["points"].as_array().unwrap();
+    assert_eq!(points.len(), 24);
+    let ninth = points.iter().find(|p| p["point"] == "9").unwrap();
+    near(&ninth["deviation"]["x"]["result"]["value"], 5.04, 0.03);
+    near(
+        &ninth["deviation"]["x"]["result"]["std"],
+        20.96_f64.sqrt(),
+        0.003,
+    );
+    near(&ninth["deviation"]["y"]["result"]["value"], -0.75, 0.015);
+    // First order against finite rotations: the square of 30 urad over 140 mm is 0.1 nm.
+    let first = ninth["deviation"]["x"]["result"]["value"].as_f64().unwrap();
+    near(&ninth["deviation"]["x"]["by_finite_rotations"], first, 1e-3);
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("Budget"));
+    let table = fs::read_to_string(out.join("deviations.csv")).unwrap();
+    assert_eq!(table.lines().count(), 25);
+    assert!(out.join("result.json").exists());
+}
+
+#[test]
+fn the_report_s_parts_scatter_more_than_its_machine() {
+    let ratios = |file: &str| {
+        let found = answer(&["parts", &fixture(file), "--points", &fixture("holes.csv")]);
+        assert_eq!(found["readings"], 324);
+        let share = found["within_two_standard_uncertainties"].as_f64().unwrap();
+        (share, found["points"].as_array().unwrap().len())
+    };
+    let ((drilled, six), (milled, _)) = (ratios("drilled_holes.csv"), ratios("milled_holes.csv"));
+    assert_eq!(six, 6);
+    // The report's conclusion: up to nine times the uncertainty for drilled holes, four for milled.
+    assert!(drilled < milled && milled < 0.6, "{drilled} {milled}");
+}
+
+#[test]
+fn simulated_components_give_the_machine_back() {
+    let folder = TempDir::new().unwrap();
+    let (machine, out) = (fixture("machine.toml"), folder.path().join("simulated"));
+    let output = errsep(&[
+        "simulate",
+        "machine",
+        &machine,
+        "--stations",
+        "12",
+        "--repeats",
+        "60",
+        "--points",
+        &fixture("holes.csv"),
+        "--parts",
+        "5",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let names = ["EXX", "EYX", "ECX", "EXY", "EYY", "ECY"];
+    let mut fitted = String::from("chain = \"XYFZ\"\ncoordinates = \"slide\"\nsense = \"work\"\n");
+    for name in names {
+        fitted.push_str(&format!("[errors.{name}]\ndegree = 1\n"));
+    }
+    fitted.push_str("[errors.C0Y]\ndegree = 0\n");
+    let model = folder.path().join("fitted.toml");
+    fs::write(&model, fitted).unwrap();
+    let components = out.join("components.csv");
+    let output = errsep(&[
+        "machine",
+        model.to_str().unwrap(),
+        "--components",
+        components.to_str().unwrap(),
+        "parts",
+        out.join("parts.csv").to_str().unwrap(),
+        "--points",
+        &fixture("holes.csv"),
+        "--format",
+        "json",
+    ]);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(found["readings"], 24 * 2 * 5 * 2);
+    // k·u: parts of the machine itself lie inside two standard uncertainties 95 times in 100.
+    near(&found["within_two_standard_uncertainties"], 0.95, 0.04);
+}
+
+/// A machine file, or points, must be refused with all of these words, a place and a remedy.
+fn refused(machine: &str, points: &str, options: &[&str], told: &[&str]) {
+    let folder = TempDir::new().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let (machine, points) = (file("machine.toml", machine), file("points.csv", points));
+    let out = folder.path().join("out");
+    let mut args = vec!["machine", &machine];
+    let action = if options.is_empty() {
+        &["predict"][..]
+    } else {
+        options
+    };
+    args.extend(action.iter().map(|word| {
+        if *word == "POINTS" {
+            points.as_str()
+        } else {
+            *word
+        }
+    }));
+    if options.is_empty() {
+        args.push(&points);
+    }
+    args.extend(["--out", out.to_str().unwrap()]);
+    let output = errsep(&args);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{told:?}: {message}");
+    assert!(output.stdout.is_empty() && !out.exists(), "{told:?}");
+    for words in told {
+        assert!(message.contains(words), "{words:?} is not in:\n{message}");
+    }
+    assert!(message.contains("help: "), "no remedy in:\n{message}");
+}
+
+const POINTS: &str = "point,x,y\na,0,0\nb,100,0\nc,100,50\n";
+
+#[test]
+fn one_thing_wrong_with_the_machine() {
+    let bad = |machine: &str, told: &[&str]| refused(machine, POINTS, &[], told);
+    bad("", &["chain"]);
+    bad("chain = \"XYZ\"\n", &["machine.toml:1:9", "no frame F"]);
+    bad(
+        "chain = \"FXYZ\"\nchian = 1\n",
+        &["machine.toml:2", "did you mean `chain`"],
+    );
+    bad("chain = \"FXYZ\"\nsense = \"both\"\n", &["machine.toml:2"]);
+    bad(
+        "chain = \"FXYZ\"\ntool_offset = [0, 0, inf]\n",
+        &["machine.toml:2", "finite"],
+    );
+    let entry = |text: &str| format!("chain = \"FXYZ\"\n[errors.EXX]\n{text}\n");
+    bad(
+        "chain = \"FXYZ\"\n[errors.EXW]\nvalue = 1\n",
+        &["`EXW` is none of the 21", "did you mean `EX"],
+    );
+    bad(&entry(""), &["machine.toml:2", "exactly one of"]);
+    bad(&entry("value = 1\npolynomial = [1]"), &["exactly one of"]);
+    bad(&entry("value = nan"), &["machine.toml:2", "finite"]);
+    bad(&entry("value = \"one\""), &["machine.toml:3"]);
+    bad(&entry("vaule = 1"), &["did you mean `value`"]);
+    bad(&entry("value = 1\nstd = -1"), &["not negative"]);
+    bad(
+        &entry("value = 1\nstd = 1\ndegrees_of_freedom = 0"),
+        &["degrees of freedom are 0"],
+    );
+    bad(
+        &entry("table = { positions = [0, 0], values = [1, 1] }"),
+        &["must ascend"],
+    );
+    bad(
+        &entry("table = { positions = [0, 50], values = [1, 1] }"),
+        &["extend the table"],
+    );
+    bad(
+        &entry("readings = [1, 2]"),
+        &["bare readings do not say where"],
+    );
+    bad(&entry("degree = 1"), &["--components"]);
+    bad(&entry("degree = 99"), &["degree 99"]);
+    bad(
+        &entry(
+            "value = 1\nregression = { residual_std = 1, observations = 2, mean_position = 0, sum_of_squares = 1 }",
+        ),
+        &["at least three readings"],
+    );
+    let angle = |text: &str| format!("chain = \"FXYZ\"\n[errors.C0Y]\n{text}\n");
+    bad(&angle("polynomial = [0, 1]"), &["error of location"]);
+    bad(&angle("readings = [1e-5]"), &["1 of at least 2 readings"]);
+}
+
+#[test]
+fn one_thing_wrong_with_the_points_or_the_feature() {
+    let good = "chain = \"FXYZ\"\n[errors.EXX]\nvalue = 1\nstd = 1\n";
+    let bad = |points: &str, told: &[&str]| refused(good, points, &[], told);
+    bad("", &["empty"]);
+    bad("point,x,y\n", &["no row of data"]);
+    bad("point,x\na,1\n", &["column `y` is missing"]);
+    bad("point,x,y\na,1,b\n", &["points.csv:2:5", "not a number"]);
+    bad("point,x,y\na,1,inf\n", &["points.csv:2:5", "finite"]);
+    bad(
+        "point,x,y\na,1,2\na,3,4\n",
+        &["points.csv:3", "given twice"],
+    );
+    bad("point,x,y\n,1,2\n", &["points.csv:2", "no name"]);
+    let feature = |options: &[&str], told: &[&str]| refused(good, POINTS, options, told);
+    feature(
+        &["length", "POINTS", "--between", "ab"],
+        &["does not name two points"],
+    );
+    feature(&["length", "POINTS", "--between", "a:d"], &["no point `d`"]);
+    feature(&["length", "POINTS", "--between", "a:a"], &["coincide"]);
+    feature(
+        &["squareness", "POINTS", "--first", "a,b", "--second", "a,b"],
+        &["row along Y"],
+    );
+    feature(
+        &["predict", "POINTS", "--confidence", "0"],
+        &["--confidence 0"],
+    );
+    feature(
+        &["circularity", "--centre", "0,0", "--radius", "-1"],
+        &["radius must be positive"],
+    );
+    feature(
+        &["circularity", "--centre", "0,0", "--radius", "0"],
+        &["radius must be positive"],
+    );
+    feature(
+        &[
+            "circularity",
+            "--centre",
+            "0,0",
+            "--radius",
+            "1",
+            "--trials",
+            "1",
+        ],
+        &["--trials"],
+    );
+    feature(
+        &[
+            "length",
+            "POINTS",
+            "--between",
+            "a:b",
+            "--trials",
+            "99999999999",
+        ],
+        &["memory"],
+    );
+}

@@ -1,0 +1,143 @@
+//! The reversal on data of others, read where they lie: `../shared/data`, or the folder that the
+//! environment variable `ERRSEP_DATA` names. Absent: skipped, and said.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn data(name: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("ERRSEP_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
+    let path = folder.join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    println!("skipped: {} is not there", path.display());
+    None
+}
+
+fn json(args: &[&str]) -> Value {
+    let output = assert_cmd::Command::new(env!("CARGO_BIN_EXE_errsep"))
+        .args(args)
+        .args(["--format", "json"])
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+const CAD_COLUMNS: &str = "x=z_mm:mm,1A=I_0_0:mm,1B=I_180_0:mm,2B=I_0_180:mm,2A=I_180_180:mm";
+
+fn degrees(value: &Value) -> f64 {
+    value["value"].as_f64().unwrap().to_degrees()
+}
+
+/// The file's readings are rounded to 1e-5 or 1e-6 mm, which is 1e-5/100 rad or 6e-6 degrees; the
+/// author of the data states the truth to 1e-5 degrees. Certified digits.
+const CAD: f64 = 1e-5;
+
+#[test]
+fn cad_model_with_slide_set_up_and_cone() {
+    let Some(file) = data("cad_reversal/cad_reversal_2.csv") else {
+        return;
+    };
+    let folder = TempDir::new().unwrap();
+    let rigid = folder.path().join("rigid.toml");
+    std::fs::write(&rigid, "[model]\nconvention = \"rigid\"\n").unwrap();
+    let args = ["reversal", file.to_str().unwrap(), "--columns", CAD_COLUMNS];
+    for method in [&["--method", "shear"][..], &["--method", "rotation"]] {
+        let seed = json(&[&args, method].concat());
+        for (tilt, truth) in [("alpha", -0.4), ("beta", 0.0), ("gamma", -0.1)] {
+            assert!(
+                (degrees(&seed["tilts"][tilt]) - truth).abs() < CAD,
+                "{tilt} {seed}"
+            );
+        }
+        assert!((degrees(&seed["closure"]["slope"]) - 0.05).abs() < CAD);
+        let rigid = json(&[&args, method, &["--setup", rigid.to_str().unwrap()]].concat());
+        for (tilt, truth) in [("alpha", -0.4), ("set_up", -0.1), ("cone", 0.05)] {
+            assert!(
+                (degrees(&rigid["tilts"][tilt]) - truth).abs() < CAD,
+                "{tilt} {rigid}"
+            );
+        }
+        assert!(degrees(&rigid["closure"]["slope"]).abs() < CAD);
+        // What is left is the rounding of the file: 1e-6 to 1e-5 mm uniform, below 3 nm.
+        assert!(rigid["residual"]["rms"].as_f64().unwrap() < 3e-3);
+        // The seed has no cone: 0.05° over 100 mm is left, 872.7 µm/m × 100 mm/√12 at the ends.
+        assert!(seed["residual"]["rms"].as_f64().unwrap() > 25.0);
+    }
+}
+
+#[test]
+fn cad_model_whose_slide_was_shifted_not_tilted() {
+    let Some(file) = data("cad_reversal/cad_reversal_1.csv") else {
+        return;
+    };
+    let result = json(&["reversal", file.to_str().unwrap(), "--columns", CAD_COLUMNS]);
+    for (tilt, found) in [("alpha", 0.0), ("beta", 0.0), ("gamma", -0.05)] {
+        assert!(
+            (degrees(&result["tilts"][tilt]) - found).abs() < CAD,
+            "{tilt} {result}"
+        );
+    }
+    assert!((degrees(&result["closure"]["slope"]) - 0.025).abs() < CAD);
+}
+
+/// A test bar turned in a milling spindle while the slide feeds. No truth is known.
+#[test]
+fn test_bar_at_opposite_spindle_angles() {
+    let Some(file) = data("bridgeport_spindle/testbar_712.csv") else {
+        return;
+    };
+    let folder = TempDir::new().unwrap();
+    let tilts = |angle: i32| {
+        let out = folder.path().join(format!("traces{angle}"));
+        let run = json(&[
+            "traces",
+            file.to_str().unwrap(),
+            "--columns",
+            "time=t_s,x=z_mm:mm,reading=reading_mm:mm",
+            "--angle",
+            &angle.to_string(),
+            "--out",
+            out.to_str().unwrap(),
+        ]);
+        // Other tool's figure: 2.5625 turns a minute, four decimals.
+        let rpm = run["frequency"]["value"].as_f64().unwrap() * 60.0;
+        assert!((rpm - 2.5625).abs() < 1e-3, "{rpm}");
+        let result = json(&["reversal", out.join("traces.csv").to_str().unwrap()]);
+        assert!(result["tilts"]["beta"].is_null());
+        let number = |v: &Value, key: &str| v[key].as_f64().unwrap() * 1e6;
+        let alpha = &result["tilts"]["alpha"];
+        let mount = &result["tilt_combinations"][0];
+        (
+            number(alpha, "value"),
+            number(alpha, "std"),
+            number(mount, "value"),
+        )
+    };
+    let angles = [0, 60, 120];
+    let found = angles.map(tilts);
+    for (angle, (alpha, std, _)) in angles.iter().zip(&found) {
+        println!("angle {angle}: alpha {alpha:.2} ± {std:.2} µrad");
+        assert!((0.1..0.5).contains(std));
+        // k·u: 4 u of what the sides of the bar scatter, 1.4 µrad, about the mean of six pairs.
+        assert!((alpha - 40.9).abs() < 5.6, "{alpha}");
+    }
+    // The tilt of the bar in the spindle turns with it: cosines 120° apart in the double angle sum to
+    // zero, (0°) − (60°) + (120°) in the single one. k·u: the three scatter as α does, √3 × 1.4 × 4.
+    let around = found[0].2 - found[1].2 + found[2].2;
+    assert!(around.abs() < 9.7, "{found:?}");
+    // Half a turn on, the two channels change places: the same α but for the readings at the ends.
+    let (alpha, std, mount) = tilts(180);
+    assert!((alpha - found[0].0).abs() < 4.0 * std, "{alpha}");
+    assert!((mount + found[0].2).abs() < 4.0 * std, "{mount}");
+}

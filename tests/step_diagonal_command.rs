@@ -1,0 +1,241 @@
+//! `errsep step-diagonal` and `errsep simulate step-diagonal` as people and programs use them.
+
+mod command;
+
+use command::{Folder, bad_input, run};
+use serde_json::Value;
+
+fn json(folder: &Folder, arguments: &[&str]) -> Value {
+    let out = run(folder, arguments);
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    serde_json::from_str(&out.stdout).unwrap()
+}
+
+const PLANE: [&str; 8] = [
+    "simulate",
+    "step-diagonal",
+    "--diagonals",
+    "face",
+    "--steps",
+    "4",
+    "--noise",
+    "0.1",
+];
+
+fn component<'a>(answer: &'a Value, name: &str) -> &'a Value {
+    answer["components"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|c| c["name"] == name)
+        .unwrap()
+}
+
+#[test]
+fn plane_says_what_cannot_be_told_apart() {
+    let folder = Folder::with(&[]);
+    folder.write("plane.csv", &run(&folder, &PLANE).stdout);
+    let answer = json(&folder, &["step-diagonal", "plane.csv", "--format", "json"]);
+    assert_eq!(answer["schema"], "errsep.step-diagonal/1");
+    assert_eq!(answer["rank"], 20);
+    assert_eq!(component(&answer, "ECY")["determined"], "wholly");
+    assert_eq!(component(&answer, "ECX")["determined"], "nothing");
+    assert_eq!(component(&answer, "EZZ")["determined"], "not-touched");
+    let statements: Vec<&str> = answer["ambiguities"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|a| a["statement"].as_str().unwrap())
+        .collect();
+    assert!(
+        statements.contains(
+            &"positioning slope of X, positioning slope of Y and mirror misalignment cannot be told apart: measure one slope"
+        ),
+        "{statements:?}"
+    );
+    let out = run(&folder, &["step-diagonal", "plane.csv"]);
+    assert!(out.stdout.contains("measure one slope"), "{}", out.stdout);
+}
+
+#[test]
+fn both_targets_and_a_measured_slope_find_the_true_errors() {
+    let folder = Folder::with(&[]);
+    let arguments = [
+        "simulate",
+        "step-diagonal",
+        "--steps",
+        "3",
+        "--target",
+        "both",
+        "--noise",
+        "0.05",
+        "--seed",
+        "5",
+    ];
+    let made = json(&folder, &[&arguments[..], &["--format", "json"]].concat());
+    folder.write("both.csv", &run(&folder, &arguments).stdout);
+    let positioning = made["truth"]["functions"]["EXX"][3].as_f64().unwrap();
+    folder.write(
+        "s.toml",
+        &format!(
+            "[test]\nnoise = 0.05\n[[measured]]\naxis = \"X\"\nslope = {}\nstd = 1e-5\n",
+            positioning / 600.0
+        ),
+    );
+    let answer = json(
+        &folder,
+        &[
+            "step-diagonal",
+            "both.csv",
+            "--setup",
+            "s.toml",
+            "--choose",
+            "--format",
+            "json",
+        ],
+    );
+    let (mut squares, mut count) = (0.0, 0.0);
+    for c in answer["components"].as_array().unwrap() {
+        if c["determined"] != "wholly" {
+            continue;
+        }
+        let truth = &made["truth"]["functions"][c["name"].as_str().unwrap()];
+        for i in 0..4 {
+            let std = c["std"][i].as_f64().unwrap();
+            if std > 0.0 {
+                let error = c["value"][i].as_f64().unwrap() - truth[i].as_f64().unwrap();
+                squares += (error / std).powi(2);
+                count += 1.0;
+            }
+        }
+    }
+    assert!(count >= 30.0, "{count}");
+    // Tolerance: k·u of a mean square of correlated values, some 15 independent: 3 √(2/15).
+    let mean: f64 = squares / count;
+    assert!(mean < 2.1 && mean > 0.1, "{mean} of {count}");
+    assert_eq!(answer["sequence_choices"].as_array().unwrap().len(), 6);
+    assert_eq!(answer["uncertainty"]["degrees_of_freedom"], "infinite");
+    expanded_as_the_guide_has_it(&answer, 1.959_963_984_540_054);
+    command::documented(&answer, "docs/json/step-diagonal.md");
+}
+
+/// Squareness comes as quantities too, with the coverage factor `k`.
+fn expanded_as_the_guide_has_it(answer: &Value, k: f64) {
+    // Tolerance: digits of the factors in print (normal distribution; GUM table G.2, two decimals).
+    let close = |found: &Value, wanted: f64, relative: f64| {
+        let found = found.as_f64().unwrap();
+        assert!(
+            (found / wanted - 1.0).abs() < relative,
+            "{found}, not {wanted}"
+        );
+    };
+    close(&answer["uncertainty"]["coverage_factor"], k, 0.0025);
+    let squareness = answer["squareness"].as_array().unwrap();
+    let determined: Vec<&Value> = squareness.iter().filter(|s| !s["std"].is_null()).collect();
+    assert!(!determined.is_empty(), "{squareness:?}");
+    for s in determined {
+        let quantities = answer["quantities"].as_array().unwrap();
+        let same = quantities.iter().find(|q| q["label"] == s["name"]).unwrap();
+        for key in ["value", "std", "unit"] {
+            assert_eq!(same[key], s[key], "{key}");
+        }
+        let expanded = k * s["std"].as_f64().unwrap();
+        close(&same["expanded"]["expanded_uncertainty"], expanded, 0.0025);
+    }
+}
+
+#[test]
+fn noise_found_from_the_readings_widens_the_coverage_factor() {
+    let folder = Folder::with(&[]);
+    folder.write("plane.csv", &run(&folder, &PLANE).stdout);
+    let answer = json(&folder, &["step-diagonal", "plane.csv", "--format", "json"]);
+    let degrees = answer["degrees_of_freedom"].as_u64().unwrap();
+    assert_eq!(
+        answer["uncertainty"]["degrees_of_freedom"].as_f64(),
+        Some(degrees as f64)
+    );
+    assert_eq!(degrees, 12);
+    // Tolerance: digits in print, GUM table G.2 for 12 degrees of freedom and 95 %.
+    let k = answer["uncertainty"]["coverage_factor"].as_f64().unwrap();
+    assert!((k - 2.18).abs() < 0.005, "{k}");
+}
+
+#[test]
+fn report_shows_errors_and_ambiguities() {
+    let folder = Folder::with(&[]);
+    folder.write("plane.csv", &run(&folder, &PLANE).stdout);
+    let out = run(&folder, &["step-diagonal", "plane.csv", "--out", "out"]);
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    let page = folder.read("out/report.html");
+    for part in [
+        "<svg",
+        "rotation of Y about Z",
+        "cannot be told apart",
+        "two face diagonals",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(folder.read("out/components.csv").contains("ECY"));
+    assert!(folder.read("out/residuals.csv").lines().count() > 30);
+}
+
+#[test]
+fn bad_readings_are_refused() {
+    let header = "diagonal,sequence,x,y,z,reading\n";
+    let good = "AG,XYZ,0,0,0,0\nAG,XYZ,100,0,0,1\nAG,XYZ,100,100,0,1\nAG,XYZ,100,100,100,2\n";
+    for (name, rows, expected) in [
+        (
+            "letter.csv",
+            "AB,XYZ,0,0,0,0\n".to_owned(),
+            "diagonal \"AB\"",
+        ),
+        (
+            "order.csv",
+            "AG,XXZ,0,0,0,0\n".to_owned(),
+            "sequence \"XXZ\"",
+        ),
+        ("text.csv", "AG,XYZ,0,0,0,none\n".to_owned(), "not a number"),
+        ("none.csv", String::new(), "no row"),
+        ("point.csv", "AG,XYZ,0,0,0,0\n".to_owned(), "makes no grid"),
+        (
+            "path.csv",
+            good.replace("100,0,0,1", "0,100,0,1"),
+            "no stop of diagonal AG",
+        ),
+        (
+            "twice.csv",
+            format!("{good}AG,XYZ,0,0,0,0\n"),
+            "repeats a stop",
+        ),
+        (
+            "uneven.csv",
+            format!("{good}AG,XYZ,30,100,100,0\n"),
+            "even steps",
+        ),
+    ] {
+        let folder = Folder::with(&[(name, &format!("{header}{rows}"))]);
+        bad_input(
+            &folder,
+            &["step-diagonal", name, "--out", "out"],
+            &[name, expected],
+        );
+    }
+    let folder = Folder::with(&[
+        ("d.csv", &format!("{header}{good}")),
+        ("zero.toml", "[assume]\nzero = [\"EXQ\"]\n"),
+        ("key.toml", "[test]\ntraget = \"mirror\"\n"),
+        (
+            "std.toml",
+            "[[measured]]\naxis = \"X\"\nslope = 0.0\nstd = 0.0\n",
+        ),
+    ]);
+    let with = |setup: &'static str| ["step-diagonal", "d.csv", "--out", "out", "--setup", setup];
+    bad_input(&folder, &with("zero.toml"), &["zero.toml:2", "EXQ"]);
+    bad_input(&folder, &with("key.toml"), &["did you mean `target`"]);
+    bad_input(&folder, &with("std.toml"), &["standard uncertainty"]);
+    bad_input(
+        &folder,
+        &["simulate", "step-diagonal", "--steps", "0"],
+        &["at least one step"],
+    );
+}

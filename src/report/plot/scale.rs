@@ -139,14 +139,24 @@ impl Scale {
     fn linear_ticks(&self, target: usize, least_step: f64) -> Ticks {
         let raw = ((self.high - self.low) / target.max(1) as f64).max(least_step);
         let power = raw.log10().floor() as i32;
-        let head = raw / 10f64.powi(power);
-        // One of 1, 2, 5, 10: the first that gives no more ticks than asked for.
-        let (head, power) = match head {
-            h if h <= 1.0 => (1.0, power),
-            h if h <= 2.0 => (2.0, power),
-            h if h <= 5.0 => (5.0, power),
-            _ => (1.0, power + 1),
+        // The first round step that gives no more ticks than asked for, and the one below it for
+        // a range that lies between two multiples of that step.
+        let (wide, narrow) = match raw / 10f64.powi(power) {
+            h if h <= 1.0 => ((1.0, power), (5.0, power - 1)),
+            h if h <= 2.0 => ((2.0, power), (1.0, power)),
+            h if h <= 5.0 => ((5.0, power), (2.0, power)),
+            _ => ((1.0, power + 1), (5.0, power)),
         };
+        let ticks = self.ticks_every(wide, target);
+        if ticks.marks.is_empty() && least_step == 0.0 {
+            self.ticks_every(narrow, target)
+        } else {
+            ticks
+        }
+    }
+
+    /// Ticks at the multiples of `head` times ten to the `power`.
+    fn ticks_every(&self, (head, power): (f64, i32), target: usize) -> Ticks {
         let step = head * 10f64.powi(power);
         let first = (self.low / step).ceil();
         let last = (self.high / step).floor();

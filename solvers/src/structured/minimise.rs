@@ -205,6 +205,12 @@ impl Minimiser {
         } else {
             None
         };
+        let accepted = self.iterations.last().is_some_and(|i| i.accepted);
+        if settled.is_some() && self.damping > 0.0 && accepted {
+            // The undamped step shows whether it is the end.
+            self.damping = 0.0;
+            return self.advance(problem);
+        }
         if let (Some(by), true) = (settled, self.damping == 0.0) {
             let combinations = undetermined(problem, system, &solved);
             self.at = trial;

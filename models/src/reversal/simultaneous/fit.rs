@@ -23,6 +23,10 @@ const MOST_NOISE_ROUNDS: usize = 10;
 /// The noise has settled when no channel's changes by more than this share.
 const NOISE_SETTLED: f64 = 1e-4;
 
+/// A robust fit is near its end, where curvature helps, when reweighting promises to lower the cost
+/// by less than this share.
+const NEAR: f64 = 1e-2;
+
 /// A channel's noise is never taken below this share of the noisiest: a channel without any noise
 /// would otherwise be the only one to count.
 const LEAST_NOISE: f64 = 1e-6;
@@ -101,6 +105,14 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
     if options.loss != Loss::Quadratic && result.converged() {
         // From the least-squares solution on, outliers are those of the readings, not of the start.
         problem.loss = options.loss;
+        problem.far = true;
+        let nearer = errsep_solvers::structured::Options {
+            cost_tolerance: NEAR,
+            ..options.minimisation
+        };
+        result = minimise(&problem, result.parameters, nearer)?;
+        history.extend(&result.iterations);
+        problem.far = false;
         result = minimise(&problem, result.parameters, options.minimisation)?;
         history.extend(&result.iterations);
     }
@@ -303,19 +315,21 @@ fn estimate_noise(
         .collect())
 }
 
-/// By how much a robust loss stretches the standard uncertainty: the rows have given
-/// (Σ w J Jᵀ)⁻¹, w = ρ′; the covariance is E[ψ²]/E[ψ′]² (JᵀJ)⁻¹ (Huber 1981, section 7.6), ψ = ρ′ r.
+/// By how much a robust loss stretches the standard uncertainty: the rows, each times its factor w,
+/// have given (Σ w² J Jᵀ)⁻¹; the covariance is E[ψ²]/E[ψ′]² (JᵀJ)⁻¹ (Huber 1981, section 7.6),
+/// ψ = ρ′ r.
 fn robust_unit(problem: &Reversal, result: &Fit) -> Result<f64, ReversalError> {
     if problem.loss == Loss::Quadratic {
         return Ok(1.0);
     }
     let (mut squares, mut slopes, mut weights) = (0.0, 0.0, 0.0);
     problem.residuals(&result.parameters, |c, _, r| {
-        let s = (r * problem.weights[c]).powi(2);
+        let weighted = r * problem.weights[c];
+        let s = weighted * weighted;
         let rho = problem.loss.at(s);
         squares += rho.first * rho.first * s;
         slopes += rho.first + 2.0 * s * rho.second;
-        weights += rho.first;
+        weights += problem.loss.row_factors(weighted).0.powi(2);
     })?;
     Ok(if slopes > 0.0 {
         (squares * weights).sqrt() / slopes

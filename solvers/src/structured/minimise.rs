@@ -122,7 +122,7 @@ impl Fit {
 }
 
 /// First damping after a failed Gauss–Newton step, relative to the squared column norms.
-const FIRST_DAMPING: f64 = 1e-4;
+const FIRST_DAMPING: f64 = 1e-3;
 /// Damping below this is none.
 const NO_DAMPING: f64 = 1e-9;
 /// Damping above this means that no step helps.

@@ -23,9 +23,9 @@ const MOST_NOISE_ROUNDS: usize = 10;
 /// The noise has settled when no channel's changes by more than this share.
 const NOISE_SETTLED: f64 = 1e-4;
 
-/// A robust fit is near its end, where curvature helps, when reweighting promises to lower the cost
-/// by less than this share.
-const NEAR: f64 = 1e-2;
+/// A robust fit is near its end, where curvature helps, when a step without it promises to lower
+/// the cost by less than this share.
+const NEAR: f64 = 0.1;
 
 /// A channel's noise is never taken below this share of the noisiest: a channel without any noise
 /// would otherwise be the only one to count.
@@ -100,21 +100,25 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         thickness_mm,
         weights_of(&sigmas),
     );
-    let mut result = minimise(&problem, start, options.minimisation)?;
+    let near = errsep_solvers::structured::Options {
+        cost_tolerance: NEAR,
+        ..options.minimisation
+    };
+    let robust = options.loss != Loss::Quadratic;
+    let first = if robust { near } else { options.minimisation };
+    let mut result = minimise(&problem, start, first)?;
     let mut history = result.iterations.clone();
-    if options.loss != Loss::Quadratic && result.converged() {
+    if robust {
         // From the least-squares solution on, outliers are those of the readings, not of the start.
         problem.loss = options.loss;
-        problem.far = true;
-        let nearer = errsep_solvers::structured::Options {
-            cost_tolerance: NEAR,
-            ..options.minimisation
-        };
-        result = minimise(&problem, result.parameters, nearer)?;
-        history.extend(&result.iterations);
-        problem.far = false;
-        result = minimise(&problem, result.parameters, options.minimisation)?;
-        history.extend(&result.iterations);
+        for (far, stop) in [(true, near), (false, options.minimisation)] {
+            if !result.converged() {
+                break;
+            }
+            problem.far = far;
+            result = minimise(&problem, result.parameters, stop)?;
+            history.extend(&result.iterations);
+        }
     }
     let first_run = history.len();
     let mut freedom = shared_freedom(&problem);

@@ -2,6 +2,7 @@
 
 use errsep_solvers::structured::Parameters;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::error::ReversalError;
 use super::readings::ChannelReadings;
@@ -14,7 +15,7 @@ use crate::units::mm_from_um;
 /// [`ReversalError::OnePosition`] for a channel without a slope.
 pub fn lines(channels: &[ChannelReadings]) -> Result<Vec<(f64, f64)>, ReversalError> {
     channels
-        .iter()
+        .par_iter()
         .map(|c| {
             let (slope, height) = c.line().ok_or(ReversalError::OnePosition {
                 channel: c.channel.name(),

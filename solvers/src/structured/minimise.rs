@@ -138,7 +138,7 @@ impl Fit {
 }
 
 /// First damping after a failed Gauss–Newton step, relative to the squared column norms.
-const FIRST_DAMPING: f64 = 1e-4;
+const FIRST_DAMPING: f64 = 1e-3;
 /// Damping below this is none.
 const NO_DAMPING: f64 = 1e-9;
 /// Damping above this means that no step helps.
@@ -282,7 +282,14 @@ impl Minimiser {
         let predicted = system.predicted_reduction(&solved.band, &solved.border);
         let cost = self.evaluation.cost;
         let trial = self.at.stepped(&solved.band, &solved.border);
-        if let (Some(by), true) = (self.settled_by(predicted, &solved), self.damping == 0.0) {
+        let settled = self.settled_by(predicted, &solved);
+        let accepted = self.iterations.last().is_some_and(|i| i.accepted);
+        if settled.is_some() && self.damping > 0.0 && accepted {
+            // The undamped step shows whether it is the end.
+            self.damping = 0.0;
+            return self.advance(problem);
+        }
+        if let (Some(by), true) = (settled, self.damping == 0.0) {
             let combinations = undetermined(problem, system, &solved);
             self.at = trial;
             self.evaluation.cost = (cost - predicted).max(0.0);

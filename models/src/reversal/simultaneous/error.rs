@@ -29,6 +29,14 @@ pub enum ReversalError {
         /// The position, mm.
         x: f64,
     },
+    /// Beyond 45° the readings say more about the units than about a tilt.
+    #[error("the readings of channel {channel} climb at {degrees:.1} degrees; below 45 is needed")]
+    TooSteep {
+        /// The channel.
+        channel: &'static str,
+        /// Its tilt.
+        degrees: f64,
+    },
     /// Fewer readings than unknowns.
     #[error(
         "{readings} readings cannot determine {unknowns} unknowns: take more readings or fewer knots"

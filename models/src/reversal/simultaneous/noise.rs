@@ -2,7 +2,7 @@
 
 use errsep_solvers::loss::Loss;
 use errsep_solvers::structured::{
-    Fit, Iteration, Minimiser, Parameters, Progress, hat_traces, minimise,
+    Fit, Iteration, Minimiser, Options as Minimisation, Parameters, Progress, hat_traces, minimise,
 };
 
 use super::error::ReversalError;
@@ -15,6 +15,10 @@ const MOST_NOISE_ROUNDS: usize = 10;
 
 /// The noise has settled when no channel's changes by more than this share.
 const NOISE_SETTLED: f64 = 1e-4;
+
+/// A robust fit is near its end, where curvature helps, when a step without it promises to lower
+/// the cost by less than this share.
+const NEAR: f64 = 0.1;
 
 /// A channel's noise is never taken below this share of the noisiest: a channel without any noise
 /// would otherwise be the only one to count.
@@ -50,13 +54,25 @@ pub fn settle(
     if options.loss == Loss::Quadratic && estimated {
         return settle_on_the_way(problem, start, options, sigmas);
     }
-    let mut fit = minimise(problem, start, options.minimisation)?;
+    let near = Minimisation {
+        cost_tolerance: NEAR,
+        ..options.minimisation
+    };
+    let robust = options.loss != Loss::Quadratic;
+    let first = if robust { near } else { options.minimisation };
+    let mut fit = minimise(problem, start, first)?;
     let mut history = fit.iterations.clone();
-    if options.loss != Loss::Quadratic && fit.converged() {
+    if robust {
         // From the least-squares solution on, outliers are those of the readings, not of the start.
         problem.loss = options.loss;
-        fit = minimise(problem, fit.parameters, options.minimisation)?;
-        history.extend(&fit.iterations);
+        for (far, stop) in [(true, near), (false, options.minimisation)] {
+            if !fit.converged() {
+                break;
+            }
+            problem.far = far;
+            fit = minimise(problem, fit.parameters, stop)?;
+            history.extend(&fit.iterations);
+        }
     }
     let first_run = history.len();
     let mut freedom = shared_freedom(problem);
@@ -205,8 +221,9 @@ fn floored(sigmas: Vec<f64>) -> Vec<f64> {
         .collect()
 }
 
-/// By how much a robust loss stretches the standard uncertainty: the rows have given
-/// (Σ w J Jᵀ)⁻¹, w = ρ′; the covariance is E[ψ²]/E[ψ′]² (JᵀJ)⁻¹ (Huber 1981, section 7.6), ψ = ρ′ r.
+/// By how much a robust loss stretches the standard uncertainty: the rows, each times its factor w,
+/// have given (Σ w² J Jᵀ)⁻¹; the covariance is E[ψ²]/E[ψ′]² (JᵀJ)⁻¹ (Huber 1981, section 7.6),
+/// ψ = ρ′ r.
 pub fn robust_unit(problem: &Reversal, residuals: &[Vec<f64>]) -> f64 {
     if problem.loss == Loss::Quadratic {
         return 1.0;
@@ -214,11 +231,12 @@ pub fn robust_unit(problem: &Reversal, residuals: &[Vec<f64>]) -> f64 {
     let (mut squares, mut slopes, mut weights) = (0.0, 0.0, 0.0);
     for (own, weight) in residuals.iter().zip(&problem.weights) {
         for r in own {
-            let s = (r * weight).powi(2);
+            let weighted = r * weight;
+            let s = weighted * weighted;
             let rho = problem.loss.at(s);
             squares += rho.first * rho.first * s;
             slopes += rho.first + 2.0 * s * rho.second;
-            weights += rho.first;
+            weights += problem.loss.row_factors(weighted).0.powi(2);
         }
     }
     if slopes > 0.0 {

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use errsep_solvers::loss::Loss;
-use errsep_solvers::structured::{Fit, hat_traces, minimise};
+use errsep_solvers::structured::{Fit, Parameters, hat_traces, minimise};
 
 use super::closure;
 use super::error::ReversalError;
@@ -106,6 +106,10 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
     };
     let robust = options.loss != Loss::Quadratic;
     let first = if robust { near } else { options.minimisation };
+    let start = match thickness_free {
+        true => start_of_thickness(&mut problem, start, first)?,
+        false => start,
+    };
     let mut result = minimise(&problem, start, first)?;
     let mut history = result.iterations.clone();
     if robust {
@@ -231,6 +235,33 @@ fn check(observations: &Observations, options: &Options) -> Result<(), ReversalE
         return refuse("the noise", sigma, "greater than zero");
     }
     Ok(())
+}
+
+/// The fit with the thickness held, where to start from with the thickness free: small tilts leave
+/// hardly a trace of it in the readings, and a search for it would go astray.
+///
+/// # Errors
+/// [`ReversalError::ThicknessNotDetermined`] where its uncertainty would exceed the value it starts
+/// from.
+fn start_of_thickness(
+    problem: &mut Reversal,
+    start: Parameters,
+    options: errsep_solvers::structured::Options,
+) -> Result<Parameters, ReversalError> {
+    let Some(index) = problem.unknowns.thickness_index() else {
+        return Ok(start);
+    };
+    problem.hold(index, true);
+    let held = minimise(problem, start, options)?;
+    let released = held.if_released(problem, index);
+    problem.hold(index, false);
+    let freedom: f64 = shared_freedom(problem).iter().sum();
+    let unit = (2.0 * held.cost / freedom.max(1.0)).sqrt();
+    let std_mm = released.map_or(f64::INFINITY, |(_, variance)| unit * variance.sqrt());
+    if std_mm > problem.thickness_mm {
+        return Err(ReversalError::ThicknessNotDetermined { std_mm });
+    }
+    Ok(held.parameters)
 }
 
 fn choose_breaks(

@@ -17,7 +17,7 @@ use crate::report::number::{measured, plain};
 
 /// Effects of which less than this part is visible are called undetectable; so are those that would
 /// show only at a size that is not plausible.
-const UNDETECTABLE: f64 = 1e-3;
+const UNDETECTABLE: f64 = 1e-4;
 /// Places that are not reported beyond this probability.
 const PLACE_LEVEL: f64 = 0.05;
 /// Normal quantile of 80 % power.
@@ -455,10 +455,20 @@ fn statement(
                 plain(gap.noise, 3)
             )
         }
-        Kind::Unknown => format!(
-            "The model misses {} {unit} RMS{place}, and no effect of the catalogue explains it.",
-            plain(gap.before.rms, 3)
-        ),
+        Kind::Unknown => {
+            let partial = match verdict.partial[..] {
+                [] => String::new(),
+                ref some => format!(
+                    "; {} would leave {} {unit} of it",
+                    some.join(" and "),
+                    plain(gap.after.rms, 3)
+                ),
+            };
+            format!(
+                "The model misses {} {unit} RMS{place}, and no effect of the catalogue explains it{partial}.",
+                plain(gap.before.rms, 3)
+            )
+        }
         Kind::Effect => {
             let named: Vec<String> = verdict
                 .effects

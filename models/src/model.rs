@@ -161,6 +161,11 @@ impl Shape {
             steps: Vec::new(),
         }
     }
+
+    /// Number of parameters that the search may change.
+    pub fn free(&self) -> usize {
+        self.steps.iter().filter(|step| **step != 0.0).count()
+    }
 }
 
 /// What people should know of an effect.

@@ -7,6 +7,7 @@
 mod attribute;
 mod bench;
 mod dictionary;
+mod folding;
 mod geometry;
 mod localise;
 mod noise;
@@ -18,6 +19,7 @@ mod search;
 mod space;
 mod tabulated;
 mod verdict;
+mod whitening;
 
 use errsep_models::model::{Effect, FittedModel};
 use nalgebra::DVector;
@@ -80,32 +82,29 @@ pub fn diagnose_with<M: FittedModel>(
         return report::compose(&bench, &readings, &first, first.global, None, options);
     }
     let found = attribute(&bench, &readings, &first);
-    second_pass(model, &catalogue, &bench, &readings, first, found, options)
+    second_pass(&bench, &readings, &first, found.as_ref(), options)
 }
 
 /// Causes bend the fitted state and swell the noise; both are found again without them, and the
 /// diagnosis is made once more from there.
 fn second_pass<M: FittedModel>(
-    model: &M,
-    catalogue: &[Box<dyn Effect<M>>],
     bench: &Bench<'_, M>,
     readings: &DVector<f64>,
-    first: Remainder,
-    found: Option<Answer>,
+    first: &Remainder,
+    found: Option<&Answer>,
     options: &Options,
 ) -> Diagnosis {
     let detected = first.global;
     let change = found
-        .as_ref()
         .and_then(|answer| {
             let (amplitudes, _) = bench.amplitudes(readings, &answer.causes)?;
             Some(bench.change(&answer.causes, &amplitudes))
         })
         .unwrap_or_else(|| DVector::zeros(readings.len()));
-    let state = model.refit(model.observed() - &change);
+    let state = bench.model.refit(bench.model.observed() - &change);
     let clean = state.linearised();
     let law = noise_of(&state, &clean);
-    let bench = Bench::new(&state, catalogue, law, options.draws, options.seed);
+    let bench = bench.moved(&state, law);
     let readings = clean + change;
     let first = bench.remainder(&readings, &[]);
     let found = attribute(&bench, &readings, &first);

@@ -49,7 +49,7 @@ pub(super) fn compose<M: FittedModel>(
     let meter = GapMeter::new(bench.model, &bench.law, options.seed);
     let unknowns: usize = causes
         .iter()
-        .map(|c| c.projected.ncols() + c.shape.values.len())
+        .map(|c| c.projected.ncols() + c.shape.free())
         .sum();
     let before = meter.size(readings, 0);
     let after = meter.size(&(readings - &change), unknowns);
@@ -244,7 +244,7 @@ fn candidates<M: FittedModel>(
         let (t, unknowns) = cause.as_ref().map_or((0.0, 0), |c| {
             let gram = c.projected.tr_mul(&c.projected);
             let score = c.projected.tr_mul(&first.residual);
-            let unknowns = c.projected.ncols() + c.shape.values.len();
+            let unknowns = c.projected.ncols() + c.shape.free();
             (statistic(&gram, &score, false), unknowns)
         });
         let in_set =
@@ -309,7 +309,7 @@ fn places<M: FittedModel>(bench: &Bench<'_, M>, first: &Remainder, excess: f64) 
                 ))
                 .column(0)
                 .clone_owned();
-            let score = super::dictionary::products(&entry.columns, &adjoint);
+            let score = entry.products(&bench.dictionary.places.sums(&adjoint));
             let t = statistic(&entry.gram, &score, false);
             let (share, ci) = interval(t);
             places.push(Where::new(item, share, ci, p));

@@ -13,7 +13,7 @@ use super::verdict::{
     Candidate, Detail, Diagnosis, Gap, Harm, Hidden, Kind, NoiseOut, Verdict, Where,
 };
 
-use crate::report::number::measured;
+use crate::report::number::{measured, plain};
 
 /// Effects of which less than this part is visible are called undetectable.
 const UNDETECTABLE: f64 = 0.01;
@@ -429,7 +429,7 @@ fn statement(
         .collect();
     let place = places.first().map_or(String::new(), |p| {
         let range = match (p.from, p.to) {
-            (Some(from), Some(to)) => format!(" from {from:.4} to {to:.4}"),
+            (Some(from), Some(to)) => format!(" from {} to {}", plain(from, 4), plain(to, 4)),
             _ => String::new(),
         };
         format!(", most of it in {} {}{range}", p.axis, p.value)
@@ -445,13 +445,13 @@ fn statement(
                 )
             };
             format!(
-                "The model misses nothing that stands out of the noise of {:.3} {unit}{blind}.",
-                gap.noise
+                "The model misses nothing that stands out of the noise of {} {unit}{blind}.",
+                plain(gap.noise, 3)
             )
         }
         Kind::Unknown => format!(
-            "The model misses {:.3} {unit} RMS{place}, and no effect of the catalogue explains it.",
-            gap.before.rms
+            "The model misses {} {unit} RMS{place}, and no effect of the catalogue explains it.",
+            plain(gap.before.rms, 3)
         ),
         Kind::Effect => {
             let named: Vec<String> = verdict
@@ -484,10 +484,10 @@ fn statement(
                 )
             };
             format!(
-                "The model misses {:.3} {unit} RMS because of {}; with it {:.3} {unit} remain. {doubt}",
-                gap.before.rms,
+                "The model misses {} {unit} RMS because of {}; with it {} {unit} remain. {doubt}",
+                plain(gap.before.rms, 3),
                 named.join(" and "),
-                gap.after.rms
+                plain(gap.after.rms, 3)
             )
         }
     }

@@ -122,7 +122,7 @@ impl Fit {
 }
 
 /// First damping after a failed Gauss–Newton step, relative to the squared column norms.
-const FIRST_DAMPING: f64 = 1e-4;
+const FIRST_DAMPING: f64 = 1e-3;
 /// Damping below this is none.
 const NO_DAMPING: f64 = 1e-9;
 /// Damping above this means that no step helps.
@@ -205,6 +205,12 @@ impl Minimiser {
         } else {
             None
         };
+        let accepted = self.iterations.last().is_some_and(|i| i.accepted);
+        if settled.is_some() && self.damping > 0.0 && accepted {
+            // The undamped step shows whether it is the end.
+            self.damping = 0.0;
+            return self.advance(problem);
+        }
         if let (Some(by), true) = (settled, self.damping == 0.0) {
             let combinations = undetermined(problem, system, &solved);
             self.at = trial;

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use errsep_solvers::loss::Loss;
-use errsep_solvers::structured::{Fit, hat_traces, minimise};
+use errsep_solvers::structured::{Fit, Parameters, hat_traces, minimise};
 
 use super::closure;
 use super::error::ReversalError;
@@ -22,6 +22,10 @@ const MOST_NOISE_ROUNDS: usize = 10;
 
 /// The noise has settled when no channel's changes by more than this share.
 const NOISE_SETTLED: f64 = 1e-4;
+
+/// A robust fit is near its end, where curvature helps, when a step without it promises to lower
+/// the cost by less than this share.
+const NEAR: f64 = 0.1;
 
 /// A channel's noise is never taken below this share of the noisiest: a channel without any noise
 /// would otherwise be the only one to count.
@@ -96,13 +100,29 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         thickness_mm,
         weights_of(&sigmas),
     );
-    let mut result = minimise(&problem, start, options.minimisation)?;
+    let near = errsep_solvers::structured::Options {
+        cost_tolerance: NEAR,
+        ..options.minimisation
+    };
+    let robust = options.loss != Loss::Quadratic;
+    let first = if robust { near } else { options.minimisation };
+    let start = match thickness_free {
+        true => start_of_thickness(&mut problem, start, first)?,
+        false => start,
+    };
+    let mut result = minimise(&problem, start, first)?;
     let mut history = result.iterations.clone();
-    if options.loss != Loss::Quadratic && result.converged() {
+    if robust {
         // From the least-squares solution on, outliers are those of the readings, not of the start.
         problem.loss = options.loss;
-        result = minimise(&problem, result.parameters, options.minimisation)?;
-        history.extend(&result.iterations);
+        for (far, stop) in [(true, near), (false, options.minimisation)] {
+            if !result.converged() {
+                break;
+            }
+            problem.far = far;
+            result = minimise(&problem, result.parameters, stop)?;
+            history.extend(&result.iterations);
+        }
     }
     let first_run = history.len();
     let mut freedom = shared_freedom(&problem);
@@ -217,6 +237,33 @@ fn check(observations: &Observations, options: &Options) -> Result<(), ReversalE
     Ok(())
 }
 
+/// The fit with the thickness held, where to start from with the thickness free: small tilts leave
+/// hardly a trace of it in the readings, and a search for it would go astray.
+///
+/// # Errors
+/// [`ReversalError::ThicknessNotDetermined`] where its uncertainty would exceed the value it starts
+/// from.
+fn start_of_thickness(
+    problem: &mut Reversal,
+    start: Parameters,
+    options: errsep_solvers::structured::Options,
+) -> Result<Parameters, ReversalError> {
+    let Some(index) = problem.unknowns.thickness_index() else {
+        return Ok(start);
+    };
+    problem.hold(index, true);
+    let held = minimise(problem, start, options)?;
+    let released = held.if_released(problem, index);
+    problem.hold(index, false);
+    let freedom: f64 = shared_freedom(problem).iter().sum();
+    let unit = (2.0 * held.cost / freedom.max(1.0)).sqrt();
+    let std_mm = released.map_or(f64::INFINITY, |(_, variance)| unit * variance.sqrt());
+    if std_mm > problem.thickness_mm {
+        return Err(ReversalError::ThicknessNotDetermined { std_mm });
+    }
+    Ok(held.parameters)
+}
+
 fn choose_breaks(
     choice: &Choice,
     knots: &Knots,
@@ -303,19 +350,21 @@ fn estimate_noise(
         .collect())
 }
 
-/// By how much a robust loss stretches the standard uncertainty: the rows have given
-/// (Σ w J Jᵀ)⁻¹, w = ρ′; the covariance is E[ψ²]/E[ψ′]² (JᵀJ)⁻¹ (Huber 1981, section 7.6), ψ = ρ′ r.
+/// By how much a robust loss stretches the standard uncertainty: the rows, each times its factor w,
+/// have given (Σ w² J Jᵀ)⁻¹; the covariance is E[ψ²]/E[ψ′]² (JᵀJ)⁻¹ (Huber 1981, section 7.6),
+/// ψ = ρ′ r.
 fn robust_unit(problem: &Reversal, result: &Fit) -> Result<f64, ReversalError> {
     if problem.loss == Loss::Quadratic {
         return Ok(1.0);
     }
     let (mut squares, mut slopes, mut weights) = (0.0, 0.0, 0.0);
     problem.residuals(&result.parameters, |c, _, r| {
-        let s = (r * problem.weights[c]).powi(2);
+        let weighted = r * problem.weights[c];
+        let s = weighted * weighted;
         let rho = problem.loss.at(s);
         squares += rho.first * rho.first * s;
         slopes += rho.first + 2.0 * s * rho.second;
-        weights += rho.first;
+        weights += problem.loss.row_factors(weighted).0.powi(2);
     })?;
     Ok(if slopes > 0.0 {
         (squares * weights).sqrt() / slopes

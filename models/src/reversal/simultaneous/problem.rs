@@ -36,6 +36,10 @@ pub struct Reversal<'a> {
     pub weights: Vec<f64>,
     /// Loss of a weighted residual.
     pub loss: Loss,
+    /// Whether rows under a robust loss are only reweighted by √ρ′, which lowers the cost from
+    /// anywhere but converges linearly. Otherwise they carry the loss's curvature, which converges
+    /// quadratically from nearby.
+    pub far: bool,
     maps: Vec<DMatrix<f64>>,
     constraints: Constraints,
     held: Vec<bool>,
@@ -73,6 +77,7 @@ impl<'a> Reversal<'a> {
             thickness_mm,
             weights,
             loss: Loss::Quadratic,
+            far: false,
             maps,
             constraints,
             held,
@@ -88,6 +93,11 @@ impl<'a> Reversal<'a> {
     /// The gauge.
     pub fn gauge(&self) -> &Constraints {
         &self.constraints
+    }
+
+    /// Holds a border unknown at its value, or lets it go.
+    pub fn hold(&mut self, index: usize, held: bool) {
+        self.held[index] = held;
     }
 
     /// The thickness at a point, mm.
@@ -290,11 +300,7 @@ fn starts(x: &[f64], breaks: &[f64]) -> Vec<usize> {
     starts
 }
 
-/// What a robust loss makes of a batch: rows and residuals times √ρ′, and the cost ½ Σ ρ.
-///
-/// Plain reweighting: it converges linearly, but from anywhere. The correction by the curvature
-/// takes every row far from the model for an outlier without curvature, and there are many where
-/// forms begin at zero.
+/// What a robust loss makes of a batch: the factors of its rows, its residuals, and the cost ½ Σ ρ.
 struct Robust {
     rows: [f64; Tall::CAPACITY],
     residuals: [f64; Tall::CAPACITY],
@@ -302,15 +308,21 @@ struct Robust {
 }
 
 impl Robust {
-    fn of(loss: Loss, residuals: &[f64]) -> Self {
+    fn of(loss: Loss, far: bool, residuals: &[f64]) -> Self {
         let mut robust = Self {
             rows: [0.0; Tall::CAPACITY],
             residuals: [0.0; Tall::CAPACITY],
             cost: loss.cost(residuals),
         };
         for (i, r) in residuals.iter().enumerate() {
-            robust.rows[i] = loss.at(r * r).first.max(0.0).sqrt();
-            robust.residuals[i] = robust.rows[i] * r;
+            let (row, residual) = if far {
+                let root = loss.at(r * r).first.max(0.0).sqrt();
+                (root, root)
+            } else {
+                loss.row_factors(*r)
+            };
+            robust.rows[i] = row;
+            robust.residuals[i] = residual * r;
         }
         robust
     }
@@ -423,7 +435,7 @@ impl StructuredProblem for Reversal<'_> {
                     points.fill(&run, x, None, sink.batch(last - first));
                     sink.push();
                 } else {
-                    let robust = Robust::of(self.loss, &points.residual[..last - first]);
+                    let robust = Robust::of(self.loss, self.far, &points.residual[..last - first]);
                     let batch = sink.batch(last - first);
                     points.fill(&run, x, Some(&robust.rows), batch);
                     let residual = batch.columns() - 1;

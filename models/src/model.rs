@@ -238,6 +238,18 @@ pub trait Effect<M>: Send + Sync {
         None
     }
 
+    /// The readings without this effect, where taking its change out of them does not suffice
+    /// because the effect hides a part of the state: from the readings with it and those less its
+    /// change, `clean`.
+    fn restored(
+        &self,
+        _model: &M,
+        _readings: &DVector<f64>,
+        _clean: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        None
+    }
+
     /// The variant in words, where the effect has several.
     fn variant_name(&self, _model: &M, _shape: &Shape) -> Option<String> {
         None

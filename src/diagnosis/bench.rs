@@ -128,9 +128,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
                 break;
             }
             last = Some(amplitudes.clone());
-            let state = self
-                .model
-                .refit(readings - self.change(&causes, &amplitudes));
+            let state = self.without(readings, &causes, &amplitudes);
             for k in 0..causes.len() {
                 let mut others = causes.clone();
                 let own = others.remove(k);
@@ -139,6 +137,24 @@ impl<'a, M: FittedModel> Bench<'a, M> {
             }
         }
         causes
+    }
+
+    /// The state fitted to readings without causes at given amplitudes.
+    pub fn without(&self, readings: &DVector<f64>, causes: &[Cause], amplitudes: &DVector<f64>) -> M {
+        let mut clean = readings - self.change(causes, amplitudes);
+        let mut at = 0;
+        for cause in causes {
+            let count = cause.columns.len();
+            let own = amplitudes.rows(at, count).clone_owned();
+            at += count;
+            let with = &clean + self.change(std::slice::from_ref(cause), &own);
+            if let Some(restored) =
+                self.catalogue[cause.effect].restored(self.model, &with, &clean)
+            {
+                clean = restored;
+            }
+        }
+        self.model.refit(clean)
     }
 
     /// Scores of everything beside some causes.
@@ -357,6 +373,21 @@ pub(super) fn stack(causes: &[Cause], readings: usize) -> DMatrix<f64> {
         .collect();
     if columns.is_empty() {
         DMatrix::zeros(readings, 0)
+    } else {
+        DMatrix::from_columns(&columns)
+    }
+}
+
+/// Signatures as they stand in the readings, readings × amplitudes.
+pub(super) fn raw_signatures<M: FittedModel>(bench: &Bench<'_, M>, causes: &[Cause]) -> DMatrix<f64> {
+    let n = bench.space.readings();
+    let columns: Vec<DVector<f64>> = causes
+        .iter()
+        .flat_map(|c| &c.columns)
+        .map(|c| c.dense(n))
+        .collect();
+    if columns.is_empty() {
+        DMatrix::zeros(n, 0)
     } else {
         DMatrix::from_columns(&columns)
     }

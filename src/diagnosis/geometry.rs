@@ -58,6 +58,7 @@ pub fn certificate<M: FittedModel>(
     let dictionary = Dictionary::new(model, catalogue, places, &space, law);
     let null = NullLaw::simulate(&dictionary, &space, law, options.draws, options.seed);
     let quantities = model.quantities();
+    let level = null.level(options.false_alarm);
     let n = space.readings();
     let mut rows = Vec::new();
     for effect in catalogue {
@@ -124,7 +125,7 @@ pub fn certificate<M: FittedModel>(
                     }
                 }
             }
-            let threshold = null.threshold(family, options.false_alarm);
+            let threshold = null.threshold(family, level);
             let smallest = (threshold.sqrt() + POWER) / length;
             row.detectable = Some(smallest);
             row.visible_rms = Some(smallest * length * law.sigma() / (n as f64).sqrt());

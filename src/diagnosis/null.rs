@@ -111,6 +111,20 @@ impl NullLaw {
         high
     }
 
+    /// The tail probability of one family at which any family stands out with a probability.
+    pub fn level(&self, probability: f64) -> f64 {
+        let (mut low, mut high) = (-700.0, 0.0);
+        for _ in 0..60 {
+            let middle: f64 = 0.5 * (low + high);
+            if self.smallest.beyond(-2.0 * middle) > probability {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        low.exp()
+    }
+
     fn smallest_of(&self, surprises: &[f64]) -> f64 {
         surprises
             .iter()

@@ -83,29 +83,10 @@ impl GapMeter {
         readings: &DVector<f64>,
         signatures: &DMatrix<f64>,
     ) -> Option<HeldOut> {
-        let repeats: Vec<u32> = model
-            .places()
-            .iter()
-            .map(|p| p.repeat)
-            .collect::<BTreeSet<_>>()
-            .into_iter()
-            .collect();
-        let half = repeats.len() / 2;
-        if half == 0 {
-            return None;
-        }
         let none = DMatrix::zeros(readings.len(), 0);
         let (mut before, mut after, mut floor, mut count) = (0.0, 0.0, 0.0, 0.0);
         let noise = self.sigma * self.sigma;
-        for chosen in halves(repeats.len()).into_iter().take(SPLITS) {
-            let inside = |t: usize| {
-                let repeat = model.places()[model.traces()[t].start].repeat;
-                repeats
-                    .iter()
-                    .position(|r| *r == repeat)
-                    .is_some_and(|k| chosen >> k & 1 == 1)
-            };
-            let split = Split::new(model, inside)?;
+        for split in splits(model)? {
             let fit = split.fit(signatures);
             let Some(fit) = fit.filter(|fit| fit.shows(signatures)) else {
                 continue;
@@ -131,6 +112,50 @@ impl GapMeter {
             floor,
         })
     }
+}
+
+/// Mean square of what a model with effects misses of held-out repeats; nothing where they are
+/// too few, or where an effect does not show in every half.
+pub(super) fn held_out_square<M: FittedModel>(
+    model: &M,
+    readings: &DVector<f64>,
+    signatures: &DMatrix<f64>,
+    noise: f64,
+) -> Option<f64> {
+    let mut sum = 0.0;
+    let splits = splits(model)?;
+    for split in &splits {
+        let fit = split.fit(signatures).filter(|fit| fit.shows(signatures))?;
+        sum += split.square(readings, &fit.predict(readings), noise);
+    }
+    Some(sum / splits.len() as f64)
+}
+
+/// The ways in which the repeats are split.
+fn splits<M: FittedModel>(model: &M) -> Option<Vec<Split>> {
+    let repeats: Vec<u32> = model
+        .places()
+        .iter()
+        .map(|p| p.repeat)
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .collect();
+    if repeats.len() < 2 {
+        return None;
+    }
+    halves(repeats.len())
+        .into_iter()
+        .take(SPLITS)
+        .map(|chosen| {
+            Split::new(model, |t: usize| {
+                let repeat = model.places()[model.traces()[t].start].repeat;
+                repeats
+                    .iter()
+                    .position(|r| *r == repeat)
+                    .is_some_and(|k| chosen >> k & 1 == 1)
+            })
+        })
+        .collect()
 }
 
 /// 1 − after / before; zero where there was nothing.

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use nalgebra::DVector;
+
 use super::FirstOrder;
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
 
@@ -10,6 +12,9 @@ use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
 /// the pointer stands when a trace begins depends on what came before: a place within the play,
 /// −1 to 1, for the forward and the backward traces of every channel.
 pub(super) struct Hysteresis;
+
+/// A pointer moves where its slope is at least this part of the other direction's.
+const MOVING: f64 = 0.5;
 
 impl Effect<FirstOrder> for Hysteresis {
     fn name(&self) -> &str {
@@ -84,6 +89,47 @@ impl Effect<FirstOrder> for Hysteresis {
             }
         }
         vec![column]
+    }
+
+    /// Where the stylus turns round within the play the pointer stands still and tells nothing of
+    /// it; the traces of the other direction, in which it moves, do.
+    fn restored(
+        &self,
+        model: &FirstOrder,
+        readings: &DVector<f64>,
+        clean: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let n = model.positions().len();
+        let mut restored = clean.clone();
+        for channel in 0..model.present().len() {
+            let traces = |direction: f64| {
+                model.traces().iter().filter(move |trace| {
+                    let place = &model.places()[trace.start];
+                    place.channel == channel && place.direction == direction
+                })
+            };
+            let mean = |direction: f64, values: &DVector<f64>| {
+                let count = traces(direction).count();
+                let mut sum = DVector::zeros(n);
+                traces(direction).for_each(|t| sum += values.rows(t.start, n));
+                (count > 0).then(|| sum / count as f64)
+            };
+            let forward = mean(1.0, readings)?;
+            let backward = mean(-1.0, readings)?;
+            let slopes = [model.smoothed(&forward).slopes, model.smoothed(&backward).slopes];
+            let clean = [mean(1.0, clean)?, mean(-1.0, clean)?];
+            for k in 0..n {
+                let steepest = slopes[0][k].abs().max(slopes[1][k].abs());
+                let moves = |d: usize| f64::from(u8::from(slopes[d][k].abs() >= MOVING * steepest));
+                let weights = [moves(0), moves(1)];
+                let stylus = (weights[0] * clean[0][k] + weights[1] * clean[1][k])
+                    / (weights[0] + weights[1]);
+                for direction in [1.0, -1.0] {
+                    traces(direction).for_each(|t| restored[t.start + k] = stylus);
+                }
+            }
+        }
+        Some(restored)
     }
 
     fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {

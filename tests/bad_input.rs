@@ -322,15 +322,17 @@ fn readings_that_determine_nothing() {
         ],
     );
     let steep = "x,1A\n0,0\n1,1100\n2,2200\n";
-    refused(
-        steep.as_bytes(),
-        None,
-        &[],
-        &[
-            "data.csv:2:3: the readings of channel 1A climb at 47.7 degrees",
-            "--columns",
-        ],
-    );
+    for options in [&[][..], &["--simultaneous"]] {
+        refused(
+            steep.as_bytes(),
+            None,
+            options,
+            &[
+                "data.csv:2:3: the readings of channel 1A climb at 47.7 degrees",
+                "--columns",
+            ],
+        );
+    }
     let apart = "x,1A,2B\n0,1,\n1,2,\n2,3,\n7,,1\n8,,1\n9,,1\n";
     refused(
         apart.as_bytes(),

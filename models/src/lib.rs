@@ -2,6 +2,7 @@
 
 pub mod anova;
 pub mod basis;
+pub mod calibration_line;
 pub mod circle;
 pub mod diagonal;
 pub mod four_sensor;

@@ -95,6 +95,8 @@ pub struct Profile {
     pub name: String,
     /// Unit of the values.
     pub unit: &'static str,
+    /// Positions of the values, in the unit of [`FittedModel::position_unit`].
+    pub positions: Vec<f64>,
     /// Values over the positions.
     pub values: DVector<f64>,
     /// Standard deviation of a value per unit standard deviation of one reading.
@@ -121,6 +123,28 @@ pub struct Parameter {
     pub low: f64,
     /// Greatest plausible value.
     pub high: f64,
+}
+
+impl Parameter {
+    /// A parameter of either sign.
+    pub const fn symmetric(name: &'static str, unit: &'static str, reach: f64) -> Self {
+        Self {
+            name,
+            unit,
+            low: -reach,
+            high: reach,
+        }
+    }
+
+    /// A parameter between two plausible values.
+    pub const fn between(name: &'static str, unit: &'static str, low: f64, high: f64) -> Self {
+        Self {
+            name,
+            unit,
+            low,
+            high,
+        }
+    }
 }
 
 /// The estimate of one parameter of an effect.

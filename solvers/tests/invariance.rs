@@ -123,7 +123,7 @@ fn rotation(seed: u64) -> DMatrix<f64> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
     fn units_do_not_matter(errors in errors(), powers in [-6.0..6.0_f64, -6.0..6.0, -6.0..6.0]) {
@@ -133,7 +133,16 @@ proptest! {
         for options in all_options() {
             let pair = (fitted(&plain, &options), fitted(&scaled, &options));
             prop_assert!(same(&pair.0, &pair.1, units), "{:?}", options.method);
-            // not only the end: scaled steps are the same steps
+        }
+    }
+
+    /// Powers of two round nothing, so that not only the end but every step must be the same.
+    #[test]
+    fn units_do_not_change_the_way(errors in errors(), powers in [-20..20_i32, -20..20, -20..20]) {
+        let plain = Seen::plain(&errors);
+        let scaled = Seen { units: powers.map(|power| 2f64.powi(power)), ..Seen::plain(&errors) };
+        for options in all_options() {
+            let pair = (fitted(&plain, &options), fitted(&scaled, &options));
             prop_assert_eq!(pair.0.iterations, pair.1.iterations, "{:?}", options.method);
         }
     }

@@ -47,6 +47,7 @@ struct Scan<'a, M> {
     last: f64,
     positions: usize,
     both_directions: bool,
+    repeats: bool,
     weights: Vec<(String, Vec<f64>)>,
 }
 
@@ -79,6 +80,7 @@ impl<'a, M: FittedModel> Scan<'a, M> {
             first,
             last,
             positions: (cells.len() / channels.len().max(1)).max(1),
+            repeats: places.windows(2).any(|w| w[0].repeat != w[1].repeat),
             both_directions: places.iter().any(|p| p.direction < 0.0)
                 && places.iter().any(|p| p.direction > 0.0),
             weights,
@@ -229,7 +231,11 @@ impl<'a, M: FittedModel> Scan<'a, M> {
             (true, false) => " forward",
         };
         let channel = channels.get(place.channel).map_or("", String::as_str);
-        format!("{channel}{direction}, repeat {}", place.repeat)
+        if self.repeats {
+            format!("{channel}{direction}, repeat {}", place.repeat)
+        } else {
+            format!("{channel}{direction}")
+        }
     }
 
     fn repeats(&self) -> Items {

@@ -13,10 +13,11 @@ use super::verdict::{
     Candidate, Detail, Diagnosis, Gap, Harm, Hidden, Kind, NoiseOut, Verdict, Where,
 };
 
-use crate::report::number::measured;
+use crate::report::number::{measured, plain};
 
-/// Effects of which less than this part is visible are called undetectable.
-const UNDETECTABLE: f64 = 0.01;
+/// Effects of which less than this part is visible are called undetectable; so are those that would
+/// show only at a size that is not plausible.
+const UNDETECTABLE: f64 = 1e-3;
 /// Places that are not reported beyond this probability.
 const PLACE_LEVEL: f64 = 0.05;
 /// Normal quantile of 80 % power.
@@ -382,8 +383,13 @@ fn hidden<M: FittedModel>(
         let entries = &bench.dictionary.entries[bench.dictionary.families[family].entries.clone()];
         let gram = entries.iter().map(|e| e.gram[(0, 0)]).fold(0.0, f64::max);
         let threshold = bench.null.threshold(family, options.false_alarm);
+        let most = description
+            .amplitudes()
+            .first()
+            .map_or(f64::INFINITY, |p| p.low.abs().max(p.high.abs()));
         let detectable = (visible >= UNDETECTABLE && gram > 0.0)
-            .then(|| (threshold.sqrt() + POWER) / gram.sqrt());
+            .then(|| (threshold.sqrt() + POWER) / gram.sqrt())
+            .filter(|size| *size <= most);
         let shape = description.grid(bench.model).into_iter().next();
         let column = shape
             .and_then(|s| description.columns(bench.model, &s).into_iter().next())
@@ -429,7 +435,7 @@ fn statement(
         .collect();
     let place = places.first().map_or(String::new(), |p| {
         let range = match (p.from, p.to) {
-            (Some(from), Some(to)) => format!(" from {from:.4} to {to:.4}"),
+            (Some(from), Some(to)) => format!(" from {} to {}", plain(from, 4), plain(to, 4)),
             _ => String::new(),
         };
         format!(", most of it in {} {}{range}", p.axis, p.value)
@@ -445,13 +451,13 @@ fn statement(
                 )
             };
             format!(
-                "The model misses nothing that stands out of the noise of {:.3} {unit}{blind}.",
-                gap.noise
+                "The model misses nothing that stands out of the noise of {} {unit}{blind}.",
+                plain(gap.noise, 3)
             )
         }
         Kind::Unknown => format!(
-            "The model misses {:.3} {unit} RMS{place}, and no effect of the catalogue explains it.",
-            gap.before.rms
+            "The model misses {} {unit} RMS{place}, and no effect of the catalogue explains it.",
+            plain(gap.before.rms, 3)
         ),
         Kind::Effect => {
             let named: Vec<String> = verdict
@@ -484,10 +490,10 @@ fn statement(
                 )
             };
             format!(
-                "The model misses {:.3} {unit} RMS because of {}; with it {:.3} {unit} remain. {doubt}",
-                gap.before.rms,
+                "The model misses {} {unit} RMS because of {}; with it {} {unit} remain. {doubt}",
+                plain(gap.before.rms, 3),
                 named.join(" and "),
-                gap.after.rms
+                plain(gap.after.rms, 3)
             )
         }
     }

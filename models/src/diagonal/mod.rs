@@ -12,7 +12,9 @@ mod closed_forms;
 mod components;
 mod design;
 mod determination;
+mod diagnosable;
 mod diagonals;
+mod effects;
 mod errors;
 mod estimates;
 mod estimators;
@@ -28,6 +30,7 @@ pub use closed_forms::{ClosedForm, DiagonalTotals, Total, TotalsEstimate, closed
 pub use components::{Axis, Component, Location, NodeKind};
 pub use design::{Identifiability, identifiability};
 pub use determination::{Ambiguity, Determined, Remedy};
+pub use diagnosable::DiagonalRuns;
 pub use diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
 pub use errors::ErrorTables;
 pub use estimates::{
@@ -39,4 +42,4 @@ pub use plan::{SequenceChoice, choose_sequences, determined_by};
 pub use prediction::{Parameter, Unknowns, predicted_reading};
 pub use readings::{DiagonalError, DiagonalReading, Edges, Motion};
 pub use regression::regress;
-pub use simulate::{DiagonalSimulation, simulate};
+pub use simulate::{DiagonalSimulation, Disturbance, Misalignments, simulate, simulate_disturbed};

@@ -580,6 +580,7 @@ impl FittedModel for FirstOrder {
         let profile = |name: &str, form: &SmoothProfile, gain: f64| Profile {
             name: name.to_owned(),
             unit: "um",
+            positions: self.positions.clone(),
             values: form.values.clone(),
             noise_gain: gain / per_channel.sqrt(),
         };

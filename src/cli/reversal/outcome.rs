@@ -113,6 +113,15 @@ impl Outcome {
         self.tilts.iter().find(is_alpha).map(|t| t.angle)
     }
 
+    /// Root mean square of the standard uncertainties of a form's points, µm; zero without the form.
+    pub fn rms_std(&self, name: &str) -> f64 {
+        let Some(form) = self.forms.iter().find(|form| form.name == name) else {
+            return 0.0;
+        };
+        let squares: f64 = form.std.iter().map(|s| s * s).sum();
+        (squares / form.std.len().max(1) as f64).sqrt()
+    }
+
     /// Straightness of each form against the three reference lines, µm.
     pub fn straightness(&self) -> Vec<(&str, [(ReferenceLine, f64); 3])> {
         self.forms

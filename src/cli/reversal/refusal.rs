@@ -7,6 +7,10 @@ use errsep_models::reversal::staged::NoSolution;
 use crate::io::Message;
 use crate::io::reversal::ReversalData;
 
+/// What to do about readings that climb too steeply.
+pub const OTHER_UNITS: &str = "x is in mm and readings in um: if the file has others, say so with \
+    --columns, such as x=x:mm,1A=1A:mm";
+
 /// The message for readings that the staged solution refuses.
 pub fn message(why: &NoSolution, file: &Path, data: &ReversalData) -> Message {
     let (channel, remedy) = match why {
@@ -16,10 +20,7 @@ pub fn message(why: &NoSolution, file: &Path, data: &ReversalData) -> Message {
             Some(*channel),
             "read every channel at three or more different positions x",
         ),
-        NoSolution::TooSteep { channel, .. } => (
-            Some(*channel),
-            "x is in mm and readings in um: if the file has others, say so with --columns, such as x=x:mm,1A=1A:mm",
-        ),
+        NoSolution::TooSteep { channel, .. } => (Some(*channel), OTHER_UNITS),
         NoSolution::NoOverlap { .. } => (
             None,
             "measure all channels over the same stretch of the slide",

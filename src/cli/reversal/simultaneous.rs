@@ -9,6 +9,7 @@ use errsep_models::reversal::{Channel, Contrast, Observations};
 use errsep_models::uncertainty::DegreesOfFreedom;
 
 use super::outcome::{Angle, Closure, Convergence, Form, Outcome, Residual};
+use super::refusal::OTHER_UNITS;
 use crate::io::Message;
 use crate::io::reversal::{ReversalData, ReversalSetup};
 use crate::report::{self, number};
@@ -39,10 +40,15 @@ fn refusal(why: &ReversalError, file: &Path, data: &ReversalData) -> Message {
             Message::not_solved(why.to_string()),
             "solve in stages (without --simultaneous), or give fewer [model] knots",
         ),
+        ReversalError::ThicknessNotDetermined { .. } => (
+            Message::not_solved(why.to_string()),
+            "measure the thickness and leave fit_thickness out of the set-up",
+        ),
         ReversalError::OnePosition { .. } => (
             Message::bad_input(why.to_string()),
             "read every channel at three or more different positions x",
         ),
+        ReversalError::TooSteep { .. } => (Message::bad_input(why.to_string()), OTHER_UNITS),
         ReversalError::TooFewReadings { .. } => (
             Message::bad_input(why.to_string()),
             "take more readings, or give fewer [model] knots in the set-up",
@@ -53,7 +59,9 @@ fn refusal(why: &ReversalError, file: &Path, data: &ReversalData) -> Message {
         ),
     };
     let place = match why {
-        ReversalError::OnePosition { channel, .. } => data.first_reading(channel),
+        ReversalError::OnePosition { channel, .. } | ReversalError::TooSteep { channel, .. } => {
+            data.first_reading(channel)
+        }
         _ => None,
     };
     match place {

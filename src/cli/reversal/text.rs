@@ -44,10 +44,21 @@ pub fn summary(o: &Outcome) -> String {
     };
     let lines = o.straightness();
     if let Some((_, lines)) = lines.iter().find(|(name, _)| *name == "M") {
-        text += &format!(
-            "; the slide is straight to {} µm (minimum zone)",
-            number::plain(lines[2].1, 3)
-        );
+        let zone = lines[2].1;
+        let std = o.rms_std("M");
+        text += &if zone > std {
+            format!(
+                "; the slide is straight to {} µm (minimum zone of points known to ± {} µm)",
+                number::plain(zone, 3),
+                number::plain(std, 2)
+            )
+        } else {
+            format!(
+                "; how straight the slide is cannot be said: its points are known to ± {} µm only, which hides the {} µm found (minimum zone)",
+                number::plain(std, 2),
+                number::plain(zone, 3)
+            )
+        };
     }
     text + "."
 }

@@ -296,6 +296,14 @@ mod tests {
         assert!(ticks.widest() <= 8, "{ticks:?}");
     }
 
+    /// 0.2003 to 0.2448 lies between two multiples of 0.05, the step for two ticks.
+    #[test]
+    fn a_range_between_two_round_values_has_a_tick() {
+        let marks = Scale::exact(0.2003, 0.2448, 0.0, 1.0).ticks(2, false).marks;
+        let labels: Vec<_> = marks.into_iter().map(|m| m.1).collect();
+        assert_eq!(labels, ["0.22", "0.24"]);
+    }
+
     #[test]
     fn decades_are_labelled_by_decades() {
         let domain = Domain::of(&[1e-9, 1.0], true);

@@ -29,6 +29,22 @@ pub enum ReversalError {
         /// The position, mm.
         x: f64,
     },
+    /// Beyond 45° the readings say more about the units than about a tilt.
+    #[error("the readings of channel {channel} climb at {degrees:.1} degrees; below 45 is needed")]
+    TooSteep {
+        /// The channel.
+        channel: &'static str,
+        /// Its tilt.
+        degrees: f64,
+    },
+    /// With tilts and forms this small the thickness leaves no trace in the readings.
+    #[error(
+        "these readings would give the thickness only to ± {std_mm:.3} mm: the tilts and slopes are too small for it to show"
+    )]
+    ThicknessNotDetermined {
+        /// Its standard uncertainty if it were fitted, mm.
+        std_mm: f64,
+    },
     /// Fewer readings than unknowns.
     #[error(
         "{readings} readings cannot determine {unknowns} unknowns: take more readings or fewer knots"

@@ -1,7 +1,10 @@
 //! The start: the least-squares line of every channel, and the contrasts of the slopes.
 
+use std::f64::consts::FRAC_PI_4;
+
 use errsep_solvers::structured::Parameters;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::error::ReversalError;
 use super::readings::ChannelReadings;
@@ -11,16 +14,24 @@ use crate::units::mm_from_um;
 /// Tilt (rad) and offset (µm) of each channel's line.
 ///
 /// # Errors
-/// [`ReversalError::OnePosition`] for a channel without a slope.
+/// [`ReversalError::OnePosition`] for a channel without a slope, [`ReversalError::TooSteep`] for one
+/// beyond 45°.
 pub fn lines(channels: &[ChannelReadings]) -> Result<Vec<(f64, f64)>, ReversalError> {
     channels
-        .iter()
+        .par_iter()
         .map(|c| {
             let (slope, height) = c.line().ok_or(ReversalError::OnePosition {
                 channel: c.channel.name(),
                 x: c.x.first().copied().unwrap_or(0.0),
             })?;
-            Ok((mm_from_um(slope).atan(), height))
+            let tilt = mm_from_um(slope).atan();
+            if tilt.abs() >= FRAC_PI_4 {
+                return Err(ReversalError::TooSteep {
+                    channel: c.channel.name(),
+                    degrees: tilt.to_degrees(),
+                });
+            }
+            Ok((tilt, height))
         })
         .collect()
 }

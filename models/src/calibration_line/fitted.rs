@@ -1,0 +1,227 @@
+//! The fitted line, laid open to the diagnosis.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use thiserror::Error;
+
+use super::effects;
+use super::lack_of_fit::{LackOfFit, lack_of_fit};
+use crate::model::{Effect, FittedModel, Freedom, Place, Quantity};
+
+/// One reading of a calibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CalibrationReading {
+    /// What was applied.
+    pub x: f64,
+    /// What was read.
+    pub y: f64,
+    /// Number of the set, from 1: readings of one set are taken in one go.
+    pub set: u32,
+    /// Seconds since the first reading, where they are known.
+    pub time: Option<f64>,
+}
+
+/// Why readings make no calibration line.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum NotALine {
+    /// A number that is NaN or infinite.
+    #[error("reading {} is not finite", index + 1)]
+    NotFinite {
+        /// Place in the list, from 0.
+        index: usize,
+    },
+    /// Too few values of x.
+    #[error(
+        "{values} different values of x leave nothing over from a straight line: calibrate at four or more"
+    )]
+    TooFewValues {
+        /// Different values of x.
+        values: usize,
+    },
+}
+
+/// The line of least squares through the readings.
+#[derive(Debug, Clone)]
+pub struct CalibrationLine {
+    observed: DVector<f64>,
+    places: Vec<Place>,
+    traces: Vec<Range<usize>>,
+    noise: Option<f64>,
+    reach: f64,
+    duration: f64,
+    /// Whether the readings came with times.
+    pub timed: bool,
+}
+
+impl CalibrationLine {
+    /// Sorts the readings into sets, in the order in which they were taken. `noise` is the standard
+    /// deviation of one reading where it is known.
+    ///
+    /// # Errors
+    /// [`NotALine`].
+    pub fn new(readings: &[CalibrationReading], noise: Option<f64>) -> Result<Self, NotALine> {
+        let finite = |r: &CalibrationReading| {
+            r.x.is_finite() && r.y.is_finite() && r.time.is_none_or(f64::is_finite)
+        };
+        if let Some(index) = readings.iter().position(|r| !finite(r)) {
+            return Err(NotALine::NotFinite { index });
+        }
+        let mut values: Vec<f64> = readings.iter().map(|r| r.x).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        if values.len() < 4 {
+            return Err(NotALine::TooFewValues {
+                values: values.len(),
+            });
+        }
+        let timed = readings.iter().all(|r| r.time.is_some());
+        let mut sets: BTreeMap<u32, Vec<(usize, &CalibrationReading)>> = BTreeMap::new();
+        for (order, reading) in readings.iter().enumerate() {
+            sets.entry(reading.set).or_default().push((order, reading));
+        }
+        let first = readings
+            .iter()
+            .filter_map(|r| r.time)
+            .fold(f64::INFINITY, f64::min);
+        let (mut observed, mut places, mut traces) = (Vec::new(), Vec::new(), Vec::new());
+        for (set, mut members) in sets {
+            members.sort_by(|a, b| a.1.x.total_cmp(&b.1.x));
+            let start = places.len();
+            for (order, reading) in members {
+                observed.push(reading.y);
+                places.push(Place {
+                    channel: 0,
+                    x: reading.x,
+                    time: match reading.time {
+                        Some(time) if timed => time - first,
+                        _ => order as f64,
+                    },
+                    repeat: set,
+                    direction: 1.0,
+                    cell: values.partition_point(|v| *v < reading.x),
+                });
+            }
+            traces.push(start..places.len());
+        }
+        let duration = places.iter().map(|p| p.time).fold(0.0, f64::max);
+        Ok(Self {
+            observed: DVector::from_vec(observed),
+            places,
+            traces,
+            noise,
+            reach: values.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs())),
+            duration: duration.max(f64::MIN_POSITIVE),
+            timed,
+        })
+    }
+
+    /// Greatest |x|: full scale.
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// Time of the last reading, s; readings are numbered where no times are given.
+    pub fn duration(&self) -> f64 {
+        self.duration
+    }
+
+    /// Whether all x are greater than zero.
+    pub fn positive(&self) -> bool {
+        self.places.iter().all(|p| p.x > 0.0)
+    }
+
+    /// The classical test of the line, with further columns fitted beside it, against the scatter
+    /// of readings of the same x; none where no x is read twice or nothing is left over.
+    pub fn lack_of_fit(&self, beside: &[DVector<f64>]) -> Option<LackOfFit> {
+        let mut columns = self.line();
+        for column in beside {
+            let at = columns.ncols();
+            columns = columns.insert_column(at, 0.0);
+            columns.set_column(at, column);
+        }
+        let cells: Vec<usize> = self.places.iter().map(|p| p.cell).collect();
+        lack_of_fit(&self.observed, &columns, &cells)
+    }
+
+    /// 1 and x of every reading, x in units of full scale.
+    fn line(&self) -> DMatrix<f64> {
+        DMatrix::from_fn(self.places.len(), 2, |row, column| {
+            [1.0, self.places[row].x / self.reach][column]
+        })
+    }
+}
+
+impl FittedModel for CalibrationLine {
+    fn name(&self) -> &'static str {
+        "calibration line"
+    }
+
+    fn reading_unit(&self) -> &'static str {
+        "y"
+    }
+
+    fn position_unit(&self) -> &'static str {
+        "x"
+    }
+
+    fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    fn traces(&self) -> &[Range<usize>] {
+        &self.traces
+    }
+
+    fn observed(&self) -> &DVector<f64> {
+        &self.observed
+    }
+
+    fn freedom(&self) -> Freedom {
+        Freedom {
+            columns: self.line(),
+            profiles: None,
+        }
+    }
+
+    fn channel_names(&self) -> Vec<String> {
+        vec!["y".to_owned()]
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        let count = self.places.len() as f64;
+        let mean = self.places.iter().map(|p| p.x).sum::<f64>() / count;
+        let sxx: f64 = self.places.iter().map(|p| (p.x - mean).powi(2)).sum();
+        let weights = |of: &dyn Fn(f64) -> f64| {
+            DVector::from_iterator(self.places.len(), self.places.iter().map(|p| of(p.x)))
+        };
+        vec![
+            Quantity {
+                name: "slope".to_owned(),
+                unit: "y/x",
+                weights: weights(&|x| (x - mean) / sxx),
+            },
+            Quantity {
+                name: "intercept".to_owned(),
+                unit: "y",
+                weights: weights(&|x| 1.0 / count - mean * (x - mean) / sxx),
+            },
+        ]
+    }
+
+    fn stated_noise(&self) -> Option<f64> {
+        self.noise
+    }
+
+    fn refit(&self, observed: DVector<f64>) -> Self {
+        Self {
+            observed,
+            ..self.clone()
+        }
+    }
+
+    fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
+        effects::all()
+    }
+}

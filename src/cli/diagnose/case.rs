@@ -1,0 +1,147 @@
+//! One diagnosis of any model, from the fitted model to the answer.
+
+use std::path::PathBuf;
+
+use errsep_models::model::{Effect, FittedModel, Place};
+
+use super::{Args, page, words};
+use crate::cli::{Answer, progress};
+use crate::diagnosis::{Diagnosis, Options, TabulatedEffects, Trials, diagnose_with, prove};
+use crate::io::{CsvTable, Message, SetupFile, Status};
+use crate::report::diagnosis as sheet;
+
+/// A fitted model and what people should know of it.
+pub(super) struct Case<M> {
+    pub model: M,
+    /// What the readings are, in words.
+    pub readings: String,
+    /// Name of the positions, for axes of plots.
+    pub along: &'static str,
+    pub notes: Vec<String>,
+    /// Files that were read beside data, set-up and effects.
+    pub inputs: Vec<PathBuf>,
+}
+
+impl<M: FittedModel> Case<M> {
+    /// Diagnoses the case.
+    pub(super) fn answer(self, args: &Args) -> Result<Answer, Message> {
+        let catalogue = catalogue(args, &self.model)?;
+        let known: Vec<String> = catalogue.iter().map(|e| e.name().to_owned()).collect();
+        if let Some(name) = args.without.iter().find(|n| !known.contains(n)) {
+            return Err(Message::bad_input(format!("there is no effect `{name}`"))
+                .remedy(format!("the catalogue has {}", known.join(", "))));
+        }
+        let options = Options {
+            false_alarm: args.false_alarm,
+            seed: args.common.seed,
+            without: args.without.clone(),
+            ..Options::default()
+        };
+        let bar = progress("diagnosing", None);
+        let diagnosis = diagnose_with(&self.model, catalogue, &options);
+        bar.finish_and_clear();
+        let own = self::catalogue(args, &self.model)?;
+        let trials = args.prove.map(|count| {
+            let bar = progress("proving", None);
+            // The trials are made on readings without what was found in them.
+            let clean = self
+                .model
+                .refit(self.model.observed() - diagnosis.detail.change());
+            let trials = prove(&clean, &own, &options, count);
+            bar.finish_and_clear();
+            trials
+        });
+        self.delivered(args, diagnosis, trials.as_ref())
+    }
+
+    fn delivered(
+        self,
+        args: &Args,
+        mut diagnosis: Diagnosis,
+        trials: Option<&Trials>,
+    ) -> Result<Answer, Message> {
+        diagnosis.notes.extend(self.notes);
+        let mut json = serde_json::to_value(&diagnosis).map_err(|e| {
+            Message::bad_input(format!("the diagnosis cannot be written as JSON: {e}"))
+        })?;
+        let mut text = format!(
+            "{}: {}\n\n{}",
+            args.data.display(),
+            self.readings,
+            words::in_words(&diagnosis)
+        );
+        let mut view = page::view(
+            args.data.display().to_string(),
+            &self.model,
+            self.along,
+            &diagnosis,
+        );
+        if let Some(trials) = trials {
+            text += &words::proof_in_words(trials);
+            view.trials = Some(sheet::Trials {
+                truths: trials.truths.clone(),
+                answers: trials.answers.clone(),
+                counts: trials.counts.clone(),
+            });
+            if let serde_json::Value::Object(object) = &mut json {
+                object.insert("proof".to_owned(), serde_json::json!(trials));
+            }
+        }
+        let mut inputs = vec![args.data.clone()];
+        inputs.extend(args.setup.clone());
+        inputs.extend(args.effects.clone());
+        inputs.extend(self.inputs);
+        Ok(Answer {
+            text,
+            json,
+            page: sheet::page(&view),
+            tables: vec![residuals(&self.model, &diagnosis)],
+            inputs,
+            seed: Some(args.common.seed),
+            status: Status::Done,
+        })
+    }
+}
+
+/// The model's effects and the user's own.
+fn catalogue<M: FittedModel>(args: &Args, model: &M) -> Result<Vec<Box<dyn Effect<M>>>, Message> {
+    let mut catalogue = model.effects();
+    let Some(path) = &args.effects else {
+        return Ok(catalogue);
+    };
+    let own: TabulatedEffects = SetupFile::read(path)?.parse()?;
+    let channels = model.channel_names();
+    for effect in own.effect {
+        let known = catalogue.iter().any(|e| e.name() == effect.name);
+        let fault = if known {
+            Some(format!("`{}` is in the catalogue already", effect.name))
+        } else {
+            effect.fault(&channels)
+        };
+        if let Some(what) = fault {
+            return Err(Message::bad_input(what)
+                .in_file(path)
+                .remedy("give every effect a new name, growing positions and known channels"));
+        }
+        catalogue.push(Box::new(effect));
+    }
+    Ok(catalogue)
+}
+
+/// What the fit leaves of every reading, without and with the effects.
+fn residuals<M: FittedModel>(model: &M, diagnosis: &Diagnosis) -> CsvTable {
+    let places = model.places();
+    let numbers = |value: fn(&Place) -> f64| -> Vec<f64> { places.iter().map(value).collect() };
+    let suffix = |unit: &str| match unit {
+        "" | "1" => String::new(),
+        unit => format!("_{}", unit.replace('/', "_per_").replace(' ', "_")),
+    };
+    let (x, reading) = (suffix(model.position_unit()), suffix(model.reading_unit()));
+    CsvTable::new("residuals.csv")
+        .numbers("channel", numbers(|p| p.channel as f64 + 1.0))
+        .numbers("repeat", numbers(|p| f64::from(p.repeat)))
+        .numbers("direction", numbers(|p| p.direction))
+        .numbers(format!("x{x}"), numbers(|p| p.x))
+        .numbers(format!("before{reading}"), diagnosis.detail.before.clone())
+        .numbers(format!("after{reading}"), diagnosis.detail.after.clone())
+}

@@ -1,0 +1,101 @@
+//! `errsep diagnose`: where the gap between model and readings lies, which effect causes it and how
+//! far it shrinks. One file wires a model: it reads the data, fits the model and names its axes.
+//!
+//! To add a model, write its file and add its line to [`recognise::MODELS`].
+
+mod calibration_line;
+mod case;
+mod circle;
+mod four_sensor;
+mod fourier;
+mod machine;
+mod page;
+mod recognise;
+mod reversal;
+mod step_diagonal;
+mod words;
+
+use std::path::PathBuf;
+
+use super::{Answer, CommonArgs};
+use crate::io::Message;
+use crate::io::reversal::ColumnMap;
+
+/// Where does the gap between model and machine lie, which effect causes it, how far does it
+/// shrink?
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Example: errsep diagnose readings.csv --out diagnosis
+         errsep diagnose readings.csv --without taper --prove 200
+
+A file for --effects has one table an effect:
+
+    [[effect]]
+    name = \"coolant\"
+    signature = [[0.0, 0.0], [100.0, 1.0], [300.0, 1.0]]   # mm, change of the reading
+    channels = { 1A = 1.0, 1B = -1.0 }                     # absent: 1 for all
+    turns_with_direction = false
+    repeats = [2]                                          # absent: all")]
+pub struct Args {
+    /// The readings.
+    #[arg(value_name = "DATA.csv")]
+    data: PathBuf,
+    /// The set-up of the model's own command; for parts the model of the machine.
+    #[arg(long, value_name = "SETUP.toml")]
+    setup: Option<PathBuf>,
+    /// The model, where columns and set-up do not tell it.
+    #[arg(long, value_name = "NAME", value_parser = recognise::names())]
+    model: Option<String>,
+    /// Points of the parts (columns point, x, y and z, mm).
+    #[arg(long, value_name = "POINTS.csv")]
+    points: Option<PathBuf>,
+    /// Names and units of the columns of a reversal, as role=column:unit,...
+    #[arg(long, value_name = "ROLE=COLUMN:UNIT,...")]
+    columns: Option<ColumnMap>,
+    /// Leave an effect out of the catalogue; may be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
+    /// Add the effects of this file (tables of signatures) to the catalogue.
+    #[arg(long, value_name = "EFFECTS.toml")]
+    effects: Option<PathBuf>,
+    /// Probability of naming anything where nothing is there.
+    #[arg(long, value_name = "P", default_value_t = 0.01)]
+    false_alarm: f64,
+    /// Put N sealed effects and none into these data, diagnose them blind, and say how often it
+    /// was right.
+    #[arg(long, value_name = "N")]
+    prove: Option<usize>,
+    #[command(flatten)]
+    pub(super) common: CommonArgs,
+}
+
+/// Diagnoses the readings.
+///
+/// # Errors
+/// The files are bad, the model is not known, an effect's name is unknown, or the readings leave
+/// nothing over to diagnose.
+pub fn run(args: &Args) -> Result<Answer, Message> {
+    if !(args.false_alarm > 0.0 && args.false_alarm < 0.5) {
+        return Err(Message::bad_input(format!(
+            "a false-alarm probability of {} cannot be",
+            args.false_alarm
+        ))
+        .remedy("give a number between 0 and 0.5, such as 0.01"));
+    }
+    (recognise::model(args)?.run)(args)
+}
+
+/// Refuses a standard deviation in the set-up that is not positive.
+fn positive(value: Option<f64>, what: &str, args: &Args) -> Result<(), Message> {
+    match value {
+        Some(v) if !(v > 0.0 && v.is_finite()) => {
+            let message = Message::bad_input(format!("{what} = {v} is no standard deviation"))
+                .remedy("give a number greater than zero, or leave it out to estimate it");
+            Err(match &args.setup {
+                Some(path) => message.in_file(path),
+                None => message,
+            })
+        }
+        _ => Ok(()),
+    }
+}

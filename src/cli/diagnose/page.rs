@@ -1,0 +1,192 @@
+//! The page of a diagnosis of any model.
+
+use errsep_models::model::{FittedModel, Place};
+
+use super::words::shown;
+use crate::diagnosis::{Diagnosis, Kind};
+use crate::report::diagnosis as sheet;
+use crate::report::number::plain;
+
+pub(super) fn view<M: FittedModel>(
+    data: String,
+    model: &M,
+    along: &str,
+    diagnosis: &Diagnosis,
+) -> sheet::View {
+    let size = |s: crate::diagnosis::Size| sheet::Size {
+        rms: s.rms,
+        ci95: s.ci95,
+    };
+    let channels = model.channel_names();
+    let gap = &diagnosis.gap;
+    let rows = RowNames::of(model.places());
+    let profiles = model.profiles();
+    sheet::View {
+        data,
+        finding: match diagnosis.verdict.kind {
+            Kind::None => sheet::Finding::None,
+            Kind::Effect => sheet::Finding::Effect,
+            Kind::Unknown => sheet::Finding::Unknown,
+        },
+        statement: diagnosis.verdict.statement.clone(),
+        gap: sheet::Gap {
+            unit: gap.unit.to_owned(),
+            noise: gap.noise,
+            before: size(gap.before),
+            after: size(gap.after),
+            shrink: gap.shrink,
+            held_out: gap.held_out.map(|h| (h.before, h.after)),
+        },
+        places: diagnosis.places.iter().map(place).collect(),
+        candidates: diagnosis.candidates.iter().map(candidate).collect(),
+        groups: groups(diagnosis),
+        residuals: model
+            .places()
+            .iter()
+            .zip(diagnosis.detail.before.iter().zip(&diagnosis.detail.after))
+            .map(|(p, (before, after))| sheet::Residual {
+                panel: channels.get(p.channel).cloned().unwrap_or_default(),
+                row: rows.name(p),
+                x: p.x,
+                before: *before,
+                after: *after,
+            })
+            .collect(),
+        x: (along.to_owned(), model.position_unit().to_owned()),
+        shifts: diagnosis.bias.iter().map(shift).collect(),
+        profiles: diagnosis
+            .detail
+            .profiles
+            .iter()
+            .zip(profiles)
+            .map(|((name, before, after), profile)| sheet::Profile {
+                name: name.clone(),
+                x: profile.positions,
+                before: before.clone(),
+                after: after.clone(),
+            })
+            .collect(),
+        hidden: diagnosis.hidden.iter().map(hidden).collect(),
+        warnings: diagnosis.notes.clone(),
+        trials: None,
+    }
+}
+
+/// Which of a trace's circumstances tell it from others.
+struct RowNames {
+    repeats: bool,
+    directions: bool,
+}
+
+impl RowNames {
+    fn of(places: &[Place]) -> Self {
+        Self {
+            repeats: places.windows(2).any(|w| w[0].repeat != w[1].repeat),
+            directions: places
+                .windows(2)
+                .any(|w| (w[0].direction > 0.0) != (w[1].direction > 0.0)),
+        }
+    }
+
+    fn name(&self, place: &Place) -> String {
+        let direction = if place.direction > 0.0 {
+            "forward"
+        } else {
+            "backward"
+        };
+        match (self.repeats, self.directions) {
+            (true, true) => format!("{} {direction}", place.repeat),
+            (true, false) => place.repeat.to_string(),
+            (false, true) => direction.to_owned(),
+            (false, false) => String::new(),
+        }
+    }
+}
+
+fn place(place: &crate::diagnosis::Where) -> sheet::Place {
+    let range = match (place.from, place.to) {
+        (Some(from), Some(to)) => format!(", {} to {}", plain(from, 4), plain(to, 4)),
+        _ => String::new(),
+    };
+    sheet::Place {
+        axis: place.axis.to_owned(),
+        value: format!("{}{range}", place.value),
+        share: place.share,
+        p_value: place.p_value,
+    }
+}
+
+fn candidate(candidate: &crate::diagnosis::Candidate) -> sheet::Candidate {
+    sheet::Candidate {
+        effect: candidate.effect.clone(),
+        explained: candidate.explained,
+        p_value: candidate.p_value,
+        evidence: candidate.evidence,
+        visible: candidate.visible,
+        named: candidate.in_set,
+        parameters: candidate
+            .parameters
+            .iter()
+            .map(|p| {
+                let (value, unit) = shown(p.value, &p.unit);
+                (
+                    p.name.clone(),
+                    value,
+                    shown(p.std, &p.unit).0,
+                    unit.to_owned(),
+                )
+            })
+            .collect(),
+        physics: candidate.physics.clone(),
+        confirm: candidate.confirm.clone(),
+    }
+}
+
+fn groups(diagnosis: &Diagnosis) -> Vec<sheet::Group> {
+    diagnosis
+        .verdict
+        .indistinguishable
+        .iter()
+        .map(|names| sheet::Group {
+            effects: names.clone(),
+            separate: diagnosis
+                .candidates
+                .iter()
+                .filter(|c| names.contains(&c.effect))
+                .map(|c| c.confirm.clone())
+                .collect::<Vec<_>>()
+                .join("; or "),
+        })
+        .collect()
+}
+
+fn shift(bias: &crate::diagnosis::Bias) -> sheet::Shift {
+    let (before, unit) = shown(bias.before, &bias.unit);
+    sheet::Shift {
+        quantity: bias.quantity.clone(),
+        before,
+        after: shown(bias.after, &bias.unit).0,
+        std: shown(bias.std, &bias.unit).0,
+        unit: unit.to_owned(),
+    }
+}
+
+fn hidden(hidden: &crate::diagnosis::Hidden) -> sheet::Hidden {
+    sheet::Hidden {
+        effect: hidden.effect.clone(),
+        visible: hidden.visible,
+        detectable: hidden.detectable.map(|d| {
+            let (value, unit) = shown(d, &hidden.unit);
+            (value, unit.to_owned())
+        }),
+        harm: hidden.harm.as_ref().map_or(String::new(), |h| {
+            let (value, unit) = shown(h.per_unit, &h.unit);
+            format!(
+                "{} {unit} in {} per {}",
+                plain(value, 3),
+                h.quantity,
+                hidden.unit
+            )
+        }),
+    }
+}

@@ -1,0 +1,153 @@
+//! A diagnosis in words.
+
+use std::fmt::Write;
+
+use crate::diagnosis::{Diagnosis, Kind, Trials};
+use crate::report::number::{measured, plain, probability};
+
+/// µrad for people; other units as they are.
+pub(super) fn shown(value: f64, unit: &str) -> (f64, &str) {
+    if unit == "rad" {
+        (value * 1e6, "urad")
+    } else {
+        (value, unit)
+    }
+}
+
+pub(super) fn in_words(diagnosis: &Diagnosis) -> String {
+    let gap = &diagnosis.gap;
+    let mut text = format!("{}\n\n", diagnosis.verdict.statement);
+    let _ = writeln!(
+        text,
+        "Gap, {} RMS          {} [{}, {}] -> {} [{}, {}]   noise of one reading {}",
+        gap.unit,
+        number(gap.before.rms),
+        number(gap.before.ci95[0]),
+        number(gap.before.ci95[1]),
+        number(gap.after.rms),
+        number(gap.after.ci95[0]),
+        number(gap.after.ci95[1]),
+        number(gap.noise)
+    );
+    if let Some(held) = gap.held_out {
+        let _ = writeln!(
+            text,
+            "On held-out repeats   {} -> {}   (a perfect model: {})",
+            number(held.before),
+            number(held.after),
+            number(held.floor)
+        );
+    }
+    if !diagnosis.places.is_empty() {
+        let _ = writeln!(
+            text,
+            "\nWhere                                              share   p"
+        );
+    }
+    for place in &diagnosis.places {
+        let range = match (place.from, place.to) {
+            (Some(from), Some(to)) => format!(" {} to {}", plain(from, 4), plain(to, 4)),
+            _ => String::new(),
+        };
+        let _ = writeln!(
+            text,
+            "  {:<48} {:>5.1} %  {}",
+            format!("{} {}{range}", place.axis, place.value),
+            100.0 * place.share,
+            probability(place.p_value)
+        );
+    }
+    let _ = writeln!(
+        text,
+        "\nEffect                     explains          p   visible  parameters"
+    );
+    for candidate in &diagnosis.candidates {
+        let parameters: Vec<String> = candidate
+            .parameters
+            .iter()
+            .map(|p| {
+                let (value, unit) = shown(p.value, &p.unit);
+                format!(
+                    "{} {} {unit}",
+                    p.name,
+                    measured(value, Some(shown(p.std, &p.unit).0))
+                )
+            })
+            .collect();
+        let mark = if candidate.in_set { "*" } else { " " };
+        let shown = if candidate.p_value < 0.05 {
+            parameters.join(", ")
+        } else {
+            String::new()
+        };
+        let _ = writeln!(
+            text,
+            "{mark} {:<24} {:>6.1} %   {:>8}  {:>5.1} %  {shown}",
+            candidate.effect,
+            100.0 * candidate.explained,
+            probability(candidate.p_value),
+            100.0 * candidate.visible
+        );
+    }
+    if diagnosis.verdict.kind == Kind::Effect {
+        let _ = writeln!(text, "\nBias of the answer        without        with");
+        for bias in &diagnosis.bias {
+            let (before, unit) = shown(bias.before, &bias.unit);
+            let (after, _) = shown(bias.after, &bias.unit);
+            let (moved, _) = shown(bias.moved, &bias.unit);
+            let _ = writeln!(
+                text,
+                "  {:<12} {:>14} {:>14} {unit}   moved {} +/- {}",
+                bias.quantity,
+                number(before),
+                number(after),
+                number(moved),
+                number(shown(bias.std, &bias.unit).0)
+            );
+        }
+    }
+    let _ = writeln!(text, "\nWhat could still hide");
+    for hidden in &diagnosis.hidden {
+        let detectable = hidden.detectable.map_or_else(
+            || "would not show whatever its size".to_owned(),
+            |d| {
+                let (value, unit) = shown(d, &hidden.unit);
+                format!("would show from {} {unit}", number(value))
+            },
+        );
+        let _ = writeln!(
+            text,
+            "  {:<24} {detectable} ({:.1} % visible)",
+            hidden.effect,
+            100.0 * hidden.visible
+        );
+    }
+    for note in &diagnosis.notes {
+        let _ = writeln!(text, "\nNote: {note}");
+    }
+    text
+}
+
+/// Four digits with a hyphen for a minus, as terminals show it.
+fn number(value: f64) -> String {
+    plain(value, 4).replace('\u{2212}', "-")
+}
+
+pub(super) fn proof_in_words(trials: &Trials) -> String {
+    let all: usize = trials.counts.iter().flatten().sum();
+    let mut text = format!(
+        "\nPut into these readings and diagnosed blind: {all} times, {} right, {} named wrong\n",
+        trials.right, trials.wrong
+    );
+    for (truth, row) in trials.truths.iter().zip(&trials.counts) {
+        let said: Vec<String> = trials
+            .answers
+            .iter()
+            .zip(row)
+            .filter(|(_, count)| **count > 0)
+            .map(|(answer, count)| format!("{answer} {count}"))
+            .collect();
+        let _ = writeln!(text, "  {truth:<24} {}", said.join(", "));
+    }
+    text
+}

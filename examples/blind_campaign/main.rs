@@ -135,6 +135,7 @@ fn solve(observations: &Observations, without: &[&str], seed: u64) -> Option<Dia
     let model = FirstOrder::new(observations, Assumptions::default()).ok()?;
     let options = Options {
         seed,
+        draws: 400,
         without: without.iter().map(|s| (*s).to_owned()).collect(),
         ..Options::default()
     };

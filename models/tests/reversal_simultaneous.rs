@@ -170,9 +170,12 @@ fn derivatives_are_those_of_finite_differences() {
     let count = observations.readings.len();
     let model = |at: &Parameters| {
         let mut r = vec![0.0; count];
-        problem
-            .residuals(at, |c, i, value| r[channels[c].source[i] as usize] = value)
-            .unwrap();
+        let residuals = problem.residuals(at).unwrap();
+        for (channel, own) in channels.iter().zip(&residuals) {
+            for (i, residual) in channel.source.iter().zip(own) {
+                r[*i as usize] = -residual;
+            }
+        }
         r
     };
     let system = evaluate(&problem, &at).unwrap().system;

@@ -1,9 +1,10 @@
 //! The structured solver against dense linear algebra, on a problem written as an outsider would.
 
-use errsep_solvers::linear::bordered::{Bordered, BorderedCovariance, Constraints, Group};
+use errsep_solvers::linear::bordered::{Bordered, BorderedCovariance, Constraints, Group, Share};
 use errsep_solvers::problem::NoValue;
 use errsep_solvers::structured::{
-    Options, Parameters, Sink, StructuredProblem, StructuredSolver, evaluate, hat_traces, minimise,
+    Minimiser, Options, Parameters, Progress, Sink, StructuredProblem, StructuredSolver, evaluate,
+    hat_traces, minimise,
 };
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
@@ -16,9 +17,10 @@ struct Bumps {
     x: Vec<f64>,
     data: Vec<f64>,
     coefficients: usize,
-    maps: Vec<DMatrix<f64>>,
     constraints: Constraints,
     held: Vec<bool>,
+    /// Of the rows of even and of odd cells: the two parts.
+    weights: [f64; 2],
 }
 
 const BORDER: usize = 3;
@@ -49,13 +51,13 @@ impl Bumps {
             x,
             data,
             coefficients,
-            maps: vec![DMatrix::identity(BORDER, BORDER)],
             constraints: Constraints {
                 band: vec![vec![1.0 / coefficients as f64; coefficients]],
                 border,
                 value: DVector::zeros(1),
             },
             held: vec![false; BORDER],
+            weights: [1.0; 2],
         }
     }
 
@@ -79,7 +81,11 @@ impl Bumps {
         row[self.coefficients + 1] = 1.0;
         row[self.coefficients + 2] = ripple;
         let model = form * stretch + at.border[1] + at.border[2] * ripple;
-        (model - self.data[i], row)
+        let weight = self.weights[k % 2];
+        for value in &mut row {
+            *value *= weight;
+        }
+        (weight * (model - self.data[i]), row)
     }
 
     fn dense(&self, at: &Parameters) -> (DMatrix<f64>, DVector<f64>) {
@@ -123,6 +129,17 @@ fn bumps(x: f64, cells: usize) -> (usize, [f64; 3]) {
     )
 }
 
+/// Every unknown of the border has a local column of its own, after those of the band.
+fn own_columns(band: u32) -> Vec<Share> {
+    (0..BORDER as u32)
+        .map(|unknown| Share {
+            column: band + unknown,
+            unknown,
+            weight: 1.0,
+        })
+        .collect()
+}
+
 impl StructuredProblem for Bumps {
     type Prepared = Parameters;
 
@@ -132,8 +149,8 @@ impl StructuredProblem for Bumps {
     fn border_count(&self) -> usize {
         BORDER
     }
-    fn border_maps(&self) -> &[DMatrix<f64>] {
-        &self.maps
+    fn part_count(&self) -> usize {
+        2
     }
     fn constraints(&self) -> &Constraints {
         &self.constraints
@@ -172,7 +189,11 @@ impl StructuredProblem for Bumps {
             }
             sink.push();
         }
-        sink.close((cell..cell + 3).map(Some).collect(), 0);
+        sink.close(
+            (cell..cell + 3).map(Some).collect(),
+            own_columns(3),
+            cell % 2,
+        );
         Ok(())
     }
 }
@@ -253,9 +274,66 @@ fn a_constrained_step_and_its_covariance_are_those_of_dense_algebra() {
     (weights[0], weights[8], weights[n + 2]) = (1.0, -2.0, 0.5);
     let exact = (weights.transpose() * &dense * &weights)[0];
     assert!((covariance.variance(&band, &border) - exact).abs() < 1e-9 * exact);
-    let trace = hat_traces(&problem, &at, &covariance).unwrap()[0];
+    let traces = hat_traces(&problem, &at, &covariance).unwrap();
+    let trace = traces[0] + traces[1];
     // As many as free unknowns.
     assert!((trace - (n + BORDER - 1) as f64).abs() < 1e-9, "{trace}");
+}
+
+#[test]
+fn parts_under_new_weights_are_those_of_a_problem_with_these_weights() {
+    let weights = [3.0, 0.25];
+    let mut problem = Bumps::new(9, 37, 0.1);
+    let at = somewhere(&problem);
+    let mut gathering = Minimiser::gathering(&problem, at.clone(), Options::default()).unwrap();
+    gathering.reweigh(&weights);
+    problem.weights = weights;
+    let parts = gathering.parts(&problem).unwrap();
+    let evaluation = evaluate(&problem, &at).unwrap();
+    // Epsilons: the same rows, weighted before or after compression.
+    assert!((gathering.cost() - evaluation.cost).abs() < 1e-13 * evaluation.cost);
+
+    let missing = problem.constraints.missing(&at.band, &at.border);
+    let solved = evaluation
+        .system
+        .solve(&problem.constraints, &missing, &problem.held)
+        .unwrap();
+    let covariance = BorderedCovariance::new(&evaluation.system, &solved);
+    let traces = hat_traces(&problem, &at, &covariance).unwrap();
+    let step: Vec<f64> = solved.band.iter().chain(&solved.border).copied().collect();
+    let (jacobian, residual) = problem.dense(&at);
+    let after = &residual + &jacobian * DVector::from_vec(step);
+    // The hat matrix by dense algebra, row by row.
+    let reduced = &jacobian * problem.allowed();
+    let normal = (reduced.transpose() * &reduced).try_inverse().unwrap();
+    let hat = &reduced * normal * reduced.transpose();
+    for part in 0..2 {
+        let own = |i: &usize| bumps(problem.x[*i], problem.cells()).0 % 2 == part;
+        let rows: Vec<usize> = (0..problem.x.len()).filter(own).collect();
+        let squares: f64 = rows.iter().map(|i| after[*i].powi(2)).sum();
+        let trace: f64 = rows.iter().map(|i| hat[(*i, *i)]).sum();
+        // Truncation: the check goes through normal equations of condition 1e6.
+        assert!(
+            (parts.squares[part] - squares).abs() < 1e-8 * squares,
+            "part {part}"
+        );
+        assert!(
+            (parts.traces[part] - trace).abs() < 1e-8 * trace,
+            "part {part}"
+        );
+        assert!((traces[part] - trace).abs() < 1e-8 * trace, "part {part}");
+    }
+
+    let ending = loop {
+        if let Progress::Done(ending) = gathering.advance(&problem) {
+            break ending;
+        }
+    };
+    let fit = gathering.finish(ending);
+    let plain = minimise(&problem, at, Options::default()).unwrap();
+    assert!(fit.converged() && plain.converged());
+    // Both stop within the tolerance of the cost, 1e-12.
+    assert!((fit.cost - plain.cost).abs() < 1e-11 * plain.cost);
 }
 
 #[test]
@@ -371,10 +449,12 @@ fn what_the_rows_do_not_determine_is_named() {
 #[test]
 fn a_group_without_band_columns_counts_for_the_border() {
     let mut system = Bordered::new(3, 2, 2);
-    let map = DMatrix::identity(2, 2);
     let group = Group {
         band: vec![None],
-        map: 0,
+        border: own_columns(1)[..2].to_vec(),
+        columns: 4,
+        part: 0,
+        cost: 0.5,
         triangle: vec![
             1.0, 2.0, 3.0, 4.0, //
             0.0, 5.0, 6.0, 7.0, //
@@ -382,7 +462,7 @@ fn a_group_without_band_columns_counts_for_the_border() {
             0.0, 0.0, 0.0, 1.0,
         ],
     };
-    system.absorb(&group, &map);
+    system.absorb(&group, 1.0);
     system.finish();
     let squares = 16.0 + 49.0 + 81.0 + 1.0;
     // Epsilons: a sum of four squares.

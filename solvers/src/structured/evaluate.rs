@@ -35,18 +35,18 @@ pub fn evaluate<P: StructuredProblem>(problem: &P, at: &Parameters) -> Result<Ev
         problem.border_count(),
     );
     let mut cost = 0.0;
-    for_each_group(problem, &prepared, |groups, part| {
-        cost += part;
-        for group in groups {
-            system.absorb(group, &problem.border_maps()[group.map]);
+    for_each_task(problem, &prepared, |groups| {
+        for group in &groups {
+            cost += group.cost;
+            system.absorb(group, 1.0);
         }
     })?;
     system.finish();
     Ok(Evaluation { cost, system })
 }
 
-/// The trace of the hat matrix J cov Jᵀ, summed by border map: how many unknowns the rows of each
-/// map have used up. `covariance` is that of unit noise at the same point.
+/// The trace of the hat matrix J cov Jᵀ, summed by part: how many unknowns the rows of each part
+/// have used up. `covariance` is that of unit noise at the same point.
 ///
 /// # Errors
 /// [`NoValue`] where the model is not defined.
@@ -56,28 +56,27 @@ pub fn hat_traces<P: StructuredProblem>(
     covariance: &BorderedCovariance,
 ) -> Result<Vec<f64>, NoValue> {
     let prepared = problem.prepare(at)?;
-    let maps = problem.border_maps();
-    let mut traces = vec![0.0; maps.len()];
-    for_each_group(problem, &prepared, |groups, _| {
+    let mut traces = vec![0.0; problem.part_count()];
+    for_each_task(problem, &prepared, |groups| {
         let shares: Vec<f64> = groups
             .par_iter()
-            .map(|group| covariance.hat_trace(group, &maps[group.map]))
+            .map(|group| covariance.hat_trace(group, 1.0))
             .collect();
         for (group, share) in groups.iter().zip(shares) {
-            traces[group.map] += share;
+            traces[group.part] += share;
         }
     })?;
     Ok(traces)
 }
 
-/// Runs the tasks on all cores and hands over their groups in order, the next tasks being worked
-/// on meanwhile.
-fn for_each_group<P: StructuredProblem>(
+/// Runs the tasks on all cores and hands over their groups in order, the next tasks being
+/// worked on meanwhile.
+pub(super) fn for_each_task<P: StructuredProblem>(
     problem: &P,
     prepared: &P::Prepared,
-    mut take: impl FnMut(&[Group], f64) + Send,
+    mut take: impl FnMut(Vec<Group>) + Send,
 ) -> Result<(), NoValue> {
-    type Chunk = Result<Vec<(Vec<Group>, f64)>, NoValue>;
+    type Chunk = Result<Vec<Vec<Group>>, NoValue>;
     let count = problem.task_count(prepared);
     let chunk = |from: usize| -> Chunk {
         (from..count.min(from + TASKS_AT_ONCE))
@@ -93,8 +92,8 @@ fn for_each_group<P: StructuredProblem>(
     let mut next = TASKS_AT_ONCE;
     loop {
         let mut hand_over = || {
-            for (groups, cost) in &ready {
-                take(groups, *cost);
+            for groups in std::mem::take(&mut ready) {
+                take(groups);
             }
         };
         if next >= count {

@@ -5,6 +5,7 @@
 //! whose many unknowns enter linearly needs none near its solution.
 
 use super::evaluate::{Evaluation, evaluate};
+use super::gathered::Gathered;
 use super::problem::{Parameters, StructuredProblem};
 use crate::linear::bordered::{Bordered, BorderedCovariance, Solved};
 use crate::outcome::{Combination, Convergence, Ending};
@@ -42,6 +43,19 @@ pub struct Iteration {
     pub accepted: bool,
 }
 
+/// What a full step would leave, part by part of the rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parts {
+    /// By how much the step promises to lower the cost.
+    pub predicted: f64,
+    /// Whether it is the last.
+    pub last: bool,
+    /// The sum of squares of the weighted rows of each part after it.
+    pub squares: Vec<f64>,
+    /// The trace of the hat matrix of each part: how many unknowns its rows use up.
+    pub traces: Vec<f64>,
+}
+
 /// Whether to go on.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Progress {
@@ -57,6 +71,8 @@ pub struct Minimiser {
     options: Options,
     at: Parameters,
     evaluation: Evaluation,
+    gathered: Option<Gathered>,
+    full: Option<Solved>,
     solved: Option<Solved>,
     scales: Option<(Vec<f64>, Vec<f64>)>,
     damping: f64,
@@ -141,16 +157,81 @@ impl Minimiser {
         options: Options,
     ) -> Result<Self, NoValue> {
         let evaluation = evaluate(problem, &start)?;
-        Ok(Self {
+        Ok(Self::at(start, evaluation, None, options))
+    }
+
+    /// Evaluates the start and keeps the compressed rows of the best point, so that parts of the
+    /// rows can be given new weights ([`Self::reweigh`]) between two steps.
+    ///
+    /// # Errors
+    /// [`NoValue`] if the model is not defined there.
+    pub fn gathering<P: StructuredProblem>(
+        problem: &P,
+        start: Parameters,
+        options: Options,
+    ) -> Result<Self, NoValue> {
+        let (evaluation, gathered) = gather(problem, &start)?;
+        Ok(Self::at(start, evaluation, Some(gathered), options))
+    }
+
+    fn at(
+        at: Parameters,
+        evaluation: Evaluation,
+        gathered: Option<Gathered>,
+        options: Options,
+    ) -> Self {
+        Self {
             options,
-            at: start,
+            at,
             evaluation,
+            gathered,
+            full: None,
             solved: None,
             scales: None,
             damping: 0.0,
             growth: 2.0,
             iterations: Vec::new(),
-        })
+        }
+    }
+
+    /// Multiplies the rows of each part by a factor, without a pass over them. The problem handed to
+    /// [`Self::advance`] from then on must have the same weights.
+    pub fn reweigh(&mut self, factors: &[f64]) {
+        if let Some(gathered) = &mut self.gathered {
+            gathered.reweigh(factors);
+            self.evaluation = Evaluation {
+                cost: gathered.cost(),
+                system: gathered.system(),
+            };
+            (self.full, self.scales) = (None, None);
+        }
+    }
+
+    /// What the full step from the best point would leave of each part of the rows, by the linear
+    /// prediction; `None` where rows are not kept or do not determine the step.
+    pub fn parts<P: StructuredProblem>(&mut self, problem: &P) -> Option<Parts> {
+        let gathered = self.gathered.as_ref()?;
+        let system = &self.evaluation.system;
+        let step = match self.full.take() {
+            Some(step) => step,
+            None => {
+                let missing = problem
+                    .constraints()
+                    .missing(&self.at.band, &self.at.border);
+                system
+                    .solve(problem.constraints(), &missing, problem.held())
+                    .ok()?
+            }
+        };
+        let predicted = system.predicted_reduction(&step.band, &step.border);
+        let parts = step.undetermined.is_empty().then(|| Parts {
+            predicted,
+            last: self.settled_by(predicted, &step).is_some(),
+            squares: gathered.squares_after(&step),
+            traces: gathered.hat_traces(&BorderedCovariance::new(system, &step)),
+        });
+        self.full = Some(step);
+        parts
     }
 
     /// The best point so far.
@@ -174,7 +255,10 @@ impl Minimiser {
         let missing = constraints.missing(&self.at.band, &self.at.border);
         let system = &self.evaluation.system;
         let solved = if self.damping == 0.0 {
-            system.solve(constraints, &missing, problem.held())
+            match self.full.take() {
+                Some(solved) => Ok(solved),
+                None => system.solve(constraints, &missing, problem.held()),
+            }
         } else {
             let scales = self.scales.get_or_insert_with(|| system.column_norms());
             system.damped(self.damping, &scales.0, &scales.1).solve(
@@ -198,13 +282,7 @@ impl Minimiser {
         let predicted = system.predicted_reduction(&solved.band, &solved.border);
         let cost = self.evaluation.cost;
         let trial = self.at.stepped(&solved.band, &solved.border);
-        let settled = if predicted <= self.options.cost_tolerance * cost {
-            Some(Convergence::Cost)
-        } else if system.change_is_rounding(&solved, &self.at.band, &self.at.border) {
-            Some(Convergence::Step)
-        } else {
-            None
-        };
+        let settled = self.settled_by(predicted, &solved);
         let accepted = self.iterations.last().is_some_and(|i| i.accepted);
         if settled.is_some() && self.damping > 0.0 && accepted {
             // The undamped step shows whether it is the end.
@@ -226,11 +304,19 @@ impl Minimiser {
         if self.iterations.len() >= self.options.max_iterations {
             return Progress::Done(Ending::IterationLimit);
         }
-        match evaluate(problem, &trial) {
-            Ok(next) if next.cost.is_finite() && cost - next.cost > ACCEPTED_GAIN * predicted => {
+        let next = if self.gathered.is_some() {
+            gather(problem, &trial).map(|(next, gathered)| (next, Some(gathered)))
+        } else {
+            evaluate(problem, &trial).map(|next| (next, None))
+        };
+        match next {
+            Ok((next, gathered))
+                if next.cost.is_finite() && cost - next.cost > ACCEPTED_GAIN * predicted =>
+            {
                 let gain = (cost - next.cost) / predicted;
                 self.at = trial;
-                self.evaluation = next;
+                (self.evaluation, self.gathered) = (next, gathered);
+                self.full = None;
                 self.record(predicted, true);
                 self.damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).max(0.1);
                 self.growth = 2.0;
@@ -254,6 +340,18 @@ impl Minimiser {
         Progress::Continue
     }
 
+    /// Why a step is the last, if it is.
+    fn settled_by(&self, predicted: f64, step: &Solved) -> Option<Convergence> {
+        let Evaluation { cost, system } = &self.evaluation;
+        if predicted <= self.options.cost_tolerance * cost {
+            Some(Convergence::Cost)
+        } else if system.change_is_rounding(step, &self.at.band, &self.at.border) {
+            Some(Convergence::Step)
+        } else {
+            None
+        }
+    }
+
     /// The result.
     pub fn finish(self, ending: Ending) -> Fit {
         Fit {
@@ -274,6 +372,18 @@ impl Minimiser {
             accepted,
         });
     }
+}
+
+fn gather<P: StructuredProblem>(
+    problem: &P,
+    at: &Parameters,
+) -> Result<(Evaluation, Gathered), NoValue> {
+    let gathered = Gathered::new(problem, at)?;
+    let evaluation = Evaluation {
+        cost: gathered.cost(),
+        system: gathered.system(),
+    };
+    Ok((evaluation, gathered))
 }
 
 /// Minimises from a start that satisfies the constraints.

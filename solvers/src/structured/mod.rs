@@ -9,12 +9,13 @@
 
 mod evaluate;
 mod executor;
+mod gathered;
 mod minimise;
 mod problem;
 mod sink;
 
 pub use evaluate::{Evaluation, evaluate, hat_traces};
 pub use executor::{StructuredSolver, StructuredState};
-pub use minimise::{Fit, Iteration, Minimiser, Options, Progress, minimise};
+pub use minimise::{Fit, Iteration, Minimiser, Options, Parts, Progress, minimise};
 pub use problem::{Parameters, StructuredProblem};
 pub use sink::Sink;

@@ -1,6 +1,5 @@
 //! What the structured solver needs to know of a problem.
 
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::sink::Sink;
@@ -38,10 +37,11 @@ impl Parameters {
 /// A least-squares problem with a banded and bordered Jacobian: minimise ½ Σ r².
 ///
 /// The rows come in *tasks* (independent, done on any core) of *groups*: the rows of a group share
-/// their columns. A group's local columns are, in this order, band unknowns, *local* border
-/// columns and the residual. Local border columns become border unknowns through one of the
-/// [`border_maps`](Self::border_maps): eight global unknowns that a trace sees through the same
-/// two columns cost two columns in every row, not eight.
+/// their columns. A group's local columns are, in this order, band unknowns, others and the
+/// residual. What they are to the unknowns of the border is told once a group, by
+/// [`Share`](crate::linear::bordered::Share)s: eight global unknowns that a trace sees through the
+/// same two columns cost two columns in every row, and an offset that is a combination of the band's
+/// columns costs none.
 pub trait StructuredProblem: Sync {
     /// What is computed once at a point and shared by all tasks.
     type Prepared: Sync;
@@ -52,8 +52,10 @@ pub trait StructuredProblem: Sync {
     /// Number of unknowns in the border, q.
     fn border_count(&self) -> usize;
 
-    /// The ways in which local border columns make up border unknowns: each (local columns) × q.
-    fn border_maps(&self) -> &[DMatrix<f64>];
+    /// Number of parts of the rows, each with a weight and degrees of freedom of its own.
+    fn part_count(&self) -> usize {
+        1
+    }
 
     /// Linear equality constraints, satisfied at the start.
     fn constraints(&self) -> &Constraints;

@@ -1,7 +1,7 @@
 //! Where a task puts its rows.
 
 use crate::linear::banded::{Tall, compress};
-use crate::linear::bordered::Group;
+use crate::linear::bordered::{Group, Share};
 
 /// Takes batches of rows, compresses each at once and keeps one small triangle a group.
 #[derive(Debug)]
@@ -29,6 +29,7 @@ impl Sink {
     /// Begins a group whose rows have so many local columns, the residual included.
     pub fn open(&mut self, columns: usize) {
         self.columns = columns;
+        self.cost = 0.0;
         self.open.clear();
         self.open.resize(columns * columns, 0.0);
     }
@@ -53,21 +54,21 @@ impl Sink {
         compress(&mut self.batch, &mut self.open);
     }
 
-    /// Ends the group: the unknown of each local band column (`None` where fixed at zero) and the
-    /// number of the border map.
-    pub fn close(&mut self, band: Vec<Option<usize>>, map: usize) {
+    /// Ends the group: the unknown of each local band column (`None` where fixed at zero), what
+    /// local columns are to the border, and the part of the rows it belongs to.
+    pub fn close(&mut self, band: Vec<Option<usize>>, border: Vec<Share>, part: usize) {
         self.groups.push(Group {
             band,
-            map,
+            border,
+            columns: self.columns,
+            part,
             triangle: self.open.clone(),
+            cost: self.cost,
         });
     }
 
-    /// What has come in since the last call: the groups and the cost.
-    pub(super) fn take(&mut self) -> (Vec<Group>, f64) {
-        (
-            std::mem::take(&mut self.groups),
-            std::mem::take(&mut self.cost),
-        )
+    /// The groups that have come in since the last call.
+    pub(super) fn take(&mut self) -> Vec<Group> {
+        std::mem::take(&mut self.groups)
     }
 }

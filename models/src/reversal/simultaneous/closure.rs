@@ -13,7 +13,7 @@ pub fn of(
     problem: &Reversal,
     result: &Fit,
     channels: &[ChannelReadings],
-    residuals: &[f64],
+    residuals: &[Vec<f64>],
     unit: f64,
 ) -> Option<Closure> {
     let index = problem.unknowns.closure_index()?;
@@ -35,11 +35,11 @@ pub fn of(
 fn profile(
     problem: &Reversal,
     channels: &[ChannelReadings],
-    residuals: &[f64],
+    residuals: &[Vec<f64>],
 ) -> (Vec<f64>, Vec<f64>) {
     let signed = |c: usize, i: usize| {
         let channel = &channels[c];
-        channel.channel.spindle_sign() * residuals[channel.source[i] as usize] / 4.0
+        channel.channel.spindle_sign() * residuals[c][i] / 4.0
     };
     let mut x = Vec::new();
     let mut closure = Vec::new();
@@ -48,10 +48,12 @@ fn profile(
         let mut from = 0;
         for place in channels[0].x.chunk_by(|a, b| a == b) {
             let to = from + place.len();
-            let sum: f64 = (0..channels.len())
-                .flat_map(|c| (from..to).map(move |i| (c, i)))
-                .map(|(c, i)| signed(c, i))
-                .sum();
+            let mut sum = 0.0;
+            for c in 0..channels.len() {
+                for i in from..to {
+                    sum += signed(c, i);
+                }
+            }
             x.push(place[0]);
             closure.push(sum / place.len() as f64);
             from = to;

@@ -64,13 +64,12 @@ impl Problem for DenseReversal<'_> {
     }
 
     fn residuals(&self, parameters: &DVector<f64>) -> Result<DVector<f64>, NoValue> {
-        let mut r = DVector::zeros(self.residual_count());
-        let starts = self.problem.row_starts();
-        self.problem
-            .residuals(&self.point_of(parameters), |c, i, value| {
-                r[starts[c] + i] = value * self.problem.weights[c];
-            })?;
-        Ok(r)
+        let channels = self.problem.residuals(&self.point_of(parameters))?;
+        let weighted = channels
+            .iter()
+            .zip(&self.problem.weights)
+            .flat_map(|(residuals, weight)| residuals.iter().map(move |r| -weight * r));
+        Ok(DVector::from_iterator(self.residual_count(), weighted))
     }
 
     fn jacobian(&self, parameters: &DVector<f64>) -> Result<DMatrix<f64>, NoValue> {
@@ -78,10 +77,10 @@ impl Problem for DenseReversal<'_> {
         let mut jacobian = DMatrix::zeros(self.residual_count(), self.parameter_count());
         let starts = self.problem.row_starts();
         let gauge = &self.problem.gauge().band;
+        let mut border = vec![0.0; self.problem.unknowns.border_count()];
         self.problem.for_each_batch(
             &self.point_of(parameters),
-            |c, first, band, batch: &Tall| {
-                let map = self.problem.unknowns.border_map(c);
+            |c, first, band, shares, batch: &Tall| {
                 for row in 0..batch.rows() {
                     let at = starts[c] + first + row;
                     for (l, unknown) in band.iter().enumerate() {
@@ -89,16 +88,16 @@ impl Problem for DenseReversal<'_> {
                             jacobian[(at, *j)] += batch.column(l)[row];
                         }
                     }
-                    let through = |j: usize| -> f64 {
-                        (0..map.nrows())
-                            .map(|l| batch.column(band.len() + l)[row] * map[(l, j)])
-                            .sum()
-                    };
+                    border.fill(0.0);
+                    for share in shares {
+                        border[share.unknown as usize] +=
+                            share.weight * batch.column(share.column as usize)[row];
+                    }
                     for (l, j) in self.kept.iter().enumerate() {
-                        jacobian[(at, n + l)] = through(*j);
+                        jacobian[(at, n + l)] = border[*j];
                     }
                     for (line, weights) in self.lines.iter().zip(gauge) {
-                        let through = through(*line);
+                        let through = border[*line];
                         if through != 0.0 {
                             for (j, w) in weights.iter().enumerate() {
                                 jacobian[(at, j)] += through * w;

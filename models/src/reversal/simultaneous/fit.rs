@@ -2,13 +2,15 @@
 
 use std::time::Instant;
 
-use errsep_solvers::loss::Loss;
-use errsep_solvers::structured::{Fit, Parameters, hat_traces, minimise};
+use errsep_solvers::structured::{Options as Minimisation, Parameters, minimise};
+
+use rayon::prelude::*;
 
 use super::closure;
 use super::error::ReversalError;
 use super::gauge::Axis;
-use super::knots::{Choice, KnotTrial, first_noise};
+use super::knots::{Choice, KnotTrial};
+use super::noise::{self, Settled, first_noise, weights_of};
 use super::options::{Knots, Noise, Options, Thickness};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
@@ -16,20 +18,6 @@ use super::seed;
 use super::solution::{ChannelNoise, Convergence, FittedKnots, Simultaneous};
 use super::unknowns::Unknowns;
 use crate::reversal::Observations;
-
-/// Rounds in which the channels' noise is estimated anew.
-const MOST_NOISE_ROUNDS: usize = 10;
-
-/// The noise has settled when no channel's changes by more than this share.
-const NOISE_SETTLED: f64 = 1e-4;
-
-/// A robust fit is near its end, where curvature helps, when a step without it promises to lower
-/// the cost by less than this share.
-const NEAR: f64 = 0.1;
-
-/// A channel's noise is never taken below this share of the noisiest: a channel without any noise
-/// would otherwise be the only one to count.
-const LEAST_NOISE: f64 = 1e-6;
 
 /// Fits tilts, offsets and forms to all readings at once.
 ///
@@ -100,82 +88,51 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         thickness_mm,
         weights_of(&sigmas),
     );
-    let near = errsep_solvers::structured::Options {
-        cost_tolerance: NEAR,
-        ..options.minimisation
+    let start = match problem.unknowns.thickness_index() {
+        Some(index) => start_of_thickness(&mut problem, index, start, options.minimisation)?,
+        None => head_start(&problem, &start, options.minimisation).unwrap_or(start),
     };
-    let robust = options.loss != Loss::Quadratic;
-    let first = if robust { near } else { options.minimisation };
-    let start = match thickness_free {
-        true => start_of_thickness(&mut problem, start, first)?,
-        false => start,
-    };
-    let mut result = minimise(&problem, start, first)?;
-    let mut history = result.iterations.clone();
-    if robust {
-        // From the least-squares solution on, outliers are those of the readings, not of the start.
-        problem.loss = options.loss;
-        for (far, stop) in [(true, near), (false, options.minimisation)] {
-            if !result.converged() {
-                break;
-            }
-            problem.far = far;
-            result = minimise(&problem, result.parameters, stop)?;
-            history.extend(&result.iterations);
-        }
-    }
-    let first_run = history.len();
-    let mut freedom = shared_freedom(&problem);
-    for _ in 0..MOST_NOISE_ROUNDS {
-        if options.noise != Noise::PerChannel || !result.converged() {
-            break;
-        }
-        freedom = channel_freedom(&problem, &result)?;
-        let next = estimate_noise(&problem, &result, &freedom)?;
-        let change = next
-            .iter()
-            .zip(&sigmas)
-            .map(|(a, b)| (a / b - 1.0).abs())
-            .fold(0.0, f64::max);
-        sigmas = next;
-        problem.weights = weights_of(&sigmas);
-        if change <= NOISE_SETTLED {
-            break;
-        }
-        result = minimise(&problem, result.parameters, options.minimisation)?;
-        history.extend(&result.iterations);
-    }
+    let Settled {
+        fit: result,
+        freedom,
+        history,
+        first_run,
+    } = noise::settle(&mut problem, start, options, &mut sigmas)?;
     let Some(covariance) = result.covariance() else {
         return Err(ReversalError::NotConverged {
             ending: result.ending.to_string(),
         });
     };
 
-    let mut residuals = vec![0.0; readings];
-    problem.residuals(&result.parameters, |c, i, r| {
-        residuals[channels[c].source[i] as usize] = -r;
-    })?;
+    let by_channel = problem.residuals(&result.parameters)?;
     let total: f64 = freedom.iter().sum();
     // With equal noise rows are in units of one: their own scatter gives the unit.
     let sigma_unit = match options.noise {
         Noise::Equal if total > 0.0 => (2.0 * result.cost / total).sqrt(),
         _ => 1.0,
     };
-    let unit = sigma_unit * robust_unit(&problem, &result)?;
+    let unit = sigma_unit * noise::robust_unit(&problem, &by_channel);
     let noise = channels
-        .iter()
+        .par_iter()
         .zip(&sigmas)
         .zip(&freedom)
-        .map(|((c, sigma), freedom)| ChannelNoise {
+        .zip(&by_channel)
+        .map(|(((c, sigma), freedom), residuals)| ChannelNoise {
             channel: c.channel,
             readings: c.len(),
-            residual_rms: rms(c.source.iter().map(|i| residuals[*i as usize])),
+            residual_rms: rms(residuals),
             sigma: sigma * sigma_unit,
             degrees_of_freedom: *freedom,
         })
         .collect();
-    let closure = closure::of(&problem, &result, &channels, &residuals, unit);
-    let knots = FittedKnots::new(breaks, table, &channels, &residuals);
+    let closure = closure::of(&problem, &result, &channels, &by_channel, unit);
+    let knots = FittedKnots::new(breaks, table, &by_channel);
+    let mut residuals = vec![0.0; readings];
+    for (channel, own) in channels.iter().zip(&by_channel) {
+        for (i, r) in channel.source.iter().zip(own) {
+            residuals[*i as usize] = *r;
+        }
+    }
     Ok(Simultaneous {
         convention: options.convention,
         unknowns: problem.unknowns.clone(),
@@ -245,17 +202,16 @@ fn check(observations: &Observations, options: &Options) -> Result<(), ReversalE
 /// from.
 fn start_of_thickness(
     problem: &mut Reversal,
+    index: usize,
     start: Parameters,
-    options: errsep_solvers::structured::Options,
+    options: Minimisation,
 ) -> Result<Parameters, ReversalError> {
-    let Some(index) = problem.unknowns.thickness_index() else {
-        return Ok(start);
-    };
     problem.hold(index, true);
+    let start = head_start(problem, &start, options).unwrap_or(start);
     let held = minimise(problem, start, options)?;
     let released = held.if_released(problem, index);
     problem.hold(index, false);
-    let freedom: f64 = shared_freedom(problem).iter().sum();
+    let freedom: f64 = noise::shared_freedom(problem).iter().sum();
     let unit = (2.0 * held.cost / freedom.max(1.0)).sqrt();
     let std_mm = released.map_or(f64::INFINITY, |(_, variance)| unit * variance.sqrt());
     if std_mm > problem.thickness_mm {
@@ -279,105 +235,28 @@ fn choose_breaks(
     }
 }
 
-fn weights_of(sigmas: &[f64]) -> Vec<f64> {
-    sigmas.iter().map(|s| 1.0 / s).collect()
-}
+/// Readings a cell and channel from which a head start is made.
+const HEAD_START_READINGS: usize = 24;
 
-/// Degrees of freedom of each channel if unknowns are shared out by readings.
-fn shared_freedom(problem: &Reversal) -> Vec<f64> {
-    let used = problem.unknowns.free_count() as f64;
-    let readings: usize = problem.channels.iter().map(ChannelReadings::len).sum();
-    problem
-        .channels
-        .iter()
-        .map(|c| c.len() as f64 * (1.0 - used / readings as f64))
-        .collect()
-}
+/// A head start costs passes over a part of the readings: it must be this many times fewer.
+const HEAD_START_GAIN: usize = 4;
 
-/// Degrees of freedom of each channel: readings less the trace of its part of the hat matrix.
-fn channel_freedom(problem: &Reversal, result: &Fit) -> Result<Vec<f64>, ReversalError> {
-    let Some(covariance) = result.covariance() else {
-        return Ok(shared_freedom(problem));
-    };
-    let traces = hat_traces(problem, &result.parameters, &covariance)?;
-    Ok(problem
-        .channels
-        .iter()
-        .zip(traces)
-        .map(|(c, trace)| (c.len() as f64 - trace).max(1.0))
-        .collect())
-}
-
-/// Each channel's noise: σ_c² = RSS_c/(n_c − tr H_c), the iterated estimate of variance components
-/// that is unbiased at its fixed point (Förstner 1979). Under a robust loss the median of the
-/// residuals takes the place of their squares.
-fn estimate_noise(
-    problem: &Reversal,
-    result: &Fit,
-    freedom: &[f64],
-) -> Result<Vec<f64>, ReversalError> {
-    let count = problem.channels.len();
-    let mut squares = vec![0.0; count];
-    let mut sizes: Vec<Vec<f64>> = vec![Vec::new(); count];
-    let robust = problem.loss != Loss::Quadratic;
-    problem.residuals(&result.parameters, |c, _, r| {
-        if robust {
-            sizes[c].push(r.abs());
-        } else {
-            squares[c] += r * r;
-        }
-    })?;
-    let sigmas: Vec<f64> = (0..count)
-        .map(|c| {
-            let readings = problem.channels[c].len() as f64;
-            if robust {
-                let middle = sizes[c].len() / 2;
-                let (_, median, _) = sizes[c].select_nth_unstable_by(middle, f64::total_cmp);
-                // The median of |z| of a normal z is 0.6745 σ.
-                *median / 0.6745 * (readings / freedom[c]).sqrt()
-            } else {
-                (squares[c] / freedom[c]).sqrt()
-            }
-        })
-        .collect();
-    let largest = sigmas.iter().fold(0.0_f64, |m, s| m.max(*s));
-    if !(largest > 0.0) {
-        return Ok(vec![1.0; count]);
+/// The minimum over a few readings of each cell: from within the noise of that of all readings,
+/// where one more step is enough. `None` where there are not many more readings than that, or
+/// where those few determine no minimum.
+fn head_start(problem: &Reversal, start: &Parameters, options: Minimisation) -> Option<Parameters> {
+    let thin = problem.thinned(HEAD_START_READINGS);
+    let count = |channels: &[ChannelReadings]| channels.iter().map(|c| c.len()).sum::<usize>();
+    if HEAD_START_GAIN * count(&thin) > count(problem.channels) {
+        return None;
     }
-    Ok(sigmas
-        .into_iter()
-        .map(|s| s.max(LEAST_NOISE * largest))
-        .collect())
+    let fit = minimise(&problem.over(&thin), start.clone(), options).ok()?;
+    fit.converged().then_some(fit.parameters)
 }
 
-/// By how much a robust loss stretches the standard uncertainty: the rows, each times its factor w,
-/// have given (Σ w² J Jᵀ)⁻¹; the covariance is E[ψ²]/E[ψ′]² (JᵀJ)⁻¹ (Huber 1981, section 7.6),
-/// ψ = ρ′ r.
-fn robust_unit(problem: &Reversal, result: &Fit) -> Result<f64, ReversalError> {
-    if problem.loss == Loss::Quadratic {
-        return Ok(1.0);
+fn rms(values: &[f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
     }
-    let (mut squares, mut slopes, mut weights) = (0.0, 0.0, 0.0);
-    problem.residuals(&result.parameters, |c, _, r| {
-        let weighted = r * problem.weights[c];
-        let s = weighted * weighted;
-        let rho = problem.loss.at(s);
-        squares += rho.first * rho.first * s;
-        slopes += rho.first + 2.0 * s * rho.second;
-        weights += problem.loss.row_factors(weighted).0.powi(2);
-    })?;
-    Ok(if slopes > 0.0 {
-        (squares * weights).sqrt() / slopes
-    } else {
-        1.0
-    })
-}
-
-fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
-    if count > 0.0 {
-        f64::sqrt(sum / count)
-    } else {
-        0.0
-    }
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }

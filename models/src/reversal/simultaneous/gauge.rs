@@ -25,7 +25,8 @@ impl Axis {
     /// The axis of readings sorted by position; `None` where all positions are equal.
     pub fn of(channels: &[ChannelReadings]) -> Option<Self> {
         let count: usize = channels.iter().map(ChannelReadings::len).sum();
-        let center = channels.iter().flat_map(|c| &c.x).sum::<f64>() / count as f64;
+        let sums: Vec<f64> = channels.par_iter().map(|c| c.x.iter().sum()).collect();
+        let center = sums.into_iter().sum::<f64>() / count as f64;
         let (low, high) = range(channels);
         let scale = (high - low) / 2.0;
         (scale > 0.0 && scale.is_finite()).then_some(Self { center, scale })
@@ -85,11 +86,11 @@ pub fn constraints(
 /// The two rows of G⁻¹XᵀB.
 fn line_of_spline(basis: &CubicBSpline, channels: &[ChannelReadings], axis: Axis) -> [Vec<f64>; 2] {
     let cells = basis.cell_count();
-    // Moments Σ tᵖ and Σ ξ tᵖ of the positions of each cell.
-    let per_channel: Vec<Vec<[f64; 8]>> = channels
+    // Moments Σ tᵖ, Σ ξ tᵖ and Σ ξ² of the positions of each cell.
+    let per_channel: Vec<Vec<[f64; 9]>> = channels
         .par_iter()
         .map(|channel| {
-            let mut moments = vec![[0.0; 8]; cells];
+            let mut moments = vec![[0.0; 9]; cells];
             let mut from = 0;
             for (k, moment) in moments.iter_mut().enumerate() {
                 let end = if k + 1 == cells {
@@ -106,6 +107,7 @@ fn line_of_spline(basis: &CubicBSpline, channels: &[ChannelReadings], axis: Axis
                         moment[p] += power;
                         moment[4 + p] += xi * power;
                     }
+                    moment[8] += xi * xi;
                 }
                 from = end;
             }
@@ -127,13 +129,10 @@ fn line_of_spline(basis: &CubicBSpline, channels: &[ChannelReadings], axis: Axis
         }
     }
     // Σ ξ is zero by the choice of the centre up to rounding; the exact sums are kept all the same.
-    let (mut n, mut s1, mut s2) = (0.0, 0.0, 0.0);
-    for x in channels.iter().flat_map(|c| &c.x) {
-        let xi = axis.xi(*x);
-        n += 1.0;
-        s1 += xi;
-        s2 += xi * xi;
-    }
+    let [n, s1, s2] = [0, 4, 8].map(|p| -> f64 {
+        let moments = per_channel.iter().flatten();
+        moments.map(|moment| moment[p]).sum()
+    });
     let determinant = n * s2 - s1 * s1;
     let inverse = Matrix2::new(s2, -s1, -s1, n) / determinant;
     let mut rows = products;

@@ -12,7 +12,7 @@ use super::problem::Reversal;
 use super::readings::ChannelReadings;
 use super::seed;
 use super::unknowns::Unknowns;
-use super::{Axis, Noise, ReversalError, gauge};
+use super::{Axis, ReversalError, gauge};
 use crate::basis::bspline::CubicBSpline;
 use crate::reversal::forward::Attitude;
 
@@ -212,56 +212,4 @@ fn linear_squares(problem: &Reversal, system: &Bordered) -> Option<f64> {
     let left =
         system.sum_of_squares() - 2.0 * system.predicted_reduction(&solved.band, &solved.border);
     Some(left.max(system.unreachable_residual().powi(2)))
-}
-
-/// First guess of each channel's noise, µm: from every reading against the line through its
-/// neighbours, by the median, so that neither smooth forms nor outliers count.
-pub fn first_noise(channels: &[ChannelReadings], noise: Noise) -> Vec<f64> {
-    match noise {
-        Noise::Declared(sigma) => vec![sigma; channels.len()],
-        Noise::Equal => vec![1.0; channels.len()],
-        Noise::PerChannel => {
-            let guesses: Vec<f64> = channels.iter().map(median_second_difference).collect();
-            let largest = guesses.iter().fold(0.0_f64, |m, g| m.max(*g));
-            // Channels whose readings show no noise at all get a share of the noisiest.
-            guesses
-                .into_iter()
-                .map(|g| {
-                    if largest > 0.0 {
-                        g.max(1e-3 * largest)
-                    } else {
-                        1.0
-                    }
-                })
-                .collect()
-        }
-    }
-}
-
-/// Most differences that enter the median.
-const DIFFERENCES: usize = 4096;
-
-fn median_second_difference(channel: &ChannelReadings) -> f64 {
-    let count = channel.len().saturating_sub(2);
-    let step = count.div_ceil(DIFFERENCES).max(1);
-    let mut scaled: Vec<f64> = (0..count)
-        .step_by(step)
-        .map(|i| {
-            let (x, y) = (&channel.x[i..i + 3], &channel.value[i..i + 3]);
-            let share = if x[2] > x[0] {
-                (x[1] - x[0]) / (x[2] - x[0])
-            } else {
-                0.5
-            };
-            let rest = y[1] - (1.0 - share) * y[0] - share * y[2];
-            rest.abs() / (1.0 + share * share + (1.0 - share) * (1.0 - share)).sqrt()
-        })
-        .collect();
-    if scaled.is_empty() {
-        return 0.0;
-    }
-    let middle = scaled.len() / 2;
-    let (_, median, _) = scaled.select_nth_unstable_by(middle, f64::total_cmp);
-    // The median of |z| of a normal z is 0.6745 σ.
-    *median / 0.6745
 }

@@ -11,6 +11,7 @@ mod fit;
 mod gauge;
 mod knots;
 mod monte_carlo;
+mod noise;
 mod options;
 mod problem;
 mod readings;

@@ -5,11 +5,12 @@
 //! a task is a run of the sorted readings, and its ends are found by bisection.
 
 use errsep_solvers::linear::banded::Tall;
-use errsep_solvers::linear::bordered::Constraints;
+use errsep_solvers::linear::bordered::{Constraints, Share};
 use errsep_solvers::loss::Loss;
 use errsep_solvers::problem::NoValue;
 use errsep_solvers::structured::{Parameters, Sink, StructuredProblem};
-use nalgebra::DMatrix;
+
+use rayon::prelude::*;
 
 use super::gauge::{self, Axis};
 use super::readings::ChannelReadings;
@@ -40,7 +41,8 @@ pub struct Reversal<'a> {
     /// anywhere but converges linearly. Otherwise they carry the loss's curvature, which converges
     /// quadratically from nearby.
     pub far: bool,
-    maps: Vec<DMatrix<f64>>,
+    /// The coefficients of ξ in each basis.
+    xi: Vec<Vec<f64>>,
     constraints: Constraints,
     held: Vec<bool>,
     /// First reading at or beyond each break of the slide's form, by channel.
@@ -57,18 +59,13 @@ impl<'a> Reversal<'a> {
         thickness_mm: f64,
         weights: Vec<f64>,
     ) -> Self {
-        let maps = (0..channels.len())
-            .map(|c| unknowns.border_map(c))
+        let xi = bases
+            .iter()
+            .map(|basis| basis.line(axis.xi(0.0), 1.0 / axis.scale))
             .collect();
         let constraints = gauge::constraints(&unknowns, &bases, channels, axis);
         let held = unknowns.held();
-        let slide_starts = match unknowns.place(Form::Slide) {
-            Some(form) => channels
-                .iter()
-                .map(|c| starts(&c.x, bases[form].breaks()))
-                .collect(),
-            None => Vec::new(),
-        };
+        let slide_starts = slide_starts(&unknowns, &bases, channels);
         Self {
             channels,
             unknowns,
@@ -78,7 +75,7 @@ impl<'a> Reversal<'a> {
             weights,
             loss: Loss::Quadratic,
             far: false,
-            maps,
+            xi,
             constraints,
             held,
             slide_starts,
@@ -184,58 +181,139 @@ impl<'a> Reversal<'a> {
                 .place(Form::Slide)
                 .map(|form| (cell(form, slide), name.indicator_sign())),
             offset: prepared.offsets[channel],
-            center: self.axis.center,
-            scale: self.axis.scale,
             weight: self.weights[channel],
             thickness: self.unknowns.thickness,
         }
     }
 
-    /// Hands out model less reading, µm, of every reading: channel, place among its sorted
-    /// readings, value.
+    /// Reading less model, µm, of every reading: by channel, in the order of its sorted readings.
     ///
     /// # Errors
     /// [`NoValue`] where the model is not defined.
-    pub fn residuals(
-        &self,
-        at: &Parameters,
-        mut take: impl FnMut(usize, usize, f64),
-    ) -> Result<(), NoValue> {
+    pub fn residuals(&self, at: &Parameters) -> Result<Vec<Vec<f64>>, NoValue> {
         let prepared = self.prepare(at)?;
-        let mut points = Box::<Points>::default();
-        for (c, channel) in self.channels.iter().enumerate() {
-            for cell in 0..self.cell_count() {
-                self.runs(&prepared, c, cell, |from, to, side, slide| {
-                    let run = self.run(&prepared, c, side, slide);
-                    for first in (from..to).step_by(Tall::CAPACITY) {
-                        let last = to.min(first + Tall::CAPACITY);
-                        points.locate(
-                            &run,
-                            &channel.x[first..last],
-                            &channel.value[first..last],
-                        )?;
-                        for (i, r) in (first..last).zip(&points.residual) {
-                            take(c, i, r / self.weights[c]);
+        self.channels
+            .par_iter()
+            .enumerate()
+            .map(|(c, channel)| {
+                let mut residuals = Vec::with_capacity(channel.len());
+                let mut points = Box::<Points>::default();
+                let unit = -1.0 / self.weights[c];
+                for cell in 0..self.cell_count() {
+                    self.runs(&prepared, c, cell, |from, to, side, slide| {
+                        let run = self.run(&prepared, c, side, slide);
+                        for first in (from..to).step_by(Tall::CAPACITY) {
+                            let last = to.min(first + Tall::CAPACITY);
+                            let (x, value) = (&channel.x[first..last], &channel.value[first..last]);
+                            points.locate(&run, x, value)?;
+                            residuals.extend(points.residual[..x.len()].iter().map(|r| unit * r));
                         }
-                    }
-                    Ok(())
-                })?;
-            }
+                        Ok(())
+                    })?;
+                }
+                Ok(residuals)
+            })
+            .collect()
+    }
+
+    /// At most `most` readings of each channel in each cell.
+    pub fn thinned(&self, most: usize) -> Vec<ChannelReadings> {
+        self.channels
+            .iter()
+            .enumerate()
+            .map(|(c, channel)| match self.slide_starts.get(c) {
+                Some(starts) => channel.thinned(starts, most),
+                None => {
+                    let form = self.unknowns.side_of(channel.channel);
+                    channel.thinned(&starts(&channel.x, self.bases[form].breaks()), most)
+                }
+            })
+            .collect()
+    }
+
+    /// The same unknowns, gauge and weights over other readings of the same channels.
+    pub fn over<'b>(&self, channels: &'b [ChannelReadings]) -> Reversal<'b> {
+        Reversal {
+            channels,
+            unknowns: self.unknowns.clone(),
+            bases: self.bases.clone(),
+            axis: self.axis,
+            thickness_mm: self.thickness_mm,
+            weights: self.weights.clone(),
+            loss: self.loss,
+            far: self.far,
+            xi: self.xi.clone(),
+            constraints: self.constraints.clone(),
+            held: self.held.clone(),
+            slide_starts: slide_starts(&self.unknowns, &self.bases, channels),
         }
-        Ok(())
     }
 }
 
 impl Reversal<'_> {
-    /// The band unknowns of the local columns of a run.
+    /// The band unknowns of the local columns of a run: by coefficient, the slide's before the
+    /// artefact's, so that the triangle of a run keeps its shape in the band.
     fn band_columns(&self, channel: usize, side: usize, slide: usize) -> Vec<Option<usize>> {
         let form = self.unknowns.side_of(self.channels[channel].channel);
+        let place = self.unknowns.place(Form::Slide);
         let mut band = Vec::with_capacity(8);
-        if let Some(m) = self.unknowns.place(Form::Slide) {
-            band.extend((slide..slide + 4).map(|k| self.unknowns.coefficient(m, k)));
+        for k in 0..4 {
+            if let Some(m) = place {
+                band.push(self.unknowns.coefficient(m, slide + k));
+            }
+            band.push(self.unknowns.coefficient(form, side + k));
         }
-        band.extend((side..side + 4).map(|k| self.unknowns.coefficient(form, k)));
         band
+    }
+
+    /// What the local columns of a run are to the unknowns of the border. A constant and ξ are
+    /// combinations of the functions of a cell: offset and lines have no column of their own.
+    fn shares(&self, channel: usize, side: usize, slide: usize) -> Vec<Share> {
+        let unknowns = &self.unknowns;
+        let name = self.channels[channel].channel;
+        let mut shares = Vec::with_capacity(28);
+        let mut push = |column: usize, unknown: usize, weight: f64| {
+            if weight != 0.0 {
+                shares.push(Share {
+                    column: column as u32,
+                    unknown: unknown as u32,
+                    weight,
+                });
+            }
+        };
+        let forms = if unknowns.place(Form::Slide).is_some() {
+            2
+        } else {
+            1
+        };
+        if let Some(form) = unknowns.place(Form::Slide) {
+            let [height, slope] = unknowns.line(form);
+            for k in 0..4 {
+                push(2 * k, unknowns.offset(channel), name.indicator_sign());
+                push(2 * k, height, -1.0);
+                push(2 * k, slope, -self.xi[form][slide + k]);
+            }
+        }
+        let form = unknowns.side_of(name);
+        let [height, slope] = unknowns.line(form);
+        for k in 0..4 {
+            let column = forms * k + forms - 1;
+            push(column, height, -1.0);
+            push(column, slope, -self.xi[form][side + k]);
+        }
+        let mut next = 4 * forms;
+        for (j, sign) in unknowns.slope_signs(channel).into_iter().enumerate() {
+            push(next, j, sign);
+        }
+        next += 1;
+        if forms == 1 {
+            push(next, unknowns.offset(channel), 1.0);
+            next += 1;
+        }
+        if let Some(thickness) = unknowns.thickness_index() {
+            push(next, thickness, 1.0);
+        }
+        shares
     }
 
     /// Where the rows of each channel begin when all are written below each other.
@@ -251,14 +329,14 @@ impl Reversal<'_> {
     }
 
     /// Hands out all rows in batches: channel, place of the first among its sorted readings, band
-    /// unknowns of the local columns, rows.
+    /// unknowns of the local columns, what they are to the border, rows.
     ///
     /// # Errors
     /// [`NoValue`] where the model is not defined.
     pub fn for_each_batch(
         &self,
         at: &Parameters,
-        mut take: impl FnMut(usize, usize, &[Option<usize>], &Tall),
+        mut take: impl FnMut(usize, usize, &[Option<usize>], &[Share], &Tall),
     ) -> Result<(), NoValue> {
         let prepared = self.prepare(at)?;
         let mut points = Box::<Points>::default();
@@ -268,13 +346,14 @@ impl Reversal<'_> {
                 self.runs(&prepared, c, cell, |from, to, side, slide| {
                     let run = self.run(&prepared, c, side, slide);
                     let band = self.band_columns(c, side, slide);
+                    let shares = self.shares(c, side, slide);
                     for first in (from..to).step_by(Tall::CAPACITY) {
                         let last = to.min(first + Tall::CAPACITY);
                         let x = &channel.x[first..last];
                         points.locate(&run, x, &channel.value[first..last])?;
                         batch.reset(last - first, run.columns());
                         points.fill(&run, x, None, &mut batch);
-                        take(c, first, &band, &batch);
+                        take(c, first, &band, &shares, &batch);
                     }
                     Ok(())
                 })?;
@@ -282,6 +361,20 @@ impl Reversal<'_> {
         }
         Ok(())
     }
+}
+
+/// First reading at or beyond each break of the slide's form, by channel, where that is fitted.
+fn slide_starts(
+    unknowns: &Unknowns,
+    bases: &[CubicBSpline],
+    channels: &[ChannelReadings],
+) -> Vec<Vec<usize>> {
+    unknowns.place(Form::Slide).map_or_else(Vec::new, |form| {
+        channels
+            .iter()
+            .map(|c| starts(&c.x, bases[form].breaks()))
+            .collect()
+    })
 }
 
 /// For each break the first of the sorted positions at or beyond it; the first and last breaks
@@ -350,8 +443,8 @@ impl StructuredProblem for Reversal<'_> {
         self.unknowns.border_count()
     }
 
-    fn border_maps(&self) -> &[DMatrix<f64>] {
-        &self.maps
+    fn part_count(&self) -> usize {
+        self.channels.len()
     }
 
     fn constraints(&self) -> &Constraints {
@@ -447,7 +540,7 @@ impl StructuredProblem for Reversal<'_> {
                 }
             }
             let band = self.band_columns(c, side, slide);
-            sink.close(band, c);
+            sink.close(band, self.shares(c, side, slide), c);
             Ok(())
         })
     }

@@ -20,27 +20,64 @@ pub struct ChannelReadings {
 impl ChannelReadings {
     /// Sorts the observations; channels without a reading are left out.
     pub fn sort(observations: &Observations) -> Vec<Self> {
+        let mut counts = [0; 4];
+        for reading in &observations.readings {
+            counts[reading.channel.index()] += 1;
+        }
         Channel::ALL
             .into_par_iter()
+            .filter(|channel| counts[channel.index()] > 0)
             .map(|channel| {
-                let mut order: Vec<u32> = (0_u32..)
-                    .zip(&observations.readings)
-                    .filter(|(_, r)| r.channel == channel)
-                    .map(|(i, _)| i)
-                    .collect();
-                let reading = |i: u32| &observations.readings[i as usize];
-                if !order.is_sorted_by(|a, b| reading(*a).x <= reading(*b).x) {
-                    order.sort_by(|a, b| reading(*a).x.total_cmp(&reading(*b).x));
-                }
-                Self {
+                let count = counts[channel.index()];
+                let mut sorted = Self {
                     channel,
-                    x: order.iter().map(|i| reading(*i).x).collect(),
-                    value: order.iter().map(|i| reading(*i).value).collect(),
-                    source: order,
+                    x: Vec::with_capacity(count),
+                    value: Vec::with_capacity(count),
+                    source: Vec::with_capacity(count),
+                };
+                for (i, reading) in (0_u32..).zip(&observations.readings) {
+                    if reading.channel == channel {
+                        sorted.x.push(reading.x);
+                        sorted.value.push(reading.value);
+                        sorted.source.push(i);
+                    }
                 }
+                if !sorted.x.is_sorted() {
+                    let reading = |i: u32| &observations.readings[i as usize];
+                    sorted
+                        .source
+                        .sort_by(|a, b| reading(*a).x.total_cmp(&reading(*b).x));
+                    sorted.x.clear();
+                    sorted.x.extend(sorted.source.iter().map(|i| reading(*i).x));
+                    sorted.value.clear();
+                    let values = sorted.source.iter().map(|i| reading(*i).value);
+                    sorted.value.extend(values);
+                }
+                sorted
             })
-            .filter(|readings| !readings.is_empty())
             .collect()
+    }
+
+    /// At most `most` readings, evenly spread, of each of the stretches that begin at `starts`
+    /// (places among the readings; the last is the end).
+    pub fn thinned(&self, starts: &[usize], most: usize) -> Self {
+        let mut thin = Self {
+            channel: self.channel,
+            x: Vec::new(),
+            value: Vec::new(),
+            source: Vec::new(),
+        };
+        for pair in starts.windows(2) {
+            let count = pair[1].saturating_sub(pair[0]);
+            let kept = count.min(most);
+            for k in 0..kept {
+                let i = pair[0] + (2 * k + 1) * count / (2 * kept);
+                thin.x.push(self.x[i]);
+                thin.value.push(self.value[i]);
+                thin.source.push(self.source[i]);
+            }
+        }
+        thin
     }
 
     /// Number of readings.

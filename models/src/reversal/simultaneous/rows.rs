@@ -33,10 +33,6 @@ pub struct Run<'a> {
     pub slide: Option<(CellForm<'a>, f64)>,
     /// Offset of the channel, µm.
     pub offset: f64,
-    /// Centre of ξ, mm.
-    pub center: f64,
-    /// Scale of ξ, mm.
-    pub scale: f64,
     /// 1/σ of a reading, 1/µm.
     pub weight: f64,
     /// Whether ∂/∂thickness is wanted.
@@ -46,8 +42,8 @@ pub struct Run<'a> {
 impl Run<'_> {
     /// Local columns, the residual included.
     pub fn columns(&self) -> usize {
-        let slide = if self.slide.is_some() { 5 } else { 0 };
-        9 + slide + usize::from(self.thickness)
+        let forms = if self.slide.is_some() { 9 } else { 6 };
+        forms + 1 + usize::from(self.thickness)
     }
 }
 
@@ -242,44 +238,35 @@ fn columns_generic<const FMA: bool>(
     let Attitude {
         sin, cos, half_mm, ..
     } = run.attitude;
-    let mut next = 0;
+    let apart = if run.slide.is_some() { 2 } else { 1 };
     if let Some((slide, sign)) = &run.slide {
         let signed = sign * run.weight;
-        for function in slide.basis {
-            for (out, t) in batch.column_mut(next).iter_mut().zip(&points.t_slide) {
+        for (k, function) in slide.basis.iter().enumerate() {
+            for (out, t) in batch.column_mut(2 * k).iter_mut().zip(&points.t_slide) {
                 *out = signed * horner(function, *t);
             }
-            next += 1;
         }
     }
     let mut weighted_q = [0.0; CAPACITY];
     for (out, q) in weighted_q[..n].iter_mut().zip(&points.q) {
         *out = run.weight * q;
     }
-    for function in run.side.basis {
+    for (k, function) in run.side.basis.iter().enumerate() {
         let points = points.t_side.iter().zip(&weighted_q);
-        for (out, (t, q)) in batch.column_mut(next).iter_mut().zip(points) {
+        let column = batch.column_mut(apart * k + apart - 1);
+        for (out, (t, q)) in column.iter_mut().zip(points) {
             *out = q * horner(function, *t);
         }
-        next += 1;
     }
+    let mut next = 4 * apart;
     for (i, out) in batch.column_mut(next).iter_mut().enumerate() {
         let across = points.u[i] * sin + (half_mm + points.height[i]) * cos;
         *out =
             UM_PER_MM * run.weight * (x[i] + (sin + points.slope[i] * cos) * across * points.q[i]);
     }
-    batch.column_mut(next + 1).fill(run.weight);
-    batch.column_mut(next + 2).copy_from_slice(&weighted_q[..n]);
-    let per_scale = 1.0 / run.scale;
-    let on_side = points.u.iter().zip(&weighted_q);
-    for (out, (u, q)) in batch.column_mut(next + 3).iter_mut().zip(on_side) {
-        *out = q * ((u - run.center) * per_scale);
-    }
-    next += 4;
-    if run.slide.is_some() {
-        for (out, x) in batch.column_mut(next).iter_mut().zip(x) {
-            *out = run.weight * ((x - run.center) * per_scale);
-        }
+    next += 1;
+    if run.slide.is_none() {
+        batch.column_mut(next).fill(run.weight);
         next += 1;
     }
     if run.thickness {

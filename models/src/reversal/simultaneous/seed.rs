@@ -4,6 +4,7 @@ use std::f64::consts::FRAC_PI_4;
 
 use errsep_solvers::structured::Parameters;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::error::ReversalError;
 use super::readings::ChannelReadings;
@@ -17,7 +18,7 @@ use crate::units::mm_from_um;
 /// beyond 45°.
 pub fn lines(channels: &[ChannelReadings]) -> Result<Vec<(f64, f64)>, ReversalError> {
     channels
-        .iter()
+        .par_iter()
         .map(|c| {
             let (slope, height) = c.line().ok_or(ReversalError::OnePosition {
                 channel: c.channel.name(),

@@ -4,11 +4,11 @@ use errsep_solvers::linear::bordered::{BorderedCovariance, Constraints};
 use errsep_solvers::outcome::Ending;
 use errsep_solvers::problem::NoValue;
 use errsep_solvers::structured::{Iteration, Parameters};
-use nalgebra::{DMatrix, RowDVector};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::gauge::Axis;
 use super::knots::KnotTrial;
-use super::readings::ChannelReadings;
 use super::unknowns::{Form, Unknowns};
 use crate::basis::bspline::{Cubic, CubicBSpline, horner, horner_slope};
 use crate::reversal::combinations::determined;
@@ -100,28 +100,21 @@ pub struct FittedKnots {
 const SUSPICIOUS_Z: f64 = 4.0;
 
 impl FittedKnots {
-    pub(super) fn new(
-        breaks: Vec<f64>,
-        table: Vec<KnotTrial>,
-        channels: &[ChannelReadings],
-        residuals: &[f64],
-    ) -> Self {
-        let (mut products, mut squares, mut pairs) = (0.0, 0.0, 0.0_f64);
-        for channel in channels {
-            let scale: f64 = channel
-                .source
-                .iter()
-                .map(|i| residuals[*i as usize].powi(2))
-                .sum::<f64>()
-                / channel.len() as f64;
-            if scale > 0.0 {
-                for pair in channel.source.windows(2) {
-                    products += residuals[pair[0] as usize] * residuals[pair[1] as usize] / scale;
+    pub(super) fn new(breaks: Vec<f64>, table: Vec<KnotTrial>, residuals: &[Vec<f64>]) -> Self {
+        let sums: Vec<[f64; 3]> = residuals
+            .par_iter()
+            .map(|channel| {
+                let count = channel.len() as f64;
+                let scale = channel.iter().map(|r| r * r).sum::<f64>() / count;
+                if !(scale > 0.0) {
+                    return [0.0; 3];
                 }
-                squares += channel.len() as f64;
-                pairs += channel.len() as f64 - 1.0;
-            }
-        }
+                let neighbours = channel.windows(2).map(|pair| pair[0] * pair[1]);
+                [neighbours.sum::<f64>() / scale, count, count - 1.0]
+            })
+            .collect();
+        let [products, squares, pairs] =
+            [0, 1, 2].map(|k| sums.iter().map(|sum| sum[k]).sum::<f64>());
         let correlation = if squares > 0.0 {
             products / squares
         } else {
@@ -421,31 +414,35 @@ impl Simultaneous {
         let (sin, cos) = (attitude.sin, attitude.cos);
         let q = 1.0 / (cos - slope * sin);
         let across = u * sin + (attitude.half_mm + height) * cos;
-        let mut local = RowDVector::zeros(self.unknowns.local_border_count());
-        local[0] = UM_PER_MM * (x + (sin + slope * cos) * across * q);
-        local[1] = 1.0;
-        local[2] = q;
-        local[3] = q * self.axis.xi(u);
+        let mut border = vec![0.0; self.unknowns.border_count()];
+        let turn = UM_PER_MM * (x + (sin + slope * cos) * across * q);
+        for (j, sign) in self.unknowns.slope_signs(c).into_iter().enumerate() {
+            border[j] = sign * turn;
+        }
+        border[self.unknowns.offset(c)] = 1.0;
+        let mut line = |form: usize, factor: f64, at: f64| {
+            let [height, slope] = self.unknowns.line(form);
+            border[height] = -factor;
+            border[slope] = -factor * self.axis.xi(at);
+        };
+        line(side, q, u);
         let mut value = UM_PER_MM * attitude.reading_mm(u, height)
             + self.parameters.border[self.unknowns.offset(c)];
         let mut band = Vec::with_capacity(8);
-        let mut next = 4;
         if let Some(slide) = self.unknowns.place(Form::Slide) {
             let sign = channel.indicator_sign();
             value += sign * self.value_of(slide, x).0;
-            local[4] = self.axis.xi(x);
-            next += 1;
+            line(slide, sign, x);
             self.push_basis(slide, x, sign, &mut band);
         }
         self.push_basis(side, u, q, &mut band);
-        if self.unknowns.thickness {
-            local[next] = 0.5 * UM_PER_MM * (q - 1.0);
+        if let Some(thickness) = self.unknowns.thickness_index() {
+            border[thickness] = 0.5 * UM_PER_MM * (q - 1.0);
         }
-        let border = local * self.unknowns.border_map(c);
         Ok(Prediction {
             value,
             band,
-            border: border.iter().copied().collect(),
+            border,
         })
     }
 

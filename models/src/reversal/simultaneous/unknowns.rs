@@ -5,8 +5,6 @@
 //! straight line that is subtracted from each form (the gauge ties it to the band), and the
 //! thickness where it is asked for.
 
-use nalgebra::DMatrix;
-
 use crate::reversal::{Channel, Contrast, Convention};
 
 /// A form that is fitted.
@@ -196,41 +194,6 @@ impl Unknowns {
             .sum()
     }
 
-    /// Whether the slide's form is among the unknowns.
-    pub fn has_slide(&self) -> bool {
-        self.place(Form::Slide).is_some()
-    }
-
-    /// Local border columns of a channel's rows: ∂/∂ψ, 1, q, q·ξ, then ξ if the slide's form is
-    /// fitted, then ∂/∂thickness if that is unknown (q = ∂reading/∂S, ξ the centred position).
-    pub fn local_border_count(&self) -> usize {
-        4 + usize::from(self.has_slide()) + usize::from(self.thickness)
-    }
-
-    /// How the local border columns of a channel make up the border unknowns.
-    pub fn border_map(&self, channel: usize) -> DMatrix<f64> {
-        let mut map = DMatrix::zeros(self.local_border_count(), self.border_count());
-        for (j, sign) in self.slope_signs(channel).into_iter().enumerate() {
-            map[(0, j)] = sign;
-        }
-        map[(1, self.offset(channel))] = 1.0;
-        let [height, slope] = self.line(self.side_of(self.channels[channel]));
-        map[(2, height)] = -1.0;
-        map[(3, slope)] = -1.0;
-        let mut next = 4;
-        if let Some(slide) = self.place(Form::Slide) {
-            let sign = self.channels[channel].indicator_sign();
-            let [height, slope] = self.line(slide);
-            map[(1, height)] = -sign;
-            map[(4, slope)] = -sign;
-            next += 1;
-        }
-        if let Some(thickness) = self.thickness_index() {
-            map[(next, thickness)] = 1.0;
-        }
-        map
-    }
-
     /// Number of unknowns that the fit is free to choose: band and border less the closure and the
     /// lines, which the gauge ties to the band.
     pub fn free_count(&self) -> usize {
@@ -249,7 +212,7 @@ impl Unknowns {
         let (a, b) = (of(true), of(false));
         (a > 0 || self.place(Form::SideA).is_none())
             && (b > 0 || self.place(Form::SideB).is_none())
-            && (!self.has_slide() || a == 2 || b == 2)
+            && (self.place(Form::Slide).is_none() || a == 2 || b == 2)
     }
 
     /// The name of a border unknown.

@@ -2,7 +2,7 @@
 
 use crate::by_processor;
 
-use super::lanes::{LANES, NEGLIGIBLE_SQUARE, add_scaled, dot, dot_four, norm_squared};
+use super::lanes::{LANES, NEGLIGIBLE_SQUARE, multiply_add, norm_squared, sum};
 
 /// A batch of rows, column by column: what a model fills and [`compress`] consumes.
 ///
@@ -119,22 +119,55 @@ fn stack_generic<const FMA: bool>(
         let mut j = k + 1;
         while j + 4 <= columns {
             let from = (j - k - 1) * STRIDE;
-            let dots = dot_four::<FMA>(v, &rest[from..from + 3 * STRIDE + rows], STRIDE);
-            for (l, dot) in dots.into_iter().enumerate() {
-                let factor = scale * (head * row[j + l] + dot);
-                row[j + l] -= head * factor;
-                let start = from + l * STRIDE;
-                add_scaled::<FMA>(&mut rest[start..start + rows], -factor, v);
-            }
+            reflect::<FMA, 4>(v, head, scale, &mut row[j..j + 4], &mut rest[from..]);
             j += 4;
         }
-        while j < columns {
-            let start = (j - k - 1) * STRIDE;
-            let column = &mut rest[start..start + rows];
-            let factor = scale * (head * row[j] + dot::<FMA>(v, column));
-            row[j] -= head * factor;
-            add_scaled::<FMA>(column, -factor, v);
-            j += 1;
+        let from = (j - k - 1) * STRIDE;
+        let (row, rest) = (&mut row[j..], rest.get_mut(from..).unwrap_or_default());
+        match columns - j {
+            3 => reflect::<FMA, 3>(v, head, scale, row, rest),
+            2 => reflect::<FMA, 2>(v, head, scale, row, rest),
+            1 => reflect::<FMA, 1>(v, head, scale, row, rest),
+            _ => {}
+        }
+    }
+}
+
+/// Applies a reflection to N columns and their values in the triangle's row.
+#[inline(always)]
+fn reflect<const FMA: bool, const N: usize>(
+    v: &[f64],
+    head: f64,
+    scale: f64,
+    row: &mut [f64],
+    columns: &mut [f64],
+) {
+    let v = v.as_chunks::<LANES>().0;
+    let count = v.len();
+    let mut rest = columns;
+    let columns: [&mut [[f64; LANES]]; N] = std::array::from_fn(|_| {
+        let (column, after) = std::mem::take(&mut rest).split_at_mut(Tall::CAPACITY);
+        rest = after;
+        &mut column.as_chunks_mut::<LANES>().0[..count]
+    });
+    let mut lanes = [[0.0; LANES]; N];
+    for i in 0..count {
+        for j in 0..N {
+            for l in 0..LANES {
+                lanes[j][l] = multiply_add::<FMA>(v[i][l], columns[j][i][l], lanes[j][l]);
+            }
+        }
+    }
+    let mut factors = [0.0; N];
+    for j in 0..N {
+        factors[j] = scale * (head * row[j] + sum(lanes[j]));
+        row[j] -= head * factors[j];
+    }
+    for i in 0..count {
+        for j in 0..N {
+            for l in 0..LANES {
+                columns[j][i][l] = multiply_add::<FMA>(-factors[j], v[i][l], columns[j][i][l]);
+            }
         }
     }
 }

@@ -1,18 +1,43 @@
 //! Building the triangle of a bordered band out of groups of rows.
 
-use nalgebra::DMatrix;
-
 use crate::linear::banded::{BandTriangle, RowStack, Tall, compress};
 
+/// What a local column is to an unknown of the border: ∂r/∂y of a row is the sum of weight·column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Share {
+    /// The local column, of the band or after it.
+    pub column: u32,
+    /// The unknown of the border.
+    pub unknown: u32,
+    /// Its weight.
+    pub weight: f64,
+}
+
 /// A group of rows that see the same unknowns, already compressed to a triangle.
+///
+/// Columns of the border that are combinations of the local columns cost nothing a row: they are
+/// told by `border` alone, whatever their number.
 #[derive(Debug, Clone)]
 pub struct Group {
     /// For each local band column the unknown it belongs to; `None` where it is fixed at zero.
     pub band: Vec<Option<usize>>,
-    /// Which of the border maps turns local border columns into border unknowns.
-    pub map: usize,
-    /// The triangle: local band columns, local border columns, residual; row-major.
+    /// How local columns make up the columns of the border.
+    pub border: Vec<Share>,
+    /// Local columns: those of the band, others, the residual.
+    pub columns: usize,
+    /// The part of the rows it belongs to: parts have weights and degrees of freedom of their own.
+    pub part: usize,
+    /// The triangle: columns × columns, row-major.
     pub triangle: Vec<f64>,
+    /// ½ Σ r² of its rows, or ½ Σ ρ(r²) under a robust loss.
+    pub cost: f64,
+}
+
+impl Group {
+    /// Row i of the triangle.
+    pub fn row(&self, i: usize) -> &[f64] {
+        &self.triangle[i * self.columns..(i + 1) * self.columns]
+    }
 }
 
 /// The triangle of a banded and bordered least-squares system.
@@ -56,53 +81,45 @@ impl Bordered {
         &self.triangle
     }
 
-    /// Folds a group in. From a group's lowest unknown to the highest seen so far there may be
-    /// no more than the width of the band; [`Self::finish`] must follow the last group.
-    ///
-    /// `map` has a row for each local border column and q columns.
-    pub fn absorb(&mut self, group: &Group, map: &DMatrix<f64>) {
+    /// Folds a group in, its rows times `weight`. From a group's lowest unknown to the highest seen
+    /// so far there may be no more than the width of the band; [`Self::finish`] must follow the
+    /// last group.
+    pub fn absorb(&mut self, group: &Group, weight: f64) {
         let local_band = group.band.len();
-        let columns = local_band + map.nrows() + 1;
-        let row = |i: usize| &group.triangle[i * columns..(i + 1) * columns];
         let bounds = group.band.iter().flatten().fold(None, |b, &j| match b {
             None => Some((j, j)),
             Some((low, high)) => Some((j.min(low), j.max(high))),
         });
-        if let Some((first, last)) = bounds {
-            let span = self.triangle.span_from(first, last);
-            self.stack.reset(first, span, self.border + 1, local_band);
-            for i in 0..local_band {
-                let local = row(i);
-                let out = self.stack.row_mut(i);
-                for (value, unknown) in local.iter().zip(&group.band) {
-                    if let Some(j) = unknown {
-                        out[j - first] += value;
-                    }
+        let mut stack = std::mem::take(&mut self.stack);
+        let (first, span) = match bounds {
+            Some((first, last)) => (first, self.triangle.span_from(first, last)),
+            None => (0, 0),
+        };
+        stack.reset(first, span, self.border + 1, local_band);
+        for i in 0..local_band {
+            let local = group.row(i);
+            let out = stack.row_mut(i);
+            for (value, unknown) in local.iter().zip(&group.band) {
+                if let Some(j) = unknown {
+                    out[j - first] += weight * value;
                 }
-                expand(&local[local_band..], map, self.border, &mut out[span..]);
             }
-            self.triangle.fold(&mut self.stack);
-        } else {
-            self.stack.reset(0, 0, self.border + 1, local_band);
-            for i in 0..local_band {
-                expand(
-                    &row(i)[local_band..],
-                    map,
-                    self.border,
-                    self.stack.row_mut(i),
-                );
-            }
+            expand(local, weight, &group.border, &mut out[span..]);
         }
-        let mut tails = std::mem::take(&mut self.stack);
-        for tail in tails.tails() {
+        if span > 0 {
+            self.triangle.fold(&mut stack);
+        }
+        for tail in stack.tails() {
             self.push_border_row(tail);
         }
-        tails.reset(0, 0, self.border + 1, 1);
-        for i in local_band..columns {
-            expand(&row(i)[local_band..], map, self.border, tails.row_mut(0));
-            self.push_border_row(tails.row_mut(0));
+        stack.reset(0, 0, self.border + 1, 1);
+        for i in local_band..group.columns {
+            let out = stack.row_mut(0);
+            out.fill(0.0);
+            expand(group.row(i), weight, &group.border, out);
+            self.push_border_row(out);
         }
-        self.stack = tails;
+        self.stack = stack;
     }
 
     /// Adds a row that sees the border alone: q values and the residual.
@@ -237,13 +254,12 @@ impl Bordered {
     }
 }
 
-/// The border columns of a row, from its local columns.
-fn expand(local: &[f64], map: &DMatrix<f64>, border: usize, out: &mut [f64]) {
-    out.fill(0.0);
-    for (l, value) in local[..map.nrows()].iter().enumerate() {
-        for (j, out) in out[..border].iter_mut().enumerate() {
-            *out += value * map[(l, j)];
-        }
+/// Adds the border columns of a row of local columns, and its residual.
+fn expand(local: &[f64], weight: f64, border: &[Share], out: &mut [f64]) {
+    for share in border {
+        out[share.unknown as usize] += weight * share.weight * local[share.column as usize];
     }
-    out[border] = local[map.nrows()];
+    if let (Some(out), Some(residual)) = (out.last_mut(), local.last()) {
+        *out = weight * residual;
+    }
 }

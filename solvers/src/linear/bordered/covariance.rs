@@ -28,6 +28,10 @@ pub struct BorderedCovariance {
     /// U, n rows of q values.
     u: DMatrix<f64>,
     border: DMatrix<f64>,
+    /// A root of C_y: q rows of q values, row-major.
+    root: Vec<f64>,
+    /// Row by row the q values of U·root and the p of P.
+    beside: Vec<f64>,
 }
 
 impl BorderedCovariance {
@@ -53,12 +57,20 @@ impl BorderedCovariance {
                 .sum();
             pulled - system.triangle.tail_row(i)[j]
         });
+        let rooted = &u * &solved.border_root;
+        let mut beside = Vec::with_capacity(n * (q + p.ncols()));
+        for i in 0..n {
+            beside.extend(rooted.row(i).iter());
+            beside.extend(p.row(i).iter());
+        }
         Self {
             triangle: system.triangle.clone(),
             inverse: BandInverse::of(&system.triangle),
             p,
             u,
             border: solved.border_covariance.clone(),
+            root: solved.border_root.transpose().as_slice().to_vec(),
+            beside,
         }
     }
 
@@ -120,35 +132,58 @@ impl BorderedCovariance {
         (own - lost + through).max(0.0)
     }
 
-    /// The trace of J cov Jᵀ over the rows of a group: how many unknowns they use up.
-    pub fn hat_trace(&self, group: &Group, map: &DMatrix<f64>) -> f64 {
-        let columns = group.band.len() + map.nrows() + 1;
-        let mut band = Vec::with_capacity(group.band.len());
-        let mut border = Vec::with_capacity(self.border.nrows());
-        (0..columns - 1)
-            .map(|i| {
-                let row = &group.triangle[i * columns..(i + 1) * columns];
-                let (in_band, beside) = row.split_at(group.band.len());
-                band.clear();
-                band.extend(
-                    group
-                        .band
-                        .iter()
-                        .zip(in_band)
-                        .filter_map(|(unknown, value)| unknown.map(|j| (j, *value)))
-                        .filter(|(_, value)| *value != 0.0),
-                );
-                border.clear();
-                border.extend((0..self.border.nrows()).map(|j| {
-                    let value = beside[..map.nrows()]
-                        .iter()
-                        .enumerate()
-                        .map(|(l, v)| v * map[(l, j)])
-                        .sum::<f64>();
-                    (j, value)
-                }));
-                self.variance(&band, &border)
-            })
-            .sum()
+    /// The trace of J cov Jᵀ over the rows of a group times `weight`: how many unknowns they use
+    /// up.
+    ///
+    /// With G the group's triangle over its local columns it is the sum of G∘(G·K), K the
+    /// covariance of the local columns' coefficients: K = Z − PPᵀ + E Eᵀ with E the rows of U and
+    /// of the unit matrix that the columns bring, times a root of C_y.
+    pub fn hat_trace(&self, group: &Group, weight: f64) -> f64 {
+        let (columns, q, p) = (group.columns - 1, self.border.nrows(), self.p.ncols());
+        let stride = q + p;
+        // Row l: what column l brings through the border, and what the constraints take away.
+        let mut through = vec![0.0; columns * stride];
+        for share in &group.border {
+            let row = &mut through[share.column as usize * stride..][..q];
+            let root = &self.root[share.unknown as usize * q..][..q];
+            for (sum, root) in row.iter_mut().zip(root) {
+                *sum += share.weight * root;
+            }
+        }
+        for (row, unknown) in through.chunks_exact_mut(stride).zip(&group.band) {
+            if let Some(j) = unknown {
+                let beside = &self.beside[j * stride..(j + 1) * stride];
+                for (sum, value) in row.iter_mut().zip(beside) {
+                    *sum += value;
+                }
+            }
+        }
+        let mut near = vec![0.0; group.band.len() * group.band.len()];
+        for (l, i) in group.band.iter().enumerate() {
+            for (m, j) in group.band.iter().enumerate() {
+                if let (Some(i), Some(j)) = (i, j) {
+                    near[l * group.band.len() + m] = self.inverse.get(*i, *j);
+                }
+            }
+        }
+        let mut sums = vec![0.0; stride];
+        let mut trace = 0.0;
+        for i in 0..columns {
+            let row = &group.row(i)[..columns];
+            sums.fill(0.0);
+            for (value, through) in row.iter().zip(through.chunks_exact(stride)).skip(i) {
+                for (sum, t) in sums.iter_mut().zip(through) {
+                    *sum += value * t;
+                }
+            }
+            let (gained, lost) = sums.split_at(q);
+            trace += gained.iter().map(|s| s * s).sum::<f64>();
+            trace -= lost.iter().map(|s| s * s).sum::<f64>();
+            for (value, near) in row.iter().zip(near.chunks_exact(group.band.len().max(1))) {
+                let own: f64 = row.iter().zip(near).map(|(v, z)| v * z).sum();
+                trace += value * own;
+            }
+        }
+        weight * weight * trace
     }
 }

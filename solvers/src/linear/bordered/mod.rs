@@ -16,7 +16,7 @@ mod constraints;
 mod covariance;
 mod solve;
 
-pub use assemble::{Bordered, Group};
+pub use assemble::{Bordered, Group, Share};
 pub use constraints::Constraints;
 pub use covariance::BorderedCovariance;
 pub use solve::{Solved, Undetermined};

@@ -38,6 +38,8 @@ pub struct Solved {
     pub(super) b: DMatrix<f64>,
     /// (MᵀM)⁺ of the small problem, q × q, zero where held.
     pub(super) border_covariance: DMatrix<f64>,
+    /// A root of it: its rows are the unknowns.
+    pub(super) border_root: DMatrix<f64>,
 }
 
 /// Singular values of the scaled small problem below this share of the largest count as zero:
@@ -98,10 +100,12 @@ impl Bordered {
         let dense = solve_small(small, &value, free.iter().map(|j| norms[*j]).collect());
         let mut border = vec![0.0; q];
         let mut border_covariance = DMatrix::zeros(q, q);
+        let mut border_root = DMatrix::zeros(q, q);
         for (l, &j) in free.iter().enumerate() {
             border[j] = dense.solution[l];
             for (m, &k) in free.iter().enumerate() {
                 border_covariance[(j, k)] = dense.covariance[(l, m)];
+                border_root[(j, m)] = dense.root[(l, m)];
             }
         }
         let undetermined = dense
@@ -134,6 +138,7 @@ impl Bordered {
             q: columns,
             b,
             border_covariance,
+            border_root,
         })
     }
 
@@ -185,6 +190,7 @@ impl Bordered {
 struct Small {
     solution: DVector<f64>,
     covariance: DMatrix<f64>,
+    root: DMatrix<f64>,
     null: Vec<DVector<f64>>,
 }
 
@@ -203,7 +209,7 @@ fn solve_small(mut matrix: DMatrix<f64>, value: &DVector<f64>, mut scales: Vec<f
     let svd = JacobiSvd::new(qr.r());
     let largest = svd.values.iter().fold(0.0_f64, |m, s| m.max(*s));
     let mut solution = DVector::zeros(unknowns);
-    let mut covariance = DMatrix::zeros(unknowns, unknowns);
+    let mut root = DMatrix::zeros(unknowns, unknowns);
     let mut null = Vec::new();
     for (k, s) in svd.values.iter().enumerate() {
         let v = svd.right.column(k);
@@ -211,18 +217,17 @@ fn solve_small(mut matrix: DMatrix<f64>, value: &DVector<f64>, mut scales: Vec<f
             null.push(v.component_div(&DVector::from_column_slice(&scales)));
         } else {
             solution.axpy(-svd.left.column(k).dot(&rhs) / s, &v, 1.0);
-            covariance.ger(1.0 / (s * s), &v, &v, 1.0);
+            root.set_column(k, &(v / *s));
         }
     }
     for i in 0..unknowns {
         solution[i] /= scales[i];
-        for j in 0..unknowns {
-            covariance[(i, j)] /= scales[i] * scales[j];
-        }
+        root.row_mut(i).scale_mut(1.0 / scales[i]);
     }
     Small {
         solution,
-        covariance,
+        covariance: &root * root.transpose(),
+        root,
         null,
     }
 }

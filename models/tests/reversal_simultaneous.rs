@@ -605,7 +605,7 @@ fn what_cannot_be_fitted_is_said() {
         .collect());
     assert!(matches!(
         fit(&steep, &plain),
-        Err(ReversalError::NoStart(_))
+        Err(ReversalError::TooSteep { channel: "1A", .. })
     ));
     let flat = of((0..50)
         .map(|i| reading(Channel::C1A, i as f64, 0.0))
@@ -619,6 +619,26 @@ fn what_cannot_be_fitted_is_said() {
     // All zero: nothing to find, but an answer all the same.
     let zero = fit(&flat, &plain).unwrap();
     assert_eq!(zero.tilts()[0].angle.value, 0.0);
+    let turned = Options {
+        start_tilts_rad: Some(vec![1.0]),
+        ..Options::default()
+    };
+    assert!(matches!(
+        fit(&flat, &turned),
+        Err(ReversalError::NoStart(_))
+    ));
+    // Hardly any tilt: the thickness leaves no trace.
+    let rough = of((0..50)
+        .map(|i| reading(Channel::C1A, i as f64, (i * i % 7) as f64))
+        .collect());
+    let free = Options {
+        thickness: Thickness::Fitted(40.0),
+        ..Options::default()
+    };
+    assert!(matches!(
+        fit(&rough, &free),
+        Err(ReversalError::ThicknessNotDetermined { std_mm }) if std_mm > 1e3
+    ));
     // Too many knots for the readings of one trace.
     let dense = Options {
         knots: Knots::At(even_grid(0.0, 49.0, 200)),

@@ -16,7 +16,7 @@ use crate::report::fourier::{FourierView, page, peak_to_valley};
 use crate::report::number;
 
 /// Orders kept where nothing is said.
-const ORDERS: usize = 30;
+pub(super) const ORDERS: usize = 30;
 
 /// Straightness by the Fourier two-sensor, three-sensor and hybrid methods.
 #[derive(Debug, clap::Args)]

@@ -12,7 +12,9 @@ mod closed_forms;
 mod components;
 mod design;
 mod determination;
+mod diagnosable;
 mod diagonals;
+mod effects;
 mod errors;
 mod estimators;
 mod geometry;
@@ -27,6 +29,7 @@ pub use closed_forms::{ClosedForm, DiagonalTotals, Total, TotalsEstimate, closed
 pub use components::{Axis, Component, Location, NodeKind};
 pub use design::{Identifiability, identifiability};
 pub use determination::{Ambiguity, Determined, Remedy};
+pub use diagnosable::DiagonalRuns;
 pub use diagonals::{Diagonal, Sequence, Target, WorkZone};
 pub use errors::ErrorTables;
 pub use estimators::{ESTIMATORS, Estimator};
@@ -38,4 +41,4 @@ pub use regression::{
     Assumptions, ComponentEstimate, LocationEstimate, Measured, MirrorEstimate, StepDiagonalFit,
     regress,
 };
-pub use simulate::{DiagonalSimulation, simulate};
+pub use simulate::{DiagonalSimulation, Disturbance, Misalignments, simulate, simulate_disturbed};

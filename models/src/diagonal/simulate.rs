@@ -57,14 +57,89 @@ impl Default for DiagonalSimulation {
 /// Angles (rad) of the reflector of each set-up out of its nominal direction.
 pub type Misalignments = BTreeMap<(Diagonal, Target), Vector3<f64>>;
 
+/// What disturbs the readings beside noise, in exact form.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Disturbance {
+    /// The mirror is turned about the first of [`Diagonal::mirror_axes`] for one sequence, rad.
+    MirrorMisalignment {
+        /// Diagonal.
+        diagonal: Diagonal,
+        /// Sequence.
+        sequence: Sequence,
+        /// Angle, rad.
+        angle: f64,
+    },
+    /// One rotation grows evenly along its axis.
+    AngularError {
+        /// The rotation.
+        component: Component,
+        /// At the end of the travel, rad.
+        angle: f64,
+    },
+    /// The dead path changes evenly, by so much over the test, µm; each run begins at zero.
+    DeadPath(f64),
+    /// The machine settles.
+    Drift {
+        /// In the end, µm.
+        drift: f64,
+        /// Time constant as a part of the duration.
+        constant: f64,
+    },
+}
+
+impl Disturbance {
+    /// The names that [`Self::named`] knows.
+    pub const NAMES: [&'static str; 4] =
+        ["angular-error", "dead-path", "drift", "mirror-misalignment"];
+
+    /// A disturbance by the name of its effect and its size, µm or rad; what these leave open is
+    /// usual: the rotation of Y about X, a time constant of a tenth of the duration, the last of
+    /// the diagonals and sequences.
+    pub fn named(name: &str, size: f64, what: &DiagonalSimulation) -> Option<Self> {
+        Some(match name {
+            "mirror-misalignment" => Self::MirrorMisalignment {
+                diagonal: *what.diagonals.last()?,
+                sequence: *what.sequences.last()?,
+                angle: size,
+            },
+            "angular-error" => Self::AngularError {
+                component: Component::from_name("EAY")?,
+                angle: size,
+            },
+            "dead-path" => Self::DeadPath(size),
+            "drift" => Self::Drift {
+                drift: size,
+                constant: 0.1,
+            },
+            _ => return None,
+        })
+    }
+}
+
 /// Readings by exact geometry, the errors they were made of and the misalignment of each set-up.
 pub fn simulate(
     what: &DiagonalSimulation,
     seed: u64,
 ) -> (Vec<DiagonalReading>, ErrorTables, Misalignments) {
+    simulate_disturbed(what, &[], seed)
+}
+
+/// [`simulate`] with disturbances; readings are taken evenly in time.
+pub fn simulate_disturbed(
+    what: &DiagonalSimulation,
+    disturbances: &[Disturbance],
+    seed: u64,
+) -> (Vec<DiagonalReading>, ErrorTables, Misalignments) {
     let zone = &what.zone;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let errors = random_errors(zone, what.translation, what.rotation, &mut rng);
+    let mut errors = random_errors(zone, what.translation, what.rotation, &mut rng);
+    for disturbance in disturbances {
+        if let Disturbance::AngularError { component, angle } = *disturbance {
+            for (i, value) in errors.of_mut(component).iter_mut().enumerate() {
+                *value += angle * i as f64 / zone.steps as f64;
+            }
+        }
+    }
     let mut mirrors = BTreeMap::new();
     let mut readings = Vec::new();
     for &target in &what.targets {
@@ -72,9 +147,10 @@ pub fn simulate(
             let mirror = Vector3::from_fn(|_, _| what.mirror * normal(&mut rng));
             mirrors.insert((diagonal, target), mirror);
             for &sequence in &what.sequences {
+                let turned = turned_mirror(zone, disturbances, diagonal, sequence, mirror);
                 for repeat in 1..=what.repeats.max(1) {
                     for at in distinct(zone.stops(diagonal, sequence)) {
-                        let exact = exact_reading(zone, &errors, diagonal, target, mirror, at);
+                        let exact = exact_reading(zone, &errors, diagonal, target, turned, at);
                         readings.push(DiagonalReading {
                             diagonal,
                             target,
@@ -88,7 +164,56 @@ pub fn simulate(
             }
         }
     }
+    add_drifts(&mut readings, disturbances);
     (readings, errors, mirrors)
+}
+
+/// The mirror of one sequence.
+fn turned_mirror(
+    zone: &WorkZone,
+    disturbances: &[Disturbance],
+    diagonal: Diagonal,
+    sequence: Sequence,
+    mirror: Vector3<f64>,
+) -> Vector3<f64> {
+    let axis = diagonal.mirror_axes(zone).into_iter().next();
+    disturbances
+        .iter()
+        .filter_map(|disturbance| match *disturbance {
+            Disturbance::MirrorMisalignment {
+                diagonal: d,
+                sequence: s,
+                angle,
+            } if d == diagonal && s == sequence => Some(axis? * angle),
+            _ => None,
+        })
+        .fold(mirror, |sum, turn| sum + turn)
+}
+
+/// What grows with time, from the zero at the beginning of each run.
+fn add_drifts(readings: &mut [DiagonalReading], disturbances: &[Disturbance]) {
+    let last = readings.len().saturating_sub(1).max(1) as f64;
+    let drifted = |moment: f64| -> f64 {
+        disturbances
+            .iter()
+            .map(|disturbance| match *disturbance {
+                Disturbance::DeadPath(size) => size * moment,
+                Disturbance::Drift { drift, constant } => {
+                    drift * (1.0 - (-moment / constant).exp()) / (1.0 - (-1.0 / constant).exp())
+                }
+                _ => 0.0,
+            })
+            .sum()
+    };
+    let mut zero = 0.0;
+    let mut run = None;
+    for (order, reading) in readings.iter_mut().enumerate() {
+        let now = drifted(order as f64 / last);
+        if run.replace(reading.run()) != Some(reading.run()) {
+            zero = now;
+        }
+        reading.value += now - zero;
+    }
 }
 
 fn distinct(mut stops: Vec<[usize; 3]>) -> Vec<[usize; 3]> {

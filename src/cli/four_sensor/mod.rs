@@ -2,8 +2,8 @@
 
 mod json;
 mod page;
-mod read;
-mod setup;
+pub(super) mod read;
+pub(super) mod setup;
 mod words;
 
 use std::path::PathBuf;

@@ -54,7 +54,7 @@ struct ParabolaTable {
 
 /// The set-up, checked.
 #[derive(Debug)]
-pub(super) struct Setup {
+pub(in crate::cli) struct Setup {
     pub file: SetupFile,
     /// D2, D3, D4, mm, and where they stand in the file.
     pub spacing: Spanned<[f64; 3]>,
@@ -64,7 +64,7 @@ pub(super) struct Setup {
 }
 
 impl Setup {
-    pub(super) fn read(file: SetupFile) -> Result<Self, Message> {
+    pub(in crate::cli) fn read(file: SetupFile) -> Result<Self, Message> {
         let File {
             sensors,
             separation,

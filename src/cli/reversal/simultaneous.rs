@@ -39,6 +39,10 @@ fn refusal(why: &ReversalError, file: &Path, data: &ReversalData) -> Message {
             Message::not_solved(why.to_string()),
             "solve in stages (without --simultaneous), or give fewer [model] knots",
         ),
+        ReversalError::ThicknessNotDetermined { .. } => (
+            Message::not_solved(why.to_string()),
+            "measure the thickness and leave fit_thickness out of the set-up",
+        ),
         ReversalError::OnePosition { .. } => (
             Message::bad_input(why.to_string()),
             "read every channel at three or more different positions x",

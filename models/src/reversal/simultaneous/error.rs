@@ -37,6 +37,14 @@ pub enum ReversalError {
         /// Its tilt.
         degrees: f64,
     },
+    /// With tilts and forms this small the thickness leaves no trace in the readings.
+    #[error(
+        "these readings would give the thickness only to ± {std_mm:.3} mm: the tilts and slopes are too small for it to show"
+    )]
+    ThicknessNotDetermined {
+        /// Its standard uncertainty if it were fitted, mm.
+        std_mm: f64,
+    },
     /// Fewer readings than unknowns.
     #[error(
         "{readings} readings cannot determine {unknowns} unknowns: take more readings or fewer knots"

@@ -88,7 +88,10 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         thickness_mm,
         weights_of(&sigmas),
     );
-    let start = head_start(&problem, &start, options.minimisation).unwrap_or(start);
+    let start = match problem.unknowns.thickness_index() {
+        Some(index) => start_of_thickness(&mut problem, index, start, options.minimisation)?,
+        None => head_start(&problem, &start, options.minimisation).unwrap_or(start),
+    };
     let Settled {
         fit: result,
         freedom,
@@ -189,6 +192,32 @@ fn check(observations: &Observations, options: &Options) -> Result<(), ReversalE
         return refuse("the noise", sigma, "greater than zero");
     }
     Ok(())
+}
+
+/// The fit with the thickness held, where to start from with the thickness free: small tilts leave
+/// hardly a trace of it in the readings, and a search for it would go astray.
+///
+/// # Errors
+/// [`ReversalError::ThicknessNotDetermined`] where its uncertainty would exceed the value it starts
+/// from.
+fn start_of_thickness(
+    problem: &mut Reversal,
+    index: usize,
+    start: Parameters,
+    options: Minimisation,
+) -> Result<Parameters, ReversalError> {
+    problem.hold(index, true);
+    let start = head_start(problem, &start, options).unwrap_or(start);
+    let held = minimise(problem, start, options)?;
+    let released = held.if_released(problem, index);
+    problem.hold(index, false);
+    let freedom: f64 = noise::shared_freedom(problem).iter().sum();
+    let unit = (2.0 * held.cost / freedom.max(1.0)).sqrt();
+    let std_mm = released.map_or(f64::INFINITY, |(_, variance)| unit * variance.sqrt());
+    if std_mm > problem.thickness_mm {
+        return Err(ReversalError::ThicknessNotDetermined { std_mm });
+    }
+    Ok(held.parameters)
 }
 
 fn choose_breaks(

@@ -175,7 +175,7 @@ fn largest_change(next: &[f64], sigmas: &[f64]) -> f64 {
 }
 
 /// Degrees of freedom of each channel if unknowns are shared out by readings.
-fn shared_freedom(problem: &Reversal) -> Vec<f64> {
+pub fn shared_freedom(problem: &Reversal) -> Vec<f64> {
     let used = problem.unknowns.free_count() as f64;
     let readings: usize = problem.channels.iter().map(ChannelReadings::len).sum();
     problem

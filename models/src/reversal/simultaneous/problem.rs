@@ -92,6 +92,11 @@ impl<'a> Reversal<'a> {
         &self.constraints
     }
 
+    /// Holds a border unknown at its value, or lets it go.
+    pub fn hold(&mut self, index: usize, held: bool) {
+        self.held[index] = held;
+    }
+
     /// The thickness at a point, mm.
     pub fn thickness(&self, at: &Parameters) -> f64 {
         self.unknowns

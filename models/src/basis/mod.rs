@@ -1,3 +1,4 @@
 //! Functions in which forms are expanded.
 
 pub mod bspline;
+pub(crate) mod few_waves;

@@ -5,6 +5,8 @@
 //! Positions are in mm; form deviations are in µm and carry `_um` in their names.
 
 mod algebraic;
+mod diagnosable;
+mod effects;
 mod farthest;
 mod inscribed;
 mod nistir;
@@ -14,8 +16,9 @@ mod simulate;
 mod zone;
 
 pub use algebraic::{AlgebraicFit, algebraic};
+pub use diagnosable::CirclePoints;
 pub use nistir::{NistirEnding, NistirFit, nistir_fit};
 pub use orthogonal::{CircleFit, OrthogonalCircle, orthogonal_fit};
 pub use points::{Circle, CircleError, Point, check_points};
-pub use simulate::{CircleSimulation, simulate};
+pub use simulate::{CircleSimulation, Disturbance, simulate, simulate_disturbed};
 pub use zone::{Circularity, Reference, Zone, circularity, reference_zone};

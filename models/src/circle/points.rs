@@ -52,6 +52,16 @@ pub struct Circle {
 /// Why no circle can be given.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CircleError {
+    /// Passes with different numbers of points cannot be compared place by place.
+    #[error(
+        "the first repeat has {first} points, another has {other}: give every repeat the same points"
+    )]
+    RepeatsDiffer {
+        /// Points of the first repeat.
+        first: usize,
+        /// Points of the other.
+        other: usize,
+    },
     /// A coordinate is NaN or infinite.
     #[error("point {} is not finite: remove or correct it", index + 1)]
     NotFinite {

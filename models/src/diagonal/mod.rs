@@ -12,8 +12,11 @@ mod closed_forms;
 mod components;
 mod design;
 mod determination;
+mod diagnosable;
 mod diagonals;
+mod effects;
 mod errors;
+mod estimates;
 mod estimators;
 mod geometry;
 mod plan;
@@ -27,15 +30,16 @@ pub use closed_forms::{ClosedForm, DiagonalTotals, Total, TotalsEstimate, closed
 pub use components::{Axis, Component, Location, NodeKind};
 pub use design::{Identifiability, identifiability};
 pub use determination::{Ambiguity, Determined, Remedy};
-pub use diagonals::{Diagonal, Sequence, Target, WorkZone};
+pub use diagnosable::DiagonalRuns;
+pub use diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
 pub use errors::ErrorTables;
+pub use estimates::{
+    Assumptions, ComponentEstimate, LocationEstimate, Measured, MirrorEstimate, StepDiagonalFit,
+};
 pub use estimators::{ESTIMATORS, Estimator};
 pub use geometry::exact_reading;
 pub use plan::{SequenceChoice, choose_sequences, determined_by};
 pub use prediction::{Parameter, Unknowns, predicted_reading};
-pub use readings::{DiagonalError, DiagonalReading, Edges};
-pub use regression::{
-    Assumptions, ComponentEstimate, LocationEstimate, Measured, MirrorEstimate, StepDiagonalFit,
-    regress,
-};
-pub use simulate::{DiagonalSimulation, simulate};
+pub use readings::{DiagonalError, DiagonalReading, Edges, Motion};
+pub use regression::regress;
+pub use simulate::{DiagonalSimulation, Disturbance, Misalignments, simulate, simulate_disturbed};

@@ -1,7 +1,7 @@
 //! Step-diagonal data of a machine with known errors.
 
 use super::components::{Component, NodeKind};
-use super::diagonals::{Diagonal, Sequence, Target, WorkZone};
+use super::diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
 use super::errors::ErrorTables;
 use super::geometry::exact_reading;
 use super::readings::DiagonalReading;
@@ -33,6 +33,12 @@ pub struct DiagonalSimulation {
     pub mirror: f64,
     /// Standard deviation of each reading, µm.
     pub noise: f64,
+    /// Whether each run goes back to its start.
+    pub backward: bool,
+    /// Size of the reversal of the translational errors, µm.
+    pub reversal: f64,
+    /// Size of the reversal of the angular errors, rad.
+    pub reversal_rotation: f64,
 }
 
 impl Default for DiagonalSimulation {
@@ -50,6 +56,9 @@ impl Default for DiagonalSimulation {
             rotation: 20e-6,
             mirror: 50e-6,
             noise: 0.2,
+            backward: false,
+            reversal: 0.0,
+            reversal_rotation: 0.0,
         }
     }
 }
@@ -57,14 +66,97 @@ impl Default for DiagonalSimulation {
 /// Angles (rad) of the reflector of each set-up out of its nominal direction.
 pub type Misalignments = BTreeMap<(Diagonal, Target), Vector3<f64>>;
 
+/// What disturbs the readings beside noise, in exact form.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Disturbance {
+    /// The mirror is turned about the first of [`Diagonal::mirror_axes`] for one sequence, rad.
+    MirrorMisalignment {
+        /// Diagonal.
+        diagonal: Diagonal,
+        /// Sequence.
+        sequence: Sequence,
+        /// Angle, rad.
+        angle: f64,
+    },
+    /// One rotation grows evenly along its axis.
+    AngularError {
+        /// The rotation.
+        component: Component,
+        /// At the end of the travel, rad.
+        angle: f64,
+    },
+    /// The dead path changes evenly, by so much over the test, µm; each run begins at zero.
+    DeadPath(f64),
+    /// The machine settles.
+    Drift {
+        /// In the end, µm.
+        drift: f64,
+        /// Time constant as a part of the duration.
+        constant: f64,
+    },
+}
+
+impl Disturbance {
+    /// The names that [`Self::named`] knows.
+    pub const NAMES: [&'static str; 4] =
+        ["angular-error", "dead-path", "drift", "mirror-misalignment"];
+
+    /// A disturbance by the name of its effect and its size, µm or rad; what these leave open is
+    /// usual: the rotation of Y about X, a time constant of a tenth of the duration, the last of
+    /// the diagonals and sequences.
+    pub fn named(name: &str, size: f64, what: &DiagonalSimulation) -> Option<Self> {
+        Some(match name {
+            "mirror-misalignment" => Self::MirrorMisalignment {
+                diagonal: *what.diagonals.last()?,
+                sequence: *what.sequences.last()?,
+                angle: size,
+            },
+            "angular-error" => Self::AngularError {
+                component: Component::from_name("EAY")?,
+                angle: size,
+            },
+            "dead-path" => Self::DeadPath(size),
+            "drift" => Self::Drift {
+                drift: size,
+                constant: 0.1,
+            },
+            _ => return None,
+        })
+    }
+}
+
 /// Readings by exact geometry, the errors they were made of and the misalignment of each set-up.
 pub fn simulate(
     what: &DiagonalSimulation,
     seed: u64,
 ) -> (Vec<DiagonalReading>, ErrorTables, Misalignments) {
+    simulate_disturbed(what, &[], seed)
+}
+
+/// [`simulate`] with disturbances; readings are taken evenly in time.
+pub fn simulate_disturbed(
+    what: &DiagonalSimulation,
+    disturbances: &[Disturbance],
+    seed: u64,
+) -> (Vec<DiagonalReading>, ErrorTables, Misalignments) {
     let zone = &what.zone;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let errors = random_errors(zone, what.translation, what.rotation, &mut rng);
+    let mut errors = random_errors(zone, what.translation, what.rotation, &mut rng);
+    for disturbance in disturbances {
+        if let Disturbance::AngularError { component, angle } = *disturbance {
+            for (i, value) in errors.of_mut(component).iter_mut().enumerate() {
+                *value += angle * i as f64 / zone.steps as f64;
+            }
+        }
+    }
+    // A stream of its own, so that a seed gives the same machine with and without reversal.
+    let mut apart = ChaCha8Rng::seed_from_u64(seed);
+    apart.set_stream(1);
+    random_reversals(&mut errors, what, &mut apart);
+    let travels = match what.backward {
+        true => &Travel::ALL[..],
+        false => &[Travel::Forward],
+    };
     let mut mirrors = BTreeMap::new();
     let mut readings = Vec::new();
     for &target in &what.targets {
@@ -72,23 +164,79 @@ pub fn simulate(
             let mirror = Vector3::from_fn(|_, _| what.mirror * normal(&mut rng));
             mirrors.insert((diagonal, target), mirror);
             for &sequence in &what.sequences {
+                let turned = turned_mirror(zone, disturbances, diagonal, sequence, mirror);
                 for repeat in 1..=what.repeats.max(1) {
-                    for at in distinct(zone.stops(diagonal, sequence)) {
-                        let exact = exact_reading(zone, &errors, diagonal, target, mirror, at);
-                        readings.push(DiagonalReading {
+                    for &travel in travels {
+                        let mut stops = distinct(zone.stops(diagonal, sequence));
+                        if travel == Travel::Backward {
+                            stops.reverse();
+                        }
+                        readings.extend(stops.into_iter().map(|at| DiagonalReading {
                             diagonal,
                             target,
                             sequence,
                             repeat,
+                            travel,
                             at,
-                            value: exact + what.noise * normal(&mut rng),
-                        });
+                            value: exact_reading(
+                                zone, &errors, diagonal, target, turned, at, travel,
+                            ) + what.noise * normal(&mut rng),
+                        }));
                     }
                 }
             }
         }
     }
+    add_drifts(&mut readings, disturbances);
     (readings, errors, mirrors)
+}
+
+/// The mirror of one sequence.
+fn turned_mirror(
+    zone: &WorkZone,
+    disturbances: &[Disturbance],
+    diagonal: Diagonal,
+    sequence: Sequence,
+    mirror: Vector3<f64>,
+) -> Vector3<f64> {
+    let axis = diagonal.mirror_axes(zone).into_iter().next();
+    disturbances
+        .iter()
+        .filter_map(|disturbance| match *disturbance {
+            Disturbance::MirrorMisalignment {
+                diagonal: d,
+                sequence: s,
+                angle,
+            } if d == diagonal && s == sequence => Some(axis? * angle),
+            _ => None,
+        })
+        .fold(mirror, |sum, turn| sum + turn)
+}
+
+/// What grows with time, from the zero at the beginning of each run.
+fn add_drifts(readings: &mut [DiagonalReading], disturbances: &[Disturbance]) {
+    let last = readings.len().saturating_sub(1).max(1) as f64;
+    let drifted = |moment: f64| -> f64 {
+        disturbances
+            .iter()
+            .map(|disturbance| match *disturbance {
+                Disturbance::DeadPath(size) => size * moment,
+                Disturbance::Drift { drift, constant } => {
+                    drift * (1.0 - (-moment / constant).exp()) / (1.0 - (-1.0 / constant).exp())
+                }
+                _ => 0.0,
+            })
+            .sum()
+    };
+    let mut zero = 0.0;
+    let mut run = None;
+    for (order, reading) in readings.iter_mut().enumerate() {
+        let now = drifted(order as f64 / last);
+        if run.replace(reading.run()) != Some(reading.run()) {
+            zero = now;
+        }
+        reading.value += now - zero;
+    }
 }
 
 fn distinct(mut stops: Vec<[usize; 3]>) -> Vec<[usize; 3]> {
@@ -129,4 +277,22 @@ fn random_errors(
     }
     errors.squareness = std::array::from_fn(|_| rotation * normal(rng));
     errors
+}
+
+/// A constant and a change along the axis in each.
+fn random_reversals(errors: &mut ErrorTables, what: &DiagonalSimulation, rng: &mut ChaCha8Rng) {
+    for component in Component::all() {
+        let size = if component.rotation {
+            what.reversal_rotation
+        } else {
+            what.reversal
+        };
+        let (constant, change) = (normal(rng), 0.5 * normal(rng));
+        let values = errors.reversal_of_mut(component);
+        let last = values.len().saturating_sub(1).max(1) as f64;
+        for (i, value) in values.iter_mut().enumerate() {
+            let t = i as f64 / last;
+            *value = size * (constant + change * t * (2.0 - t));
+        }
+    }
 }

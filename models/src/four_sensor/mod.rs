@@ -13,7 +13,9 @@
 //! can find the parabola of f: see [`Parabola`].
 
 mod choice;
+mod diagnosable;
 pub mod direct;
+mod effects;
 mod error;
 mod frame;
 mod gauge;
@@ -27,6 +29,7 @@ pub mod simulate;
 pub mod triples;
 
 pub use choice::{Choice, Chosen, Penalised};
+pub use diagnosable::FourSensors;
 pub use error::FourSensorError;
 pub use gauge::{Line, Parabola};
 pub use geometry::Geometry;

@@ -84,6 +84,8 @@ pub struct Disturbances {
     pub drift: f64,
     /// Relative gain error of each sensor.
     pub gain: [f64; 4],
+    /// Drift of each sensor over the travel, µm.
+    pub sensor_drift: [f64; 4],
 }
 
 impl Disturbances {
@@ -95,7 +97,37 @@ impl Disturbances {
             slide_position: 0.0,
             drift: 0.0,
             gain: [0.0; 4],
+            sensor_drift: [0.0; 4],
         }
+    }
+}
+
+impl Disturbances {
+    /// The names that [`Self::add`] knows.
+    pub const NAMES: [&'static str; 6] = [
+        "common-drift",
+        "common-gain",
+        "drift",
+        "gain",
+        "sensor-position",
+        "slide-position",
+    ];
+
+    /// Adds an effect of the diagnosis's catalogue by its name at a size (µm, mm or a share), to
+    /// sensor 3 where it is of one sensor; for `slide-position` the size is the amplitude of the
+    /// first wave, mm. Says whether the name is known.
+    pub fn add(&mut self, name: &str, size: f64) -> bool {
+        match name {
+            "common-drift" => self.drift += size,
+            "common-gain" => self.gain = self.gain.map(|g| g + size),
+            "drift" => self.sensor_drift[2] += size,
+            "gain" => self.gain[2] += size,
+            "sensor-position" => self.sensor_position[2] += size,
+            // Equation (20) of Zhao et al. begins with 10 µm.
+            "slide-position" => self.slide_position += size / mm_from_um(10.0),
+            _ => return false,
+        }
+        true
     }
 }
 
@@ -124,7 +156,7 @@ pub fn simulate(
                     + truth.straightness(x)
                     + UM_PER_MM * arm * truth.tilt(x)
                     + zero[sensor]
-                    + disturbances.drift * share;
+                    + (disturbances.drift + disturbances.sensor_drift[sensor]) * share;
                 let noise: f64 = StandardNormal.sample(&mut generator);
                 (1.0 + disturbances.gain[sensor]) * sum + disturbances.noise * noise
             })

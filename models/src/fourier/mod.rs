@@ -7,6 +7,8 @@
 //!
 //! Positions and spacings are in mm, readings and profiles in µm.
 
+mod diagnosable;
+mod effects;
 mod joint;
 mod noise;
 mod quantities;
@@ -18,10 +20,11 @@ mod spectrum;
 mod transfer;
 mod variance;
 
+pub use diagnosable::FourierScans;
 pub use joint::{Compensation, Joint, ShiftTerm, join};
 pub use noise::NoiseSource;
 pub use repeatability::{mean_deviation, mean_harmonic_deviation, repeatability};
 pub use scan::{FourierError, Scan, ScanReading, Section};
 pub use separation::{Combination, OrderResidual, OrderResult, Separation, separate, straightness};
-pub use simulate::{FourierSimulation, FourierTruth, simulate};
+pub use simulate::{Disturbance, FourierSimulation, FourierTruth, simulate, simulate_disturbed};
 pub use transfer::{LOST_BELOW, determinant, noise_gain, sensitive_orders, transfer};

@@ -65,6 +65,50 @@ pub struct FourierTruth {
     pub slide: Vec<f64>,
 }
 
+/// What disturbs the scans beside noise, in exact form; a spacing is given by its place in the list.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Disturbance {
+    /// P3 stands higher in the scans of one spacing.
+    HeightDifference {
+        /// Place of the spacing.
+        spacing: usize,
+        /// Height, µm.
+        height: f64,
+    },
+    /// P2 and P3 stand further from P1 than the spacing says.
+    ProbeSpacing {
+        /// Place of the spacing.
+        spacing: usize,
+        /// Error, mm.
+        error: f64,
+    },
+    /// The slide turns by a sine over the section, rad.
+    Yaw(f64),
+}
+
+impl Disturbance {
+    /// The names that [`Self::named`] knows.
+    pub const NAMES: [&'static str; 3] = ["height-difference", "probe-spacing", "yaw"];
+
+    /// A disturbance by the name of its effect and its size, µm, mm or rad; those of one spacing are
+    /// given to the last.
+    pub fn named(name: &str, size: f64, spacings: usize) -> Option<Self> {
+        let spacing = spacings.saturating_sub(1);
+        Some(match name {
+            "height-difference" => Self::HeightDifference {
+                spacing,
+                height: size,
+            },
+            "probe-spacing" => Self::ProbeSpacing {
+                spacing,
+                error: size,
+            },
+            "yaw" => Self::Yaw(size),
+            _ => return None,
+        })
+    }
+}
+
 /// Σ a_ω cos(ωθ + φ_ω) = Re Σ c_ω z^ω with z = e^{jθ}.
 struct Waves {
     coefficients: Vec<Complex64>,
@@ -100,6 +144,18 @@ pub fn simulate(
     what: &FourierSimulation,
     seed: u64,
 ) -> Result<(Vec<Scan>, FourierTruth), FourierError> {
+    simulate_disturbed(what, &[], seed)
+}
+
+/// The scans of one seed with disturbances.
+///
+/// # Errors
+/// Those of [`simulate`].
+pub fn simulate_disturbed(
+    what: &FourierSimulation,
+    disturbances: &[Disturbance],
+    seed: u64,
+) -> Result<(Vec<Scan>, FourierTruth), FourierError> {
     let length = what.length;
     if what.samples < 3 || what.spacings.is_empty() {
         return Err(FourierError::Simulation {
@@ -126,11 +182,26 @@ pub fn simulate(
     };
     let mut scans = Vec::new();
     for repeat in 1..=what.repeats.max(1) {
-        for &spacing in &what.spacings {
+        for (place, &spacing) in what.spacings.iter().enumerate() {
             if !(spacing > 0.0 && spacing < length) {
                 return Err(FourierError::Spacing { spacing, length });
             }
             let joint = length - spacing;
+            let (mut height, mut error, mut yaw) = (0.0, 0.0, 0.0);
+            for disturbance in disturbances {
+                match *disturbance {
+                    Disturbance::HeightDifference { spacing, height: h } if spacing == place => {
+                        height += h;
+                    }
+                    Disturbance::ProbeSpacing { spacing, error: e } if spacing == place => {
+                        error += e
+                    }
+                    Disturbance::Yaw(angle) => yaw += angle,
+                    Disturbance::HeightDifference { .. } | Disturbance::ProbeSpacing { .. } => {}
+                }
+            }
+            // A probe at an arm along the slide rises by the arm times the tangent of the angle.
+            let lift = |x: f64, arm: f64| 1e3 * arm * (yaw * (TAU * x / length + 0.7).sin()).tan();
             // One step before the joint, so that it can be interpolated where it is off the grid.
             let third_from = joint - 1.5 * length / what.samples as f64;
             let readings = (0..=what.samples)
@@ -141,10 +212,19 @@ pub fn simulate(
                         x,
                         m1: workpiece(x) + slide(x) + noise(),
                         m2: Some(
-                            what.height_difference + workpiece(x + spacing) + slide(x) + noise(),
+                            what.height_difference
+                                + workpiece(x + spacing + error)
+                                + slide(x)
+                                + lift(x, spacing + error)
+                                + noise(),
                         ),
-                        m3: (what.third_probe && x >= third_from)
-                            .then(|| workpiece(x - joint) + slide(x) + noise()),
+                        m3: (what.third_probe && x >= third_from).then(|| {
+                            workpiece(x - joint + error)
+                                + slide(x)
+                                + height
+                                + lift(x, error - joint)
+                                + noise()
+                        }),
                     }
                 })
                 .collect();

@@ -5,11 +5,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Axis, Machine, MachineError, PartReading, Position, part_residuals};
-use crate::model::{
-    About, Column, Effect, FittedModel, Freedom, Parameter, Place, Quantity, Shape,
-};
-use crate::units::{UM_PER_MM, um_from_mm};
+use super::{Axis, Machine, MachineError, PartReading, effects, part_residuals};
+use crate::model::{Column, Effect, FittedModel, Freedom, Place, Quantity};
 
 /// Parts measured at points whose deviations a machine model predicts.
 #[derive(Debug, Clone)]
@@ -19,12 +16,14 @@ pub struct MeasuredParts {
     observed: DVector<f64>,
     places: Vec<Place>,
     traces: Vec<Range<usize>>,
+    parts: Vec<String>,
 }
 
 impl MeasuredParts {
     /// Predicts every reading and puts them into traces: one direction of one replicate of one part.
     /// The position of a reading is the coordinate of its point along its direction; parts follow
-    /// one another in time, in the order in which they first occur.
+    /// one another in time, in the order in which they first occur. Replicates of one part repeat
+    /// each other; parts do not, so that their scatter is gap and not noise.
     ///
     /// # Errors
     /// A point outside a table of the machine, a reading that is not finite.
@@ -45,7 +44,8 @@ impl MeasuredParts {
                 time: parts[&r.part] as f64,
                 repeat: r.replicate,
                 direction: 1.0,
-                cell: features[&r.feature] * Axis::ALL.len() + r.axis.index(),
+                cell: (parts[&r.part] * features.len() + features[&r.feature]) * Axis::ALL.len()
+                    + r.axis.index(),
             })
             .collect();
         let mut traces: Vec<Range<usize>> = Vec::new();
@@ -63,6 +63,12 @@ impl MeasuredParts {
             observed: DVector::from_iterator(readings.len(), readings.iter().map(|r| r.value)),
             places,
             traces,
+            parts: {
+                let mut names: Vec<(usize, String)> =
+                    parts.into_iter().map(|(name, k)| (k, name)).collect();
+                names.sort_unstable();
+                names.into_iter().map(|(_, name)| name).collect()
+            },
             readings,
         })
     }
@@ -71,6 +77,17 @@ impl MeasuredParts {
     #[must_use]
     pub fn readings(&self) -> &[PartReading] {
         &self.readings
+    }
+
+    /// The parts, in the order in which they first occur.
+    #[must_use]
+    pub fn parts(&self) -> &[String] {
+        &self.parts
+    }
+
+    /// The signature with a value for each reading of some parts.
+    pub(super) fn column(&self, value: impl Fn(&PartReading) -> f64) -> Column {
+        Column::from_places(&self.places, |k, _| value(&self.readings[k]))
     }
 }
 
@@ -150,108 +167,6 @@ impl FittedModel for MeasuredParts {
     }
 
     fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
-        EFFECTS
-            .iter()
-            .map(|effect| Box::new(*effect) as Box<dyn Effect<Self>>)
-            .collect()
-    }
-}
-
-/// An effect that moves the points of all parts alike.
-#[derive(Clone, Copy)]
-struct Motion {
-    name: &'static str,
-    about: About,
-    parameters: &'static [Parameter],
-    /// Change of a reading along an axis at a point per unit of each parameter, um.
-    change: fn(Axis, &Position) -> [f64; 2],
-}
-
-const fn parameter(name: &'static str, unit: &'static str, reach: f64) -> Parameter {
-    Parameter {
-        name,
-        unit,
-        low: -reach,
-        high: reach,
-    }
-}
-
-/// What a machine model leaves out of parts, common to all of them.
-const EFFECTS: [Motion; 4] = [
-    Motion {
-        name: "datum-offset",
-        about: About {
-            physics: "The origin from which the parts are measured is not the one they were made from.",
-            confirm: "Measure the parts from another datum, or the datum itself.",
-            source: "rigid translation of all points",
-        },
-        parameters: &[parameter("x", "um", 1e3), parameter("y", "um", 1e3)],
-        change: |axis, _| match axis {
-            Axis::X => [1.0, 0.0],
-            Axis::Y => [0.0, 1.0],
-            Axis::Z => [0.0, 0.0],
-        },
-    },
-    Motion {
-        name: "datum-rotation",
-        about: About {
-            physics: "The parts are measured in a frame turned against that of the machine.",
-            confirm: "Align the measurement to another edge and see the deviations turn.",
-            source: "rigid rotation about Z: (-y, x)",
-        },
-        parameters: &[parameter("angle", "rad", 1e-2)],
-        change: |axis, p| match axis {
-            Axis::X => [-um_from_mm(p.y), 0.0],
-            Axis::Y => [um_from_mm(p.x), 0.0],
-            Axis::Z => [0.0, 0.0],
-        },
-    },
-    Motion {
-        name: "thermal-expansion",
-        about: About {
-            physics: "Parts were warmer or colder when made than when measured.",
-            confirm: "Record the temperature of a part at both times.",
-            source: "uniform scale: (x, y, z)",
-        },
-        parameters: &[parameter("scale", "1", 1e-2)],
-        change: |axis, p| [um_from_mm(p[axis.index()]), 0.0],
-    },
-    Motion {
-        name: "squareness-change",
-        about: About {
-            physics: "The angle between X and Y was another when the parts were made.",
-            confirm: "Measure the squareness of X and Y again, at the load of machining.",
-            source: "shear of X by y; NISTIR 6868, equation (9)",
-        },
-        parameters: &[parameter("angle", "rad", 1e-2)],
-        change: |axis, p| match axis {
-            Axis::X => [-p.y * UM_PER_MM, 0.0],
-            Axis::Y | Axis::Z => [0.0, 0.0],
-        },
-    },
-];
-
-impl Effect<MeasuredParts> for Motion {
-    fn name(&self) -> &str {
-        self.name
-    }
-
-    fn about(&self) -> About {
-        self.about
-    }
-
-    fn amplitudes(&self) -> Vec<Parameter> {
-        self.parameters.to_vec()
-    }
-
-    fn columns(&self, model: &MeasuredParts, _shape: &Shape) -> Vec<Column> {
-        (0..self.parameters.len())
-            .map(|k| {
-                Column::from_places(&model.places, |i, _| {
-                    let reading = &model.readings[i];
-                    (self.change)(reading.axis, &reading.position)[k]
-                })
-            })
-            .collect()
+        effects::all()
     }
 }

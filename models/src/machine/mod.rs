@@ -11,6 +11,7 @@ pub mod names;
 
 mod chain;
 mod component;
+mod effects;
 mod function;
 mod kinematics;
 mod measured_parts;

@@ -3,10 +3,16 @@
 //!
 //! To add a model, write its file and add its line to [`recognise::MODELS`].
 
+mod calibration_line;
 mod case;
+mod circle;
+mod four_sensor;
+mod fourier;
+mod machine;
 mod page;
 mod recognise;
 mod reversal;
+mod step_diagonal;
 mod words;
 
 use std::path::PathBuf;
@@ -77,4 +83,19 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         .remedy("give a number between 0 and 0.5, such as 0.01"));
     }
     (recognise::model(args)?.run)(args)
+}
+
+/// Refuses a standard deviation in the set-up that is not positive.
+fn positive(value: Option<f64>, what: &str, args: &Args) -> Result<(), Message> {
+    match value {
+        Some(v) if !(v > 0.0 && v.is_finite()) => {
+            let message = Message::bad_input(format!("{what} = {v} is no standard deviation"))
+                .remedy("give a number greater than zero, or leave it out to estimate it");
+            Err(match &args.setup {
+                Some(path) => message.in_file(path),
+                None => message,
+            })
+        }
+        _ => Ok(()),
+    }
 }

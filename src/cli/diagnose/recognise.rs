@@ -2,7 +2,9 @@
 
 use clap::builder::PossibleValuesParser;
 
-use super::{Args, reversal};
+use super::{
+    Args, calibration_line, circle, four_sensor, fourier, machine, reversal, step_diagonal,
+};
 use crate::cli::Answer;
 use crate::io::{Message, SetupFile, TableReader};
 
@@ -19,18 +21,56 @@ pub(super) struct Model {
 }
 
 /// The models, in the order in which they are offered.
-pub(super) const MODELS: &[Model] = &[Model {
-    name: "reversal",
-    tables: &["artefact", "indicator", "model", "columns"],
-    columns: &[
-        &["channel", "x", "reading"],
-        &["x", "1A"],
-        &["x", "1B"],
-        &["x", "2A"],
-        &["x", "2B"],
-    ],
-    run: reversal::run,
-}];
+pub(super) const MODELS: &[Model] = &[
+    Model {
+        name: "reversal",
+        tables: &["artefact", "indicator", "model", "columns"],
+        columns: &[
+            &["channel", "x", "reading"],
+            &["x", "1A"],
+            &["x", "1B"],
+            &["x", "2A"],
+            &["x", "2B"],
+        ],
+        run: reversal::run,
+    },
+    Model {
+        name: "calibration-line",
+        tables: &["line"],
+        columns: &[&["x", "y"]],
+        run: calibration_line::run,
+    },
+    Model {
+        name: "circle",
+        tables: &["circle"],
+        columns: &[&["x", "y"]],
+        run: circle::run,
+    },
+    Model {
+        name: "four-sensor",
+        tables: &["sensors", "separation", "parabola"],
+        columns: &[&["x", "m1", "m2", "m3", "m4"], &["sensor", "x", "reading"]],
+        run: four_sensor::run,
+    },
+    Model {
+        name: "fourier",
+        tables: &["section", "probe", "method"],
+        columns: &[&["spacing", "x", "m1", "m2"]],
+        run: fourier::run,
+    },
+    Model {
+        name: "machine",
+        tables: &["chain", "errors"],
+        columns: &[&["part", "point", "axis", "value"]],
+        run: machine::run,
+    },
+    Model {
+        name: "step-diagonal",
+        tables: &["test", "assume", "measured"],
+        columns: &[&["diagonal", "sequence", "x", "y", "reading"]],
+        run: step_diagonal::run,
+    },
+];
 
 /// The names that `--model` takes.
 pub(super) fn names() -> PossibleValuesParser {
@@ -64,10 +104,20 @@ pub(super) fn model(args: &Args) -> Result<&'static Model, Message> {
     if let [only] = by_setup[..] {
         return Ok(only);
     }
-    let has_all = |form: &&&[&str]| form.iter().all(|name| found.contains(name));
+    // The longest form that is wholly there: x and y alone are also part of others.
+    let length = |model: &Model| {
+        model
+            .columns
+            .iter()
+            .filter(|form| form.iter().all(|name| found.contains(name)))
+            .map(|form| form.len())
+            .max()
+            .unwrap_or(0)
+    };
+    let longest = MODELS.iter().map(length).max().unwrap_or(0);
     let by_columns: Vec<&Model> = MODELS
         .iter()
-        .filter(|m| m.columns.iter().any(|form| has_all(&form)))
+        .filter(|m| longest > 0 && length(m) == longest)
         .collect();
     match by_columns[..] {
         [only] => Ok(only),

@@ -10,8 +10,10 @@ use crate::io::{Message, TableReader};
 
 /// Outputs and what their repeats say of the noise.
 #[derive(Debug)]
-pub(super) struct Measured {
+pub(in crate::cli) struct Measured {
     pub outputs: Outputs,
+    /// Each repeat by itself.
+    pub each: Vec<Outputs>,
     /// Number of repeats that were averaged.
     pub repeats: usize,
     /// Standard deviation of the averaged reading from the scatter of the repeats, µm.
@@ -27,7 +29,7 @@ struct Reading {
     line: usize,
 }
 
-pub(super) fn read(path: &Path, setup: &Setup) -> Result<Measured, Message> {
+pub(in crate::cli) fn read(path: &Path, setup: &Setup) -> Result<Measured, Message> {
     let mut table = TableReader::open(path)?;
     let readings = if table.optional("sensor").is_some() {
         tidy(&mut table)?
@@ -66,8 +68,19 @@ pub(super) fn read(path: &Path, setup: &Setup) -> Result<Measured, Message> {
     });
     let outputs = Outputs::new(geometry, positions[0], rows)
         .map_err(|error| Message::bad_input(error.to_string()).in_file(path))?;
+    let each = (0..repeats)
+        .map(|repeat| {
+            let rows = cells
+                .iter()
+                .map(|cell| std::array::from_fn(|sensor| cell[sensor][repeat]))
+                .collect();
+            Outputs::new(geometry, positions[0], rows)
+        })
+        .collect::<Result<_, _>>()
+        .map_err(|error| Message::bad_input(error.to_string()).in_file(path))?;
     Ok(Measured {
         outputs,
+        each,
         repeats,
         // Repeats that agree to the last digit say nothing of the noise.
         noise: noise.filter(|noise| *noise > 0.0),

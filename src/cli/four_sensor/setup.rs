@@ -41,6 +41,7 @@ enum Rule {
     #[default]
     LCurve,
     Gcv,
+    Likelihood,
     Discrepancy,
 }
 
@@ -54,7 +55,7 @@ struct ParabolaTable {
 
 /// The set-up, checked.
 #[derive(Debug)]
-pub(super) struct Setup {
+pub(in crate::cli) struct Setup {
     pub file: SetupFile,
     /// D2, D3, D4, mm, and where they stand in the file.
     pub spacing: Spanned<[f64; 3]>,
@@ -64,7 +65,7 @@ pub(super) struct Setup {
 }
 
 impl Setup {
-    pub(super) fn read(file: SetupFile) -> Result<Self, Message> {
+    pub(in crate::cli) fn read(file: SetupFile) -> Result<Self, Message> {
         let File {
             sensors,
             separation,
@@ -102,12 +103,13 @@ impl Setup {
             (Some(lambda), _, _) => Choice::Fixed(positive(lambda, "lambda")?),
             (None, Rule::LCurve, _) => Choice::LCurve,
             (None, Rule::Gcv, _) => Choice::Gcv,
+            (None, Rule::Likelihood, _) => Choice::Likelihood,
             (None, Rule::Discrepancy, Some(noise)) => Choice::Discrepancy { noise },
             (None, Rule::Discrepancy, None) => {
                 return Err(file.bad(
                     sensors.spacing.span(),
                     "the discrepancy principle needs the noise of one reading",
-                    "add noise = … (um) to [sensors], or choose l-curve or gcv",
+                    "add noise = … (um) to [sensors], or choose l-curve, gcv or likelihood",
                 ));
             }
         };

@@ -97,7 +97,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     Ok(Answer {
         text: text::text(&args.data, &data, &outcome),
         json: if folder || args.common.format == Format::Json {
-            json::json(&data, &outcome)
+            json::json(&data, &outcome)?
         } else {
             Value::Null
         },

@@ -1,0 +1,224 @@
+//! The fitted circle, laid open to the diagnosis.
+//!
+//! A reading is the radial distance of a point from a circle that stays fixed, at the angle where it
+//! was taken. Taking an effect out of the readings moves the points along their radii and the circle
+//! is fitted again, exactly; the fixed circle only keeps the books.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector, Matrix3};
+
+use super::effects;
+use super::orthogonal::{CircleFit, orthogonal_fit};
+use super::points::{Circle, CircleError, Point};
+use crate::model::{Effect, FittedModel, Freedom, Place, Quantity};
+use crate::units::UM_PER_MM;
+
+/// Points of one or several passes round a circle with the fitted circle.
+#[derive(Debug, Clone)]
+pub struct CirclePoints {
+    places: Vec<Place>,
+    traces: Vec<Range<usize>>,
+    /// The circle from which readings are counted.
+    fixed: Circle,
+    directions: Vec<Point>,
+    observed: DVector<f64>,
+    fitted: Circle,
+    residuals: DVector<f64>,
+    jacobian: DMatrix<f64>,
+    noise: Option<f64>,
+}
+
+impl CirclePoints {
+    /// Fits the circle to points (mm) with their repeat numbers from 1; the k-th point by angle of
+    /// each repeat stands at the same place. `noise` is the standard deviation of a radial
+    /// deviation, µm, where it is known.
+    ///
+    /// # Errors
+    /// No circle passes through the points, or repeats differ in their number of points.
+    pub fn new(points: &[(Point, u32)], noise: Option<f64>) -> Result<Self, CircleError> {
+        let all: Vec<Point> = points.iter().map(|p| p.0).collect();
+        let first = orthogonal_fit(&all, noise)?;
+        let fixed = first.circle;
+        let degrees = |p: Point| {
+            let angle = (p.y - fixed.centre.y)
+                .atan2(p.x - fixed.centre.x)
+                .to_degrees();
+            if angle < 0.0 { angle + 360.0 } else { angle }
+        };
+        let mut sorted: Vec<(u32, f64, Point)> = points
+            .iter()
+            .map(|&(p, repeat)| (repeat, degrees(p), p))
+            .collect();
+        sorted.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut traces: Vec<Range<usize>> = Vec::new();
+        for k in 0..sorted.len() {
+            match traces.last_mut() {
+                Some(trace) if sorted[k].0 == sorted[trace.start].0 => trace.end = k + 1,
+                _ => traces.push(k..k + 1),
+            }
+        }
+        let size = traces.first().map_or(0, Range::len);
+        if let Some(other) = traces.iter().find(|t| t.len() != size) {
+            return Err(CircleError::RepeatsDiffer {
+                first: size,
+                other: other.len(),
+            });
+        }
+        let places = sorted
+            .iter()
+            .enumerate()
+            .map(|(k, (repeat, angle, _))| Place {
+                channel: 0,
+                x: *angle,
+                time: k as f64,
+                repeat: *repeat,
+                direction: 1.0,
+                cell: k % size,
+            })
+            .collect();
+        let ordered: Vec<Point> = sorted.iter().map(|s| s.2).collect();
+        let distances = ordered.iter().map(|p| p.distance(fixed.centre));
+        let observed = DVector::from_iterator(
+            ordered.len(),
+            distances.map(|r| (r - fixed.radius) * UM_PER_MM),
+        );
+        let directions = ordered
+            .iter()
+            .map(|p| {
+                let r = p.distance(fixed.centre);
+                Point::new((p.x - fixed.centre.x) / r, (p.y - fixed.centre.y) / r)
+            })
+            .collect();
+        let own = orthogonal_fit(&ordered, noise)?;
+        Ok(Self {
+            places,
+            traces,
+            fixed,
+            directions,
+            observed,
+            fitted: own.circle,
+            residuals: DVector::zeros(0),
+            jacobian: DMatrix::zeros(0, 0),
+            noise,
+        }
+        .with(own))
+    }
+
+    fn with(mut self, fit: CircleFit) -> Self {
+        self.fitted = fit.circle;
+        self.residuals = DVector::from_vec(fit.residuals_um);
+        // ∂(reading)/∂(centre, radius) is the negative of ∂(deviation)/∂(…).
+        self.jacobian = -fit.jacobian;
+        self
+    }
+
+    /// The fitted circle.
+    pub fn circle(&self) -> Circle {
+        self.fitted
+    }
+
+    /// Number of points of one pass.
+    pub fn points_of_a_pass(&self) -> usize {
+        self.traces.first().map_or(0, Range::len)
+    }
+
+    /// Angle of a place, rad.
+    pub(super) fn angle(place: &Place) -> f64 {
+        place.x.to_radians()
+    }
+}
+
+impl FittedModel for CirclePoints {
+    fn name(&self) -> &'static str {
+        "circle"
+    }
+
+    fn reading_unit(&self) -> &'static str {
+        "um"
+    }
+
+    fn position_unit(&self) -> &'static str {
+        "deg"
+    }
+
+    fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    fn traces(&self) -> &[Range<usize>] {
+        &self.traces
+    }
+
+    fn observed(&self) -> &DVector<f64> {
+        &self.observed
+    }
+
+    fn freedom(&self) -> Freedom {
+        Freedom {
+            columns: self.jacobian.clone(),
+            profiles: None,
+        }
+    }
+
+    fn linearised(&self) -> DVector<f64> {
+        // The exact deviations and, linearly, how far the circle lies from the fixed one.
+        let moved = DVector::from_vec(vec![
+            self.fitted.centre.x - self.fixed.centre.x,
+            self.fitted.centre.y - self.fixed.centre.y,
+            self.fitted.radius - self.fixed.radius,
+        ]) * UM_PER_MM;
+        &self.residuals + &self.jacobian * moved
+    }
+
+    fn channel_names(&self) -> Vec<String> {
+        vec!["radius".to_owned()]
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        let gram = self.jacobian.tr_mul(&self.jacobian);
+        let Some(inverse) = Matrix3::from_fn(|i, j| gram[(i, j)]).try_inverse() else {
+            return Vec::new();
+        };
+        ["centre x, moved", "centre y, moved", "radius, moved"]
+            .into_iter()
+            .enumerate()
+            .map(|(k, name)| Quantity {
+                name: name.to_owned(),
+                unit: "um",
+                weights: &self.jacobian * inverse.row(k).transpose(),
+            })
+            .collect()
+    }
+
+    fn stated_noise(&self) -> Option<f64> {
+        self.noise
+    }
+
+    fn refit(&self, observed: DVector<f64>) -> Self {
+        let points: Vec<Point> = self
+            .directions
+            .iter()
+            .zip(observed.iter())
+            .map(|(u, r)| {
+                let r = self.fixed.radius + r / UM_PER_MM;
+                Point::new(self.fixed.centre.x + r * u.x, self.fixed.centre.y + r * u.y)
+            })
+            .collect();
+        let mut fitted = self.clone();
+        fitted.observed = observed;
+        match orthogonal_fit(&points, self.noise) {
+            Ok(fit) => fitted.with(fit),
+            // Readings that are no circle any more: counted from the circle as it was.
+            Err(_) => {
+                let before = self.linearised() - &self.residuals;
+                fitted.residuals = &fitted.observed - before;
+                fitted
+            }
+        }
+    }
+
+    fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
+        effects::all()
+    }
+}

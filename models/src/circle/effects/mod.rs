@@ -1,0 +1,61 @@
+//! What a circle leaves out of the points measured on it: one file an effect.
+
+mod lobes;
+mod outlier;
+mod ovality;
+mod scale;
+mod scale_mismatch;
+
+use nalgebra::DMatrix;
+
+use super::diagnosable::CirclePoints;
+use crate::model::{Column, Effect, Estimate, FittedModel};
+
+/// The catalogue.
+pub(super) fn all() -> Vec<Box<dyn Effect<CirclePoints>>> {
+    vec![
+        Box::new(lobes::Lobes),
+        Box::new(outlier::Outlier),
+        Box::new(ovality::Ovality),
+        Box::new(scale::Scale),
+        Box::new(scale_mismatch::ScaleMismatch),
+    ]
+}
+
+/// Cosine and sine of a number of undulations per revolution.
+fn undulations(model: &CirclePoints, count: f64) -> Vec<Column> {
+    [f64::cos, f64::sin]
+        .map(|wave| {
+            Column::from_places(model.places(), |_, place| {
+                wave(count * CirclePoints::angle(place))
+            })
+        })
+        .into()
+}
+
+/// Amplitude and direction of a wave of `count` undulations from its cosine and sine.
+fn amplitude_and_phase(count: f64, amplitudes: &[f64], covariance: &DMatrix<f64>) -> Vec<Estimate> {
+    let &[cosine, sine] = amplitudes else {
+        return Vec::new();
+    };
+    let size = cosine.hypot(sine).max(f64::MIN_POSITIVE);
+    let at = |i: usize, j: usize| covariance.get((i, j)).map_or(f64::NAN, |v| *v);
+    let along = |c: f64, s: f64| {
+        let variance = c * c * at(0, 0) + 2.0 * c * s * at(0, 1) + s * s * at(1, 1);
+        variance.max(0.0).sqrt()
+    };
+    vec![
+        Estimate {
+            name: "amplitude".to_owned(),
+            value: size,
+            std: along(cosine / size, sine / size),
+            unit: "um".to_owned(),
+        },
+        Estimate {
+            name: "first-maximum".to_owned(),
+            value: (sine.atan2(cosine) / count).to_degrees(),
+            std: (along(-sine / size, cosine / size) / (size * count)).to_degrees(),
+            unit: "deg".to_owned(),
+        },
+    ]
+}

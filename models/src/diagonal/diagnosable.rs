@@ -1,0 +1,197 @@
+//! The regression of step-diagonal readings, laid open to the diagnosis.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::design::{Design, is_definition};
+use super::effects;
+use super::prediction::{Parameter, sensitivities};
+use super::readings::{DiagonalError, DiagonalReading, check};
+use super::{Component, Diagonal, Sequence, Target, Travel, WorkZone};
+use crate::model::{Effect, FittedModel, Freedom, Place};
+
+/// Readings whose laser was on one diagonal with one target, in one order of motions.
+type Channel = (Diagonal, Target, Sequence);
+
+/// Sensitivities of a reading to the parameters.
+type Terms = Vec<(Parameter, f64)>;
+
+/// Step-diagonal readings with the design of their regression.
+#[derive(Debug, Clone)]
+pub struct DiagonalRuns {
+    zone: WorkZone,
+    channels: Vec<Channel>,
+    places: Vec<Place>,
+    traces: Vec<Range<usize>>,
+    columns: Arc<DMatrix<f64>>,
+    terms: Arc<Vec<Terms>>,
+    observed: DVector<f64>,
+    duration: f64,
+    noise: Option<f64>,
+}
+
+impl DiagonalRuns {
+    /// Sets up the regression of all functions but those assumed `zero`. Readings follow each other
+    /// evenly in time, in the order given. `noise` is the standard deviation of one reading, µm,
+    /// where it is known.
+    ///
+    /// # Errors
+    /// What [`DiagonalError`] lists.
+    pub fn new(
+        zone: &WorkZone,
+        readings: &[DiagonalReading],
+        zero: &[Component],
+        noise: Option<f64>,
+    ) -> Result<Self, DiagonalError> {
+        check(zone, readings)?;
+        let mut channels: Vec<Channel> = readings
+            .iter()
+            .map(|r| (r.diagonal, r.target, r.sequence))
+            .collect();
+        channels.sort_unstable();
+        channels.dedup();
+        let mut runs: BTreeMap<(usize, u32, Travel), Vec<(f64, usize)>> = BTreeMap::new();
+        for (order, r) in readings.iter().enumerate() {
+            let channel = channels.partition_point(|c| *c < (r.diagonal, r.target, r.sequence));
+            let from_start = zone.position(r.at) - r.diagonal.start(zone);
+            let along = r.diagonal.direction(zone).dot(&from_start);
+            runs.entry((channel, r.repeat, r.travel))
+                .or_default()
+                .push((along, order));
+        }
+        let (mut places, mut traces, mut ordered) = (Vec::new(), Vec::new(), Vec::new());
+        let mut cells = BTreeMap::new();
+        for ((channel, repeat, travel), mut run) in runs {
+            run.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let start = places.len();
+            for (along, order) in run {
+                let next = cells.len();
+                let cell = *cells
+                    .entry((channel, readings[order].at, travel))
+                    .or_insert(next);
+                places.push(Place {
+                    channel,
+                    x: along,
+                    time: order as f64,
+                    repeat,
+                    direction: f64::from(travel.sign()),
+                    cell,
+                });
+                ordered.push(readings[order]);
+            }
+            traces.push(start..places.len());
+        }
+        let design = Design::of(zone, &ordered, |p| {
+            !is_definition(p, zone.steps)
+                && !matches!(p, Parameter::Node(c, _) | Parameter::Reversal(c, _)
+                    if zero.contains(&c))
+        });
+        let unknowns = design.matrix.ncols();
+        let mut columns = design
+            .matrix
+            .resize_horizontally(unknowns + traces.len(), 0.0);
+        for (k, trace) in traces.iter().enumerate() {
+            for row in trace.clone() {
+                columns[(row, unknowns + k)] = 1.0;
+            }
+        }
+        Ok(Self {
+            zone: *zone,
+            channels,
+            columns: Arc::new(columns),
+            terms: Arc::new(
+                ordered
+                    .iter()
+                    .map(|r| sensitivities(zone, r.diagonal, r.target, r.at, r.travel))
+                    .collect(),
+            ),
+            observed: DVector::from_iterator(ordered.len(), ordered.iter().map(|r| r.value)),
+            duration: (places.len().max(2) - 1) as f64,
+            places,
+            traces,
+            noise,
+        })
+    }
+
+    /// Diagonal, target and sequence of each channel.
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    /// Part of the test at which a reading was taken, 0 to 1.
+    pub(super) fn moment(&self, place: &Place) -> f64 {
+        place.time / self.duration
+    }
+
+    /// Σ weight(parameter) · sensitivity of a reading, µm.
+    pub(super) fn weighted(&self, row: usize, weight: impl Fn(&Parameter) -> f64) -> f64 {
+        self.terms[row].iter().map(|(p, s)| weight(p) * s).sum()
+    }
+
+    /// Steps on each axis.
+    pub(super) fn steps(&self) -> usize {
+        self.zone.steps
+    }
+}
+
+impl FittedModel for DiagonalRuns {
+    fn name(&self) -> &'static str {
+        "step-diagonal"
+    }
+
+    fn reading_unit(&self) -> &'static str {
+        "um"
+    }
+
+    fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    fn traces(&self) -> &[Range<usize>] {
+        &self.traces
+    }
+
+    fn observed(&self) -> &DVector<f64> {
+        &self.observed
+    }
+
+    fn freedom(&self) -> Freedom {
+        Freedom {
+            columns: self.columns.as_ref().clone(),
+            profiles: None,
+        }
+    }
+
+    fn channel_names(&self) -> Vec<String> {
+        let both = self.channels.windows(2).any(|w| w[0].1 != w[1].1);
+        self.channels
+            .iter()
+            .map(|(diagonal, target, sequence)| {
+                let on = match (both, target) {
+                    (false, _) => "",
+                    (true, Target::Mirror) => " mirror",
+                    (true, Target::RetroReflector) => " retro-reflector",
+                };
+                format!("{} {}{on}", diagonal.name(), sequence.name())
+            })
+            .collect()
+    }
+
+    fn stated_noise(&self) -> Option<f64> {
+        self.noise
+    }
+
+    fn refit(&self, observed: DVector<f64>) -> Self {
+        Self {
+            observed,
+            ..self.clone()
+        }
+    }
+
+    fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
+        effects::all()
+    }
+}

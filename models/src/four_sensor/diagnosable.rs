@@ -1,0 +1,257 @@
+//! The four-sensor model, laid open to the diagnosis.
+//!
+//! mᵢ(x) = f(x + pᵢ) + S(x) + 1000 pᵢ γ(x) + eᵢ with f, S, γ free at every position and e free for
+//! every sensor: what the fit leaves is what no surface and no slide can explain, without any
+//! penalty. The penalised separation only supplies the state at which effects are taken.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::effects;
+use super::{
+    Choice, FourSensorError, Geometry, Line, Outputs, Penalised, Separation, Separator, Settings,
+};
+use crate::model::{Effect, FittedModel, Freedom, Pattern, Place, Profile};
+use crate::units::UM_PER_MM;
+
+/// Outputs of four sensors, in one or several repeats, with the fitted state.
+#[derive(Debug, Clone)]
+pub struct FourSensors {
+    geometry: Geometry,
+    start: f64,
+    separator: Arc<Separator>,
+    settings: Settings,
+    places: Vec<Place>,
+    traces: Vec<Range<usize>>,
+    observed: DVector<f64>,
+    state: Separation,
+    noise: Option<f64>,
+}
+
+impl FourSensors {
+    /// Fits the state to the mean of the repeats, which share one geometry and start. `noise` is
+    /// the standard deviation of one reading, µm, where it is stated.
+    ///
+    /// # Errors
+    /// No repeat, repeats of different geometry, or a separation that fails.
+    pub fn new(repeats: &[Outputs], noise: Option<f64>) -> Result<Self, FourSensorError> {
+        let Some(first) = repeats.first() else {
+            return Err(FourSensorError::NoNoise);
+        };
+        let geometry = *first.geometry();
+        let start = first.slide_positions().first().copied().unwrap_or(0.0);
+        let positions = first.slide_positions();
+        let count = positions.len();
+        if let Some(other) = repeats.iter().find(|r| r.geometry() != &geometry) {
+            return Err(FourSensorError::OutputCount {
+                found: other.readings().len(),
+                expected: count,
+            });
+        }
+        let (mut places, mut traces, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        for sensor in 0..4 {
+            for (repeat, outputs) in repeats.iter().enumerate() {
+                let from = places.len();
+                for (n, (x, row)) in positions.iter().zip(outputs.readings()).enumerate() {
+                    values.push(row[sensor]);
+                    places.push(Place {
+                        channel: sensor,
+                        x: *x,
+                        time: (repeat * count + n) as f64,
+                        repeat: repeat as u32 + 1,
+                        direction: 1.0,
+                        cell: sensor * count + n,
+                    });
+                }
+                traces.push(from..places.len());
+            }
+        }
+        let separator = Separator::new(&geometry, Penalised::default(), Line::LeastSquares)?;
+        let settings = Settings {
+            choice: Choice::LCurve,
+            ..Settings::default()
+        };
+        let observed = DVector::from_vec(values);
+        let state = state_of(&separator, &settings, &geometry, start, &traces, &observed)?;
+        Ok(Self {
+            geometry,
+            start,
+            separator: Arc::new(separator),
+            settings,
+            places,
+            traces,
+            observed,
+            state,
+            noise,
+        })
+    }
+
+    /// The sensors' places.
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// Index of a place along the travel.
+    pub(super) fn at(&self, place: &Place) -> usize {
+        place.cell % self.geometry.output_count()
+    }
+
+    /// Part of the travel at a place, 0 to 1.
+    pub(super) fn share(&self, place: &Place) -> f64 {
+        self.at(place) as f64 / (self.geometry.output_count() - 1) as f64
+    }
+
+    /// Place of a sensor from sensor 1, mm.
+    pub(super) fn arm(&self, sensor: usize) -> f64 {
+        self.geometry.positions()[sensor]
+    }
+
+    /// Slope of the fitted surface under a sensor, µm/mm, by the difference of its neighbours.
+    pub(super) fn surface_slope(&self, place: &Place) -> f64 {
+        let n = self.at(place) + self.geometry.offsets()[place.channel];
+        slope(&self.state.surface.values, n, self.geometry.step())
+    }
+
+    /// Fitted tilt at a place, rad.
+    pub(super) fn tilt(&self, place: &Place) -> f64 {
+        self.state.tilt.values[self.at(place)]
+    }
+
+    /// What the fitted state says a sensor reads, µm.
+    pub(super) fn fitted(&self, place: &Place) -> f64 {
+        let n = self.at(place);
+        self.state.surface.values[n + self.geometry.offsets()[place.channel]]
+            + self.state.straightness.values[n]
+            + UM_PER_MM * self.arm(place.channel) * self.state.tilt.values[n]
+            + self.state.zero_adjustment[place.channel]
+    }
+}
+
+/// Central difference, one-sided at the ends.
+fn slope(values: &DVector<f64>, at: usize, step: f64) -> f64 {
+    let (low, high) = (at.saturating_sub(1), (at + 1).min(values.len() - 1));
+    (values[high] - values[low]) / ((high - low) as f64 * step)
+}
+
+fn state_of(
+    separator: &Separator,
+    settings: &Settings,
+    geometry: &Geometry,
+    start: f64,
+    traces: &[Range<usize>],
+    observed: &DVector<f64>,
+) -> Result<Separation, FourSensorError> {
+    let repeats = traces.len() / 4;
+    let rows = (0..geometry.output_count())
+        .map(|n| {
+            std::array::from_fn(|sensor| {
+                let own = &traces[sensor * repeats..(sensor + 1) * repeats];
+                own.iter().map(|t| observed[t.start + n]).sum::<f64>() / repeats as f64
+            })
+        })
+        .collect();
+    separator.separate(&Outputs::new(*geometry, start, rows)?, settings)
+}
+
+impl FittedModel for FourSensors {
+    fn name(&self) -> &'static str {
+        "four-sensor"
+    }
+
+    fn reading_unit(&self) -> &'static str {
+        "um"
+    }
+
+    fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    fn traces(&self) -> &[Range<usize>] {
+        &self.traces
+    }
+
+    fn observed(&self) -> &DVector<f64> {
+        &self.observed
+    }
+
+    fn freedom(&self) -> Freedom {
+        let (points, count) = (self.geometry.point_count(), self.geometry.output_count());
+        let longest = self.arm(3);
+        let mut columns = DMatrix::zeros(self.places.len(), points + 2 * count + 4);
+        for (row, place) in self.places.iter().enumerate() {
+            let n = self.at(place);
+            columns[(row, n + self.geometry.offsets()[place.channel])] = 1.0;
+            columns[(row, points + n)] = 1.0;
+            columns[(row, points + count + n)] = self.arm(place.channel) / longest;
+            columns[(row, points + 2 * count + place.channel)] = 1.0;
+        }
+        Freedom {
+            columns,
+            profiles: None,
+        }
+    }
+
+    fn channel_names(&self) -> Vec<String> {
+        (1..=4).map(|k| format!("sensor {k}")).collect()
+    }
+
+    fn patterns(&self) -> Vec<Pattern> {
+        let free = self.geometry.slide_free();
+        ["curvature", "third difference"]
+            .into_iter()
+            .enumerate()
+            .map(|(k, name)| Pattern {
+                name: name.to_owned(),
+                weights: free.column(k).iter().copied().collect(),
+            })
+            .collect()
+    }
+
+    fn profiles(&self) -> Vec<Profile> {
+        let step = self.geometry.step();
+        let profile = |name: &str, profile: &super::Profile| {
+            let spread = profile.std.norm() / (profile.std.len() as f64).sqrt();
+            Profile {
+                name: name.to_owned(),
+                unit: "um",
+                positions: (0..profile.values.len())
+                    .map(|n| self.start + n as f64 * step)
+                    .collect(),
+                values: profile.values.clone(),
+                noise_gain: spread / self.state.noise.max(f64::MIN_POSITIVE),
+            }
+        };
+        vec![
+            profile("surface", &self.state.surface),
+            profile("straightness", &self.state.straightness),
+        ]
+    }
+
+    fn stated_noise(&self) -> Option<f64> {
+        self.noise
+    }
+
+    fn refit(&self, observed: DVector<f64>) -> Self {
+        let mut fitted = self.clone();
+        let state = state_of(
+            &self.separator,
+            &self.settings,
+            &self.geometry,
+            self.start,
+            &self.traces,
+            &observed,
+        );
+        // Where the penalty finds no corner the state before is the better one to take slopes from.
+        if let Ok(state) = state {
+            fitted.state = state;
+        }
+        fitted.observed = observed;
+        fitted
+    }
+
+    fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
+        effects::all()
+    }
+}

@@ -1,0 +1,234 @@
+//! The Fourier separation, laid open to the diagnosis.
+//!
+//! A reading is the difference m = m₁ − m₂ before the joint x = L − d and m₁ − m₃ beyond it, free of
+//! the slide: f(x) − f(x + d), f periodic up to the orders kept, plus a zero for each scan and one
+//! step at the joint for the slope of the workpiece, common to all scans.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::effects;
+use super::separation::spacings;
+use super::{Compensation, FourierError, Scan, Section, join};
+use crate::model::{Effect, FittedModel, Freedom, Place, Profile};
+
+/// Scans of one or several probe spacings with the fitted workpiece.
+#[derive(Debug, Clone)]
+pub struct FourierScans {
+    section: Section,
+    spacings: Vec<f64>,
+    places: Vec<Place>,
+    traces: Vec<Range<usize>>,
+    columns: Arc<DMatrix<f64>>,
+    /// Maps readings to the coefficients of the columns.
+    solver: Arc<DMatrix<f64>>,
+    observed: DVector<f64>,
+    coefficients: DVector<f64>,
+    noise: Option<f64>,
+}
+
+impl FourierScans {
+    /// Joins the scans and fits the workpiece. `noise` is the standard deviation of one reading of
+    /// one probe, µm, where it is known.
+    ///
+    /// # Errors
+    /// Those of [`join`], and [`FourierError::NoScan`].
+    pub fn new(scans: &[Scan], section: Section, noise: Option<f64>) -> Result<Self, FourierError> {
+        if scans.is_empty() {
+            return Err(FourierError::NoScan);
+        }
+        let spacings = spacings(scans);
+        let (mut places, mut traces, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        for (channel, spacing) in spacings.iter().enumerate() {
+            let first_cell = channel << 32;
+            for scan in scans.iter().filter(|s| s.spacing == *spacing) {
+                let joined = join(scan, section, Compensation::None)?;
+                let start = places.len();
+                for (k, value) in joined.difference.iter().enumerate() {
+                    values.push(*value);
+                    places.push(Place {
+                        channel,
+                        x: section.length * k as f64 / joined.difference.len() as f64,
+                        time: (start + k) as f64,
+                        repeat: scan.repeat,
+                        direction: 1.0,
+                        cell: first_cell + k,
+                    });
+                }
+                traces.push(start..places.len());
+            }
+        }
+        let mut model = Self {
+            section,
+            spacings,
+            places,
+            traces,
+            columns: Arc::new(DMatrix::zeros(0, 0)),
+            solver: Arc::new(DMatrix::zeros(0, 0)),
+            observed: DVector::zeros(0),
+            coefficients: DVector::zeros(0),
+            // A difference of two readings.
+            noise: noise.map(|sigma| sigma * 2f64.sqrt()),
+        };
+        let columns = model.design();
+        let gram = columns.tr_mul(&columns);
+        let cut = 1e-12 * gram.diagonal().amax();
+        let inverse = gram
+            .pseudo_inverse(cut)
+            .map_err(|what| FourierError::Simulation {
+                what: what.to_owned(),
+            })?;
+        model.solver = Arc::new(inverse * columns.transpose());
+        model.columns = Arc::new(columns);
+        Ok(model.refit(DVector::from_vec(values)))
+    }
+
+    fn design(&self) -> DMatrix<f64> {
+        let orders = self.section.orders;
+        let mut columns = DMatrix::zeros(self.places.len(), 2 * orders + self.traces.len() + 1);
+        for (row, place) in self.places.iter().enumerate() {
+            let (here, there) = (self.angle(place.x), self.angle(self.second(place)));
+            for order in 1..=orders {
+                let w = order as f64;
+                columns[(row, 2 * order - 2)] = (w * here).cos() - (w * there).cos();
+                columns[(row, 2 * order - 1)] = (w * here).sin() - (w * there).sin();
+            }
+            columns[(row, 2 * orders)] = f64::from(u8::from(self.beyond(place)));
+        }
+        for (k, trace) in self.traces.iter().enumerate() {
+            for row in trace.clone() {
+                columns[(row, 2 * orders + 1 + k)] = 1.0;
+            }
+        }
+        columns
+    }
+
+    fn angle(&self, x: f64) -> f64 {
+        TAU * x / self.section.length
+    }
+
+    /// Probe spacings, mm, one a channel.
+    pub fn spacings(&self) -> &[f64] {
+        &self.spacings
+    }
+
+    /// Part of the section at a place, 0 to 1.
+    pub(super) fn share(&self, place: &Place) -> f64 {
+        place.x / self.section.length
+    }
+
+    /// Whether the third probe has taken over.
+    pub(super) fn beyond(&self, place: &Place) -> bool {
+        let slack = 1e-9 * self.section.length;
+        place.x >= self.section.length - self.spacings[place.channel] - slack
+    }
+
+    /// Distance from the first probe to the second, or to the third where that has taken over, mm.
+    pub(super) fn arm(&self, place: &Place) -> f64 {
+        let spacing = self.spacings[place.channel];
+        if self.beyond(place) {
+            spacing - self.section.length
+        } else {
+            spacing
+        }
+    }
+
+    /// Place under the second or third probe, mm.
+    fn second(&self, place: &Place) -> f64 {
+        place.x + self.arm(place)
+    }
+
+    /// Slope of the fitted workpiece under the second or third probe, µm/mm.
+    pub(super) fn slope_there(&self, place: &Place) -> f64 {
+        let theta = self.angle(self.second(place));
+        let per_mm = TAU / self.section.length;
+        (1..=self.section.orders)
+            .map(|order| {
+                let w = order as f64;
+                let (c, s) = (
+                    self.coefficients[2 * order - 2],
+                    self.coefficients[2 * order - 1],
+                );
+                w * per_mm * (s * (w * theta).cos() - c * (w * theta).sin())
+            })
+            .sum()
+    }
+}
+
+impl FittedModel for FourierScans {
+    fn name(&self) -> &'static str {
+        "fourier"
+    }
+
+    fn reading_unit(&self) -> &'static str {
+        "um"
+    }
+
+    fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    fn traces(&self) -> &[Range<usize>] {
+        &self.traces
+    }
+
+    fn observed(&self) -> &DVector<f64> {
+        &self.observed
+    }
+
+    fn freedom(&self) -> Freedom {
+        Freedom {
+            columns: self.columns.as_ref().clone(),
+            profiles: None,
+        }
+    }
+
+    fn channel_names(&self) -> Vec<String> {
+        self.spacings
+            .iter()
+            .map(|d| format!("spacing {d} mm"))
+            .collect()
+    }
+
+    fn profiles(&self) -> Vec<Profile> {
+        let count = 200;
+        let positions: Vec<f64> = (0..count)
+            .map(|k| self.section.length * f64::from(k) / f64::from(count))
+            .collect();
+        let waves = DMatrix::from_fn(positions.len(), 2 * self.section.orders, |row, column| {
+            let turn = (column / 2 + 1) as f64 * self.angle(positions[row]);
+            if column % 2 == 0 {
+                turn.cos()
+            } else {
+                turn.sin()
+            }
+        });
+        let used = self.coefficients.rows(0, waves.ncols());
+        let gain = &waves * self.solver.rows(0, waves.ncols());
+        vec![Profile {
+            name: "workpiece".to_owned(),
+            unit: "um",
+            values: &waves * used,
+            noise_gain: gain.norm() / (positions.len() as f64).sqrt(),
+            positions,
+        }]
+    }
+
+    fn stated_noise(&self) -> Option<f64> {
+        self.noise
+    }
+
+    fn refit(&self, observed: DVector<f64>) -> Self {
+        let mut fitted = self.clone();
+        fitted.coefficients = self.solver.as_ref() * &observed;
+        fitted.observed = observed;
+        fitted
+    }
+
+    fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
+        effects::all()
+    }
+}

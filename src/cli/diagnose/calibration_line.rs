@@ -1,0 +1,100 @@
+//! A straight calibration line.
+
+use std::path::Path;
+
+use errsep_models::calibration_line::{CalibrationLine, CalibrationReading, LackOfFit};
+use errsep_models::model::FittedModel;
+use serde::Deserialize;
+
+use super::Args;
+use super::case::Case;
+use crate::cli::Answer;
+use crate::io::{Message, SetupFile, TableReader};
+use crate::report::number::{plain, probability};
+
+/// The set-up.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Setup {
+    #[serde(default)]
+    line: LineSetup,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LineSetup {
+    /// Standard deviation of one reading, in the unit of y.
+    noise: Option<f64>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Answer, Message> {
+    let setup: Setup = match &args.setup {
+        Some(path) => SetupFile::read(path)?.parse()?,
+        None => Setup::default(),
+    };
+    super::positive(setup.line.noise, "[line] noise", args)?;
+    let readings = read(&args.data)?;
+    let model = CalibrationLine::new(&readings, setup.line.noise).map_err(|e| {
+        Message::bad_input(e.to_string())
+            .in_file(&args.data)
+            .remedy("give finite readings at four or more values of x")
+    })?;
+    let mut notes = vec![
+        "x and y are in the units of their columns; sizes of effects are in the unit of y."
+            .to_owned(),
+    ];
+    if !model.timed {
+        notes.push("No times are given: the readings are taken to follow each other evenly in the order of the file.".to_owned());
+    }
+    if let Some(test) = model.lack_of_fit(&[]) {
+        notes.push(format!(
+            "The classical test of a straight line: {}",
+            test_in_words(&test)
+        ));
+    }
+    Case {
+        readings: format!(
+            "{} readings in {} sets",
+            readings.len(),
+            model.traces().len()
+        ),
+        model,
+        along: "x",
+        notes,
+        inputs: Vec::new(),
+    }
+    .answer(args)
+}
+
+fn test_in_words(test: &LackOfFit) -> String {
+    format!(
+        "lack of fit F = {} with {} and {} degrees of freedom (p {}), scatter of readings of the same x {}, residuals {}.",
+        plain(test.f, 5),
+        test.freedom[0],
+        test.freedom[1],
+        probability(test.p_value),
+        plain(test.pure_error, 4),
+        plain(test.residual, 4)
+    )
+}
+
+/// Columns x and y, and where they apply set and time.
+fn read(path: &Path) -> Result<Vec<CalibrationReading>, Message> {
+    let mut table = TableReader::open(path)?;
+    table.only(&["x", "y", "set", "time"])?;
+    let (x, y) = (table.column("x")?, table.column("y")?);
+    let (set, time) = (table.optional("set"), table.optional("time"));
+    let mut readings = Vec::new();
+    while let Some(row) = table.next_row()? {
+        readings.push(CalibrationReading {
+            x: row.number(&x)?,
+            y: row.number(&y)?,
+            set: set.as_ref().map_or(Ok(1), |column| row.count(column))?,
+            time: time.as_ref().map(|column| row.number(column)).transpose()?,
+        });
+    }
+    if readings.is_empty() {
+        return Err(table.no_rows());
+    }
+    Ok(readings)
+}

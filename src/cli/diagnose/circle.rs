@@ -1,0 +1,84 @@
+//! Points of a circle.
+
+use std::path::Path;
+
+use errsep_models::circle::{CircleError, CirclePoints, Point};
+use serde::Deserialize;
+
+use super::Args;
+use super::case::Case;
+use crate::cli::Answer;
+use crate::io::{Message, SetupFile, TableReader};
+
+/// The set-up.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Setup {
+    #[serde(default)]
+    circle: CircleSetup,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CircleSetup {
+    /// Standard deviation of a radial deviation, µm.
+    noise: Option<f64>,
+}
+
+/// Most points that are diagnosed together: noise is a matrix of the points of a pass.
+const MOST: usize = 4000;
+
+pub(super) fn run(args: &Args) -> Result<Answer, Message> {
+    let setup: Setup = match &args.setup {
+        Some(path) => SetupFile::read(path)?.parse()?,
+        None => Setup::default(),
+    };
+    super::positive(setup.circle.noise, "[circle] noise", args)?;
+    let points = read(&args.data)?;
+    if points.len() > MOST {
+        return Err(Message::bad_input(format!(
+            "{} points are more than the {MOST} that are diagnosed together",
+            points.len()
+        ))
+        .in_file(&args.data)
+        .remedy("take every n-th point"));
+    }
+    let model = CirclePoints::new(&points, setup.circle.noise).map_err(|e| {
+        let message = match e {
+            CircleError::StraighterThanAnyCircle | CircleError::NotConverged { .. } => {
+                Message::not_solved(e.to_string())
+            }
+            _ => Message::bad_input(e.to_string()),
+        };
+        message.in_file(&args.data)
+    })?;
+    let circle = model.circle();
+    Case {
+        readings: format!("{} points", points.len()),
+        model,
+        along: "angle",
+        notes: vec![format!(
+            "Centre and radius are given as they move from the circle of all points: centre ({:.6}, {:.6}) mm, radius {:.6} mm.",
+            circle.centre.x, circle.centre.y, circle.radius
+        )],
+        inputs: Vec::new(),
+    }
+    .answer(args)
+}
+
+/// Columns x and y, mm, and where it applies repeat.
+fn read(path: &Path) -> Result<Vec<(Point, u32)>, Message> {
+    let mut table = TableReader::open(path)?;
+    table.only(&["x", "y", "repeat"])?;
+    let (x, y) = (table.column("x")?, table.column("y")?);
+    let repeat = table.optional("repeat");
+    let mut points = Vec::new();
+    while let Some(row) = table.next_row()? {
+        let number = repeat.as_ref().map_or(Ok(1), |column| row.count(column))?;
+        points.push((Point::new(row.number(&x)?, row.number(&y)?), number));
+    }
+    if points.is_empty() {
+        return Err(table.no_rows());
+    }
+    Ok(points)
+}

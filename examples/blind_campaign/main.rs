@@ -55,7 +55,9 @@ fn main() -> std::io::Result<()> {
         arguments.get(at + 1).map(String::as_str)
     };
     let number = |name: &str, fallback: u64| -> u64 {
-        option(name).and_then(|v| v.parse().ok()).unwrap_or(fallback)
+        option(name)
+            .and_then(|v| v.parse().ok())
+            .unwrap_or(fallback)
     };
     if let Some(files) = option("--judge") {
         let text = judge::judged(files.split(','))?;
@@ -65,10 +67,20 @@ fn main() -> std::io::Result<()> {
         };
     }
     let set = option("--set").unwrap_or("single");
-    let jobs = jobs(set, number("--cases", 4), number("--seed", 1), option("--only").unwrap_or(""));
+    let jobs = jobs(
+        set,
+        number("--cases", 4),
+        number("--seed", 1),
+        option("--only").unwrap_or(""),
+    );
     let start = Instant::now();
     let mut file = match option("--out") {
-        Some(path) => Some(std::fs::OpenOptions::new().create(true).append(true).open(path)?),
+        Some(path) => Some(
+            std::fs::OpenOptions::new()
+                .create(true)
+                .append(true)
+                .open(path)?,
+        ),
         None => None,
     };
     for chunk in jobs.chunks(CHUNK) {
@@ -84,7 +96,11 @@ fn main() -> std::io::Result<()> {
             file.flush()?;
         }
     }
-    eprintln!("{} cases in {:.1} s", jobs.len(), start.elapsed().as_secs_f64());
+    eprintln!(
+        "{} cases in {:.1} s",
+        jobs.len(),
+        start.elapsed().as_secs_f64()
+    );
     Ok(())
 }
 
@@ -120,9 +136,17 @@ fn jobs(set: &str, cases: u64, seed: u64, only: &str) -> Vec<Job> {
 }
 
 fn tried(set: &str, job: &Job) -> Option<Outcome> {
-    let sizes = if set == "small" { (0.02, 0.2) } else { (0.7, 3.0) };
+    let sizes = if set == "small" {
+        (0.02, 0.2)
+    } else {
+        (0.7, 3.0)
+    };
     let made = make(&job.names, job.case, sizes, job.noise)?;
-    let withheld: &[&str] = if set == "withheld" { &made.effects } else { &[] };
+    let withheld: &[&str] = if set == "withheld" {
+        &made.effects
+    } else {
+        &[]
+    };
     let start = Instant::now();
     let diagnosis = solve(&made.observations, withheld, job.case)?;
     let seconds = start.elapsed().as_secs_f64();
@@ -151,22 +175,30 @@ fn opened(
     seconds: f64,
     report: String,
 ) -> Outcome {
-    assert_eq!(made.seal, seal(&format!("{:?} {}", made.truth, made.gap)), "the seal is broken");
+    assert_eq!(
+        made.seal,
+        seal(&format!("{:?} {}", made.truth, made.gap)),
+        "the seal is broken"
+    );
     let verdict = &diagnosis.verdict;
     let mut said = verdict.effects.clone();
     said.sort();
-    let sizes = made.effects.iter().zip(&made.truth).filter_map(|(name, injection)| {
-        let candidate = diagnosis.candidates.iter().find(|c| c.effect == *name)?;
-        let parameter = candidate.parameters.first()?;
-        let hidden = diagnosis.hidden.iter().find(|h| h.effect == *name);
-        Some(Sized {
-            effect: (*name).to_owned(),
-            truth: size(injection),
-            value: parameter.value,
-            std: parameter.std,
-            detectable: hidden.and_then(|h| h.detectable),
-        })
-    });
+    let sizes = made
+        .effects
+        .iter()
+        .zip(&made.truth)
+        .filter_map(|(name, injection)| {
+            let candidate = diagnosis.candidates.iter().find(|c| c.effect == *name)?;
+            let parameter = candidate.parameters.first()?;
+            let hidden = diagnosis.hidden.iter().find(|h| h.effect == *name);
+            Some(Sized {
+                effect: (*name).to_owned(),
+                truth: size(injection),
+                value: parameter.value,
+                std: parameter.std,
+                detectable: hidden.and_then(|h| h.detectable),
+            })
+        });
     let held = diagnosis.gap.held_out;
     Outcome {
         set: set.to_owned(),

@@ -53,7 +53,11 @@ impl Outcome {
     pub fn name(&self) -> String {
         let mut names = self.truth.clone();
         names.sort();
-        if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
+        if names.is_empty() {
+            "none".to_owned()
+        } else {
+            names.join(" + ")
+        }
     }
 
     /// Exactly the truth was named.
@@ -65,9 +69,10 @@ impl Outcome {
     pub fn in_group(&self) -> bool {
         self.kind == "effect"
             && !self.groups.is_empty()
-            && self.truth.iter().all(|t| {
-                self.said.contains(t) || self.groups.iter().any(|group| group.contains(t))
-            })
+            && self
+                .truth
+                .iter()
+                .all(|t| self.said.contains(t) || self.groups.iter().any(|group| group.contains(t)))
     }
 
     /// Something was named, no group, and it was not the truth.

@@ -243,7 +243,11 @@ fn confidence_set<M: FittedModel>(
 
 /// Whether each of several causes makes the prediction of held-out repeats better; a cause that
 /// happened once cannot be judged so.
-fn predicts<M: FittedModel>(bench: &Bench<'_, M>, readings: &DVector<f64>, causes: &[Cause]) -> bool {
+fn predicts<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> bool {
     let noise = bench.law.sigma().powi(2);
     let square = |causes: &[Cause]| {
         let signatures = raw_signatures(bench, causes);

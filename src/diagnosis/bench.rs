@@ -140,7 +140,12 @@ impl<'a, M: FittedModel> Bench<'a, M> {
     }
 
     /// The state fitted to readings without causes at given amplitudes.
-    pub fn without(&self, readings: &DVector<f64>, causes: &[Cause], amplitudes: &DVector<f64>) -> M {
+    pub fn without(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+        amplitudes: &DVector<f64>,
+    ) -> M {
         let mut clean = readings - self.change(causes, amplitudes);
         let mut at = 0;
         for cause in causes {
@@ -148,8 +153,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
             let own = amplitudes.rows(at, count).clone_owned();
             at += count;
             let with = &clean + self.change(std::slice::from_ref(cause), &own);
-            if let Some(restored) =
-                self.catalogue[cause.effect].restored(self.model, &with, &clean)
+            if let Some(restored) = self.catalogue[cause.effect].restored(self.model, &with, &clean)
             {
                 clean = restored;
             }
@@ -379,7 +383,10 @@ pub(super) fn stack(causes: &[Cause], readings: usize) -> DMatrix<f64> {
 }
 
 /// Signatures as they stand in the readings, readings × amplitudes.
-pub(super) fn raw_signatures<M: FittedModel>(bench: &Bench<'_, M>, causes: &[Cause]) -> DMatrix<f64> {
+pub(super) fn raw_signatures<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    causes: &[Cause],
+) -> DMatrix<f64> {
     let n = bench.space.readings();
     let columns: Vec<DVector<f64>> = causes
         .iter()

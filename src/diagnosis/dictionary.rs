@@ -64,7 +64,10 @@ impl Entry {
 
     /// Eᵀ a.
     pub fn products(&self, adjoint: &Sums) -> DVector<f64> {
-        DVector::from_iterator(self.columns.len(), self.columns.iter().map(|c| c.dot(adjoint)))
+        DVector::from_iterator(
+            self.columns.len(),
+            self.columns.iter().map(|c| c.dot(adjoint)),
+        )
     }
 
     /// Eᵀ a for several a.
@@ -92,7 +95,9 @@ impl Places {
             .map(|(axis, items)| {
                 let folded = items
                     .into_iter()
-                    .map(|(item, columns)| (item, columns.iter().map(|c| folding.fold(c)).collect()))
+                    .map(|(item, columns)| {
+                        (item, columns.iter().map(|c| folding.fold(c)).collect())
+                    })
                     .collect();
                 (axis, folded)
             })
@@ -146,7 +151,14 @@ impl Dictionary {
                 .map(|shape| {
                     let columns = effect.columns(model, &shape);
                     let folded = columns.iter().map(|c| folding.fold(c)).collect();
-                    entry(Meaning::Effect(shape), &columns, folded, positive, space, law)
+                    entry(
+                        Meaning::Effect(shape),
+                        &columns,
+                        folded,
+                        positive,
+                        space,
+                        law,
+                    )
                 })
                 .collect();
             dictionary.add(effect.name(), true, built);
@@ -244,7 +256,9 @@ pub(super) fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
         return DMatrix::from_element(1, 1, 1.0 / gram[(0, 0)].max(f64::MIN_POSITIVE));
     }
     let lifted = gram + DMatrix::identity(n, n) * (1e-9 * gram.trace());
-    lifted.cholesky().map_or_else(|| DMatrix::zeros(n, n), |factor| factor.inverse())
+    lifted
+        .cholesky()
+        .map_or_else(|| DMatrix::zeros(n, n), |factor| factor.inverse())
 }
 
 /// −2 ln of the chi-squared tail beyond T.

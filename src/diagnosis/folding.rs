@@ -83,7 +83,8 @@ impl Folding {
                 }
             }
         }
-        let whole = (0..count.len()).all(|k| count[k] == 0 || count[k] as usize == self.members[k].len());
+        let whole =
+            (0..count.len()).all(|k| count[k] == 0 || count[k] as usize == self.members[k].len());
         let touched = count.iter().filter(|c| **c > 0).count();
         if !(whole && (even || odd) && touched < column.rows.len()) {
             return Folded {
@@ -155,7 +156,11 @@ impl Folding {
                 .map(|cell| {
                     let mut sum = [0f32; BATCH];
                     for &row in cell {
-                        let sign = if turned { self.direction[row as usize] as f32 } else { 1.0 };
+                        let sign = if turned {
+                            self.direction[row as usize] as f32
+                        } else {
+                            1.0
+                        };
                         for (s, v) in sum.iter_mut().zip(&plain[row as usize]) {
                             *s += sign * v;
                         }
@@ -181,7 +186,9 @@ impl Folded {
             Kind::Odd => &sums.odd,
         };
         let terms = self.rows.iter().zip(&self.values);
-        terms.map(|(row, value)| value * vector[*row as usize]).sum()
+        terms
+            .map(|(row, value)| value * vector[*row as usize])
+            .sum()
     }
 
     /// Its products with several vectors.

@@ -126,17 +126,28 @@ fn examined<M: FittedModel, R>(
         });
     }
     let found = attribute(bench, readings, &first);
-    let none = || (DVector::zeros(readings.len()), bench.model.refit(bench.model.observed().clone()));
+    let none = || {
+        (
+            DVector::zeros(readings.len()),
+            bench.model.refit(bench.model.observed().clone()),
+        )
+    };
     let (change, state) = found
         .and_then(|answer| {
             let (amplitudes, _) = bench.amplitudes(readings, &answer.causes)?;
             let change = bench.change(&answer.causes, &amplitudes);
             let observed = bench.model.observed().clone();
-            Some((change, bench.without(&observed, &answer.causes, &amplitudes)))
+            Some((
+                change,
+                bench.without(&observed, &answer.causes, &amplitudes),
+            ))
         })
         .unwrap_or_else(none);
     // The readings themselves keep what an effect had hidden of the state.
-    let clean = bench.model.refit(bench.model.observed() - &change).linearised();
+    let clean = bench
+        .model
+        .refit(bench.model.observed() - &change)
+        .linearised();
     let law = noise_of(&state, &clean);
     let bench = bench.moved(&state, law);
     let readings = clean + change;

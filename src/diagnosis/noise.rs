@@ -138,7 +138,11 @@ pub(super) fn neighbour_scatter<M: FittedModel>(
     let gaps: Vec<f64> = model
         .traces()
         .iter()
-        .flat_map(|t| model.places()[t.clone()].windows(2).map(|w| (w[1].x - w[0].x).abs()))
+        .flat_map(|t| {
+            model.places()[t.clone()]
+                .windows(2)
+                .map(|w| (w[1].x - w[0].x).abs())
+        })
         .collect();
     if freedom < 20.0 || gaps.is_empty() {
         return None;

@@ -11,7 +11,11 @@ use super::verdict::Where;
 pub(super) const PLACE_LEVEL: f64 = 0.05;
 
 /// The strongest place on every axis, and the channels' shares.
-pub(super) fn places<M: FittedModel>(bench: &Bench<'_, M>, first: &Remainder, excess: f64) -> Vec<Where> {
+pub(super) fn places<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    first: &Remainder,
+    excess: f64,
+) -> Vec<Where> {
     let interval = |t: f64| {
         let reach = 1.96 * 2.0 * t.sqrt() / excess;
         let share = (t / excess).clamp(0.0, 1.0);

@@ -163,7 +163,9 @@ fn answer<M: FittedModel>(
     let readings = model.linearised();
     let law = noise_of(&model, &readings);
     let bench = bench.moved(&model, law);
-    examined(&bench, &readings, options.false_alarm, |examined| said(&examined, options))
+    examined(&bench, &readings, options.false_alarm, |examined| {
+        said(&examined, options)
+    })
 }
 
 fn said<M: FittedModel>(examined: &Examined<'_, M>, options: &Options) -> String {

@@ -227,7 +227,9 @@ impl Split {
         for row in others.iter().flat_map(|t| model.traces()[*t].clone()) {
             let place = &model.places()[row];
             if let Some(cell) = known.get(&place.cell) {
-                let group = groups.entry((place.cell, place.direction < 0.0)).or_default();
+                let group = groups
+                    .entry((place.cell, place.direction < 0.0))
+                    .or_default();
                 group.push((row, *cell));
             }
         }
@@ -263,7 +265,8 @@ impl Split {
 
     /// Mean over the groups of a function of predictions, one a held-out reading.
     fn mean(&self, predicted: &[Vec<f64>], value: impl Fn(f64) -> f64) -> f64 {
-        let of = |group: &Vec<f64>| group.iter().map(|p| value(*p)).sum::<f64>() / group.len() as f64;
+        let of =
+            |group: &Vec<f64>| group.iter().map(|p| value(*p)).sum::<f64>() / group.len() as f64;
         predicted.iter().map(of).sum::<f64>() / predicted.len() as f64
     }
 
@@ -313,12 +316,21 @@ impl SplitFit<'_> {
         }
         let effect = |row: usize| -> f64 {
             let signature = self.signatures.row(row);
-            signature.iter().zip(amplitudes.iter()).map(|(s, a)| s * a).sum()
+            signature
+                .iter()
+                .zip(amplitudes.iter())
+                .map(|(s, a)| s * a)
+                .sum()
         };
         split
             .groups
             .iter()
-            .map(|group| group.iter().map(|(row, cell)| means[*cell] + effect(*row)).collect())
+            .map(|group| {
+                group
+                    .iter()
+                    .map(|(row, cell)| means[*cell] + effect(*row))
+                    .collect()
+            })
             .collect()
     }
 }

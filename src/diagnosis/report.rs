@@ -10,9 +10,9 @@ use super::noise::{NoiseSource, neighbour_scatter};
 use super::places::places;
 use super::quantify::{GapMeter, biases, shrink};
 use super::statement::statement;
-use crate::report::number::plain;
-use super::{Examined, Options};
 use super::verdict::{Detail, Diagnosis, Gap, Kind, NoiseOut, Verdict};
+use super::{Examined, Options};
+use crate::report::number::plain;
 
 pub(super) fn compose<M: FittedModel>(
     examined: &Examined<'_, M>,
@@ -125,11 +125,7 @@ pub(super) fn compose<M: FittedModel>(
     }
 }
 
-fn notes<M: FittedModel>(
-    bench: &Bench<'_, M>,
-    clean: &DVector<f64>,
-    spikes: usize,
-) -> Vec<String> {
+fn notes<M: FittedModel>(bench: &Bench<'_, M>, clean: &DVector<f64>, spikes: usize) -> Vec<String> {
     let mut notes = Vec::new();
     if spikes > 0 {
         notes.push(format!(

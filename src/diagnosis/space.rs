@@ -103,12 +103,7 @@ impl Space {
         space
     }
 
-    fn free_profiles(
-        &mut self,
-        profiles: &Profiles,
-        chosen: &[usize],
-        covariance: &DMatrix<f64>,
-    ) {
+    fn free_profiles(&mut self, profiles: &Profiles, chosen: &[usize], covariance: &DMatrix<f64>) {
         let patterns = profiles.patterns.select_rows(chosen);
         let sizes: Vec<f64> = patterns.column_iter().map(|c| c.norm()).collect();
         let basis = orthonormal(&patterns, &sizes);
@@ -242,7 +237,11 @@ impl Space {
     pub fn gram(&self, columns: &[Column], shift: f64) -> Gram {
         let parts: Vec<Part> = columns.iter().map(|c| self.part(c)).collect();
         let gram = DMatrix::from_fn(parts.len(), parts.len(), |i, j| {
-            if j < i { 0.0 } else { parts[i].product(&parts[j], self) }
+            if j < i {
+                0.0
+            } else {
+                parts[i].product(&parts[j], self)
+            }
         });
         let shift_share = match parts.first() {
             Some(part) if shift > 0.0 && gram[(0, 0)] > 0.0 => {
@@ -394,7 +393,9 @@ impl Part {
                 .iter()
                 .map(|&t| {
                     let (from, length) = (space.traces[t].start, space.traces[t].len());
-                    self.whitened.rows(from, length).dot(&other.whitened.rows(from, length))
+                    self.whitened
+                        .rows(from, length)
+                        .dot(&other.whitened.rows(from, length))
                 })
                 .sum()
         };

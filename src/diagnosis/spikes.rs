@@ -18,7 +18,10 @@ const REPEATS: usize = 3;
 ///
 /// A spike of height h in a trace makes the second differences −h/2, h, −h/2; a step, a bump wider
 /// than the spacing, or whatever comes back in the other repeats does not.
-pub(super) fn pulled_in<M: FittedModel>(model: &M, readings: &DVector<f64>) -> (DVector<f64>, usize) {
+pub(super) fn pulled_in<M: FittedModel>(
+    model: &M,
+    readings: &DVector<f64>,
+) -> (DVector<f64>, usize) {
     let mut groups: BTreeMap<(Vec<usize>, bool), Vec<usize>> = BTreeMap::new();
     for (t, trace) in model.traces().iter().enumerate() {
         let places = &model.places()[trace.clone()];

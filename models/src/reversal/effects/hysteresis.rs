@@ -66,7 +66,11 @@ impl Effect<FirstOrder> for Hysteresis {
     }
 
     fn allowed(&self, _model: &FirstOrder, shape: &Shape) -> bool {
-        shape.values.iter().skip(1).all(|v| (-1.0..=1.0).contains(v))
+        shape
+            .values
+            .iter()
+            .skip(1)
+            .all(|v| (-1.0..=1.0).contains(v))
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
@@ -77,11 +81,19 @@ impl Effect<FirstOrder> for Hysteresis {
         let places = model.places();
         let mut column = Column::default();
         for trace in model.traces() {
-            let begins = shape.values.get(1 + beginning_of(model, trace)).copied().unwrap_or(0.0);
+            let begins = shape
+                .values
+                .get(1 + beginning_of(model, trace))
+                .copied()
+                .unwrap_or(0.0);
             let forward = places[trace.start].direction > 0.0;
             let mut pointer = model.smooth_reading(&places[first_of(model, trace)]) + begins * half;
             for step in 0..trace.len() {
-                let k = if forward { trace.start + step } else { trace.end - 1 - step };
+                let k = if forward {
+                    trace.start + step
+                } else {
+                    trace.end - 1 - step
+                };
                 let stylus = model.smooth_reading(&places[k]);
                 pointer = pointer.clamp(stylus - half, stylus + half);
                 column.rows.push(k);
@@ -116,7 +128,10 @@ impl Effect<FirstOrder> for Hysteresis {
             };
             let forward = mean(1.0, readings)?;
             let backward = mean(-1.0, readings)?;
-            let slopes = [model.smoothed(&forward).slopes, model.smoothed(&backward).slopes];
+            let slopes = [
+                model.smoothed(&forward).slopes,
+                model.smoothed(&backward).slopes,
+            ];
             let clean = [mean(1.0, clean)?, mean(-1.0, clean)?];
             for k in 0..n {
                 let steepest = slopes[0][k].abs().max(slopes[1][k].abs());

@@ -1,11 +1,11 @@
 //! `errsep anova`: its answer, and every kind of wrong input with place and remedy.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Output;
+mod command;
 
+use std::path::{Path, PathBuf};
+
+use command::{Folder, Output, bad_input, run};
 use serde_json::Value;
-use tempfile::TempDir;
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -14,17 +14,13 @@ fn fixture(name: &str) -> PathBuf {
 }
 
 fn errsep(args: &[&str]) -> Output {
-    assert_cmd::Command::new(env!("CARGO_BIN_EXE_errsep"))
-        .args(args)
-        .output()
-        .unwrap()
+    run(&Folder::with(&[]), args)
 }
 
 fn answer(args: &[&str]) -> Value {
     let output = errsep(args);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{message}");
-    serde_json::from_slice(&output.stdout).unwrap()
+    assert_eq!(output.status, 0, "{}", output.stderr);
+    serde_json::from_str(&output.stdout).unwrap()
 }
 
 fn near(found: &Value, expected: f64, tolerance: f64) {
@@ -72,6 +68,14 @@ fn json_holds_the_documented_keys_and_the_report_s_figures() {
                     && !analysis["future_reading"]["result"][key].is_null()
             );
         }
+        for quantity in [&analysis["mean"], &analysis["future_reading"]["result"]] {
+            let number = |value: &Value| value.as_f64().unwrap();
+            let expanded = &quantity["expanded"];
+            let u = number(&expanded["expanded_uncertainty"]);
+            let ratio = u / number(&quantity["std"]) / number(&expanded["coverage_factor"]);
+            // Epsilons.
+            assert!((ratio - 1.0).abs() < 1e-14 && expanded["coverage_probability"] == 0.95);
+        }
         assert!(analysis["f"].is_number() && analysis["p_value"].is_number());
         assert!(analysis["groups"] == 21 && analysis["readings"] == 54);
         assert_eq!(feature["parts"].as_array().unwrap().len(), 21);
@@ -96,40 +100,32 @@ fn json_holds_the_documented_keys_and_the_report_s_figures() {
 
 #[test]
 fn the_folder_holds_report_result_and_tables() {
-    let folder = TempDir::new().unwrap();
-    let out = folder.path().join("out");
+    let folder = Folder::with(&[]);
     let path = fixture("replicates.csv");
-    let output = errsep(&[
-        "anova",
-        path.to_str().unwrap(),
-        "--out",
-        out.to_str().unwrap(),
-    ]);
-    assert_eq!(output.status.code(), Some(0));
-    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    let output = run(&folder, &["anova", path.to_str().unwrap(), "--out", "out"]);
+    assert_eq!(output.status, 0, "{}", output.stderr);
+    // The budget of a future reading, the largest share first, with its expanded uncertainty.
+    let budget = output.stdout.find("a future reading").unwrap();
+    let shown = &output.stdout[budget..];
+    assert!(
+        shown.find("between groups").unwrap() < shown.find("within a group").unwrap(),
+        "{shown}"
+    );
+    assert!(shown.contains("U = ") && shown.contains("(k = "), "{shown}");
+    let page = folder.read("out/report.html");
     assert!(
         page.contains("<svg")
             && page.contains("between parts")
             && !page.contains("http://www.w3.org/1999")
     );
-    let result: Value =
-        serde_json::from_str(&fs::read_to_string(out.join("result.json")).unwrap()).unwrap();
+    let result: Value = serde_json::from_str(&folder.read("out/result.json")).unwrap();
     assert_eq!(result["schema"], "errsep.anova/1");
-    let components = fs::read_to_string(out.join("components.csv")).unwrap();
-    assert_eq!(components.lines().count(), 16);
-    assert_eq!(
-        fs::read_to_string(out.join("parts.csv"))
-            .unwrap()
-            .lines()
-            .count(),
-        1 + 15 * 21
-    );
+    assert_eq!(folder.read("out/components.csv").lines().count(), 16);
+    assert_eq!(folder.read("out/parts.csv").lines().count(), 1 + 15 * 21);
 }
 
 #[test]
 fn simulated_components_are_found() {
-    let folder = TempDir::new().unwrap();
-    let file = folder.path().join("replicates.csv");
     let options = [
         "simulate",
         "anova",
@@ -139,11 +135,15 @@ fn simulated_components_are_found() {
         "2",
         "--within",
         "0.5",
+        "--replicates-of-first-four",
+        "5",
     ];
-    let output = errsep(&[&options[..], &["--replicates-of-first-four", "5"]].concat());
-    assert_eq!(output.status.code(), Some(0));
-    fs::write(&file, &output.stdout).unwrap();
-    let found = answer(&["anova", file.to_str().unwrap(), "--format", "json"]);
+    let output = errsep(&options);
+    assert_eq!(output.status, 0, "{}", output.stderr);
+    let folder = Folder::with(&[("replicates.csv", &output.stdout)]);
+    let output = run(&folder, &["anova", "replicates.csv", "--format", "json"]);
+    assert_eq!(output.status, 0, "{}", output.stderr);
+    let found: Value = serde_json::from_str(&output.stdout).unwrap();
     let analysis = &found["features"][0]["analysis"];
     // k·u: 400 parts give their standard deviation to 3.5 %, 412 repeats theirs to as much.
     near(
@@ -161,12 +161,10 @@ fn simulated_components_are_found() {
 
 #[test]
 fn one_reading_a_part_is_not_identifiable() {
-    let folder = TempDir::new().unwrap();
-    let file = folder.path().join("data.csv");
-    fs::write(&file, "part,value\n1,0.5\n2,0.7\n3,0.1\n").unwrap();
-    let output = errsep(&["anova", file.to_str().unwrap(), "--format", "json"]);
-    assert_eq!(output.status.code(), Some(1));
-    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let folder = Folder::with(&[("data.csv", "part,value\n1,0.5\n2,0.7\n3,0.1\n")]);
+    let output = run(&folder, &["anova", "data.csv", "--format", "json"]);
+    assert_eq!(output.status, 1, "{}", output.stderr);
+    let answer: Value = serde_json::from_str(&output.stdout).unwrap();
     let analysis = &answer["features"][0]["analysis"];
     assert!(analysis["components"]["between"].is_null() && analysis["f"].is_null());
     near(&analysis["mean"]["value"], 13.0 / 30.0, 1e-15);
@@ -174,24 +172,9 @@ fn one_reading_a_part_is_not_identifiable() {
 
 /// A file must be refused with all of these words, a place and a remedy.
 fn refused(data: &str, options: &[&str], told: &[&str]) {
-    let folder = TempDir::new().unwrap();
-    let (file, out) = (folder.path().join("data.csv"), folder.path().join("out"));
-    fs::write(&file, data).unwrap();
-    let mut args = vec![
-        "anova",
-        file.to_str().unwrap(),
-        "--out",
-        out.to_str().unwrap(),
-    ];
-    args.extend(options);
-    let output = errsep(&args);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{data:?}: {message}");
-    assert!(output.stdout.is_empty() && !out.exists(), "{data:?}");
-    for words in told {
-        assert!(message.contains(words), "{words:?} is not in:\n{message}");
-    }
-    assert!(message.contains("help: "), "no remedy in:\n{message}");
+    let folder = Folder::with(&[("data.csv", data)]);
+    let args = [&["anova", "data.csv", "--out", "out"], options].concat();
+    bad_input(&folder, &args, &[told, &["help: "]].concat());
 }
 
 #[test]

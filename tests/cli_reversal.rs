@@ -154,6 +154,10 @@ fn json_is_what_the_documentation_says() {
                 result["tilts"][tilt]["value"].is_f64() && result["tilts"][tilt]["std"].is_f64()
             );
             assert_eq!(result["tilts"][tilt]["unit"], "rad");
+            let expanded = &result["tilts"][tilt]["expanded"];
+            assert!(expanded["coverage_factor"].as_f64().unwrap() > 1.95);
+            assert_eq!(expanded["coverage_probability"], 0.95);
+            assert!(!result["tilts"][tilt]["degrees_of_freedom"].is_null());
         }
         for form in ["M", "M_std", "S_A", "S_A_std", "S_B", "S_B_std"] {
             let length = result["forms"]["x"].as_array().unwrap().len();

@@ -161,6 +161,95 @@ fn noise_found_from_the_readings_widens_the_coverage_factor() {
 }
 
 #[test]
+fn the_way_back_gives_the_reversals() {
+    let folder = Folder::with(&[]);
+    let arguments = [
+        "simulate",
+        "step-diagonal",
+        "--steps",
+        "3",
+        "--backward",
+        "--noise",
+        "0.05",
+    ];
+    let made = json(&folder, &[&arguments[..], &["--format", "json"]].concat());
+    folder.write("back.csv", &run(&folder, &arguments).stdout);
+    let answer = json(&folder, &["step-diagonal", "back.csv", "--format", "json"]);
+    let reversals = answer["reversals"].as_array().unwrap();
+    assert_eq!(reversals.len(), 18);
+    let yaw = reversals.iter().find(|c| c["name"] == "EBY").unwrap();
+    assert_eq!(yaw["determined"], "wholly");
+    for i in 0..4 {
+        let truth = made["truth"]["reversals"]["EBY"][i].as_f64().unwrap();
+        let (value, u) = (&yaw["value"][i], &yaw["expanded_uncertainty"][i]);
+        // k·u: five standard uncertainties and more; the coverage is the library's test.
+        let error = value.as_f64().unwrap() - truth;
+        assert!(error.abs() < 2.5 * u.as_f64().unwrap(), "{i}: {error} {u}");
+    }
+    let motions: Vec<&str> = answer["closed_forms"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|f| f["equation"] == "(35)")
+        .map(|f| f["motion"].as_str().unwrap())
+        .collect();
+    assert_eq!(motions, ["either", "positive", "negative"]);
+    assert!(answer["diagonals"][0]["reversal"]["value"].is_number());
+    command::documented(&answer, "docs/json/step-diagonal.md");
+    let out = run(&folder, &["step-diagonal", "back.csv", "--out", "out"]);
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    assert!(
+        out.stdout.contains("forward less backward"),
+        "{}",
+        out.stdout
+    );
+    assert!(out.stdout.contains("(k = "), "{}", out.stdout);
+    assert!(
+        folder
+            .read("out/report.html")
+            .contains("reversal of rotation of Y about Z")
+    );
+    assert!(folder.read("out/components.csv").contains("EBY reversal"));
+    assert!(folder.read("out/residuals.csv").contains("backward"));
+    bad_input(
+        &Folder::with(&[]),
+        &["simulate", "step-diagonal", "--reversal", "1"],
+        &["--backward"],
+    );
+}
+
+#[test]
+fn a_slope_known_from_few_measurements_widens_what_rests_on_it() {
+    let folder = Folder::with(&[]);
+    folder.write("plane.csv", &run(&folder, &PLANE).stdout);
+    let slope = |degrees: &str| {
+        folder.write(
+            "s.toml",
+            &format!(
+                "[assume]\nzero = [\"ECX\"]\n[[measured]]\naxis = \"X\"\nslope = 0\nstd = 1e-3\n{degrees}"
+            ),
+        );
+        let answer = json(
+            &folder,
+            &[
+                "step-diagonal",
+                "plane.csv",
+                "--setup",
+                "s.toml",
+                "--format",
+                "json",
+            ],
+        );
+        let x = component(&answer, "EXX");
+        let at = |key: &str| x[key][4].as_f64();
+        at("expanded_uncertainty").unwrap() / at("std").unwrap()
+    };
+    // Tolerance: digits in print, GUM table G.2 for 4 and infinitely many degrees of freedom.
+    assert!((slope("degrees_of_freedom = 4\n") - 2.78).abs() < 0.005);
+    assert!((slope("") - 1.96).abs() < 0.005);
+}
+
+#[test]
 fn report_shows_errors_and_ambiguities() {
     let folder = Folder::with(&[]);
     folder.write("plane.csv", &run(&folder, &PLANE).stdout);
@@ -220,6 +309,13 @@ fn bad_readings_are_refused() {
             &[name, expected],
         );
     }
+    let way = "diagonal,sequence,direction,x,y,z,reading\nAG,XYZ,back,0,0,0,0\n";
+    let folder = Folder::with(&[("way.csv", way)]);
+    bad_input(
+        &folder,
+        &["step-diagonal", "way.csv", "--out", "out"],
+        &["way.csv:2:8", "direction \"back\"", "forward or backward"],
+    );
     let folder = Folder::with(&[
         ("d.csv", &format!("{header}{good}")),
         ("zero.toml", "[assume]\nzero = [\"EXQ\"]\n"),

@@ -320,7 +320,9 @@ fn sampled_components_follow_the_law_of_propagation() {
                 .unwrap()
                 .result
                 .standard_uncertainty;
-            let sampler = Sampler::new(&machine, &[a, b], independence, prediction).unwrap();
+            let sampler = Sampler::new(&machine, &[a, b], independence, prediction)
+                .unwrap()
+                .with_known_spreads();
             let sample = sample_features(&sampler, 20_000, 1, 3, |d, out| {
                 out[0] = errsep_models::machine::features::length_of(&(b - a), &(d[1] - d[0]));
             });

@@ -2,9 +2,10 @@
 
 use errsep_models::diagonal::{
     Assumptions, Axis, Component, Determined, Diagonal, DiagonalReading, DiagonalSimulation,
-    ErrorTables, Measured, Sequence, Target, WorkZone, choose_sequences, closed_forms,
+    ErrorTables, Measured, Sequence, Target, Travel, WorkZone, choose_sequences, closed_forms,
     determined_by, identifiability, predicted_reading, regress, simulate,
 };
+use errsep_models::uncertainty::DegreesOfFreedom;
 use nalgebra::Vector3;
 
 fn zone(steps: usize) -> WorkZone {
@@ -153,8 +154,17 @@ fn linear(
                 target,
                 sequence,
                 repeat: 1,
+                travel: Travel::Forward,
                 at,
-                value: predicted_reading(zone, tables, diagonal, target, misaligned, at),
+                value: predicted_reading(
+                    zone,
+                    tables,
+                    diagonal,
+                    target,
+                    misaligned,
+                    at,
+                    Travel::Forward,
+                ),
             });
         }
     }
@@ -249,6 +259,7 @@ fn one_measured_slope_settles_the_other_and_the_mirror_difference() {
             axis: Axis::X,
             slope: truth("EXX") / what.zone.travel[0],
             std: 1e-5,
+            degrees_of_freedom: DegreesOfFreedom::Infinite,
         }],
         ..unsettled
     };
@@ -366,12 +377,14 @@ fn mirror_misalignment_tilts_the_positioning_of_z() {
                     Target::Mirror,
                     mirror,
                     at,
+                    Travel::Forward,
                 );
                 readings.push(DiagonalReading {
                     diagonal,
                     target: Target::Mirror,
                     sequence,
                     repeat: 1,
+                    travel: Travel::Forward,
                     at,
                     value,
                 });

@@ -344,3 +344,28 @@ fn intervals_of_a_small_sample_stay_inside_it() {
     assert!(Sample::new(vec![f64::NAN, 1.0]).is_none());
     assert!(sample.shortest_interval(1.0).is_err());
 }
+
+#[test]
+fn coverage_factors_end_for_any_degrees_of_freedom() {
+    // Effective degrees of freedom take any value; an inversion by Newton's method need not end there.
+    let mut before = f64::INFINITY;
+    for exponent in -20..=600 {
+        let degrees = 10_f64.powf(f64::from(exponent) / 20.0);
+        let k = coverage_factor(0.95, DegreesOfFreedom::Finite(degrees)).unwrap();
+        // Falls towards the normal one; epsilons where it has arrived.
+        assert!(
+            k <= before * (1.0 + 1e-13) && k > 1.959_963,
+            "{degrees} {k}"
+        );
+        before = k;
+        if degrees < 1e4 {
+            // Student's distribution itself, another algorithm: to 1e-9 of the share.
+            let student = statrs::distribution::StudentsT::new(0.0, 1.0, degrees).unwrap();
+            let share = 1.0 - 2.0 * statrs::distribution::ContinuousCDF::sf(&student, k);
+            assert!((share - 0.95).abs() < 1e-9, "{degrees} {share}");
+        }
+    }
+    // Limit.
+    let normal = coverage_factor(0.95, DegreesOfFreedom::Infinite).unwrap();
+    assert!((before / normal - 1.0).abs() < 1e-14, "{before} {normal}");
+}

@@ -5,7 +5,7 @@
 
 use errsep_solvers::regularization::{
     CornerStatus, Decomposition, Family, RegularizationError, Spectrum, discrepancy, gcv, l_curve,
-    periodogram, problems,
+    likelihood, periodogram, problems,
 };
 use nalgebra::DVector;
 use rand::SeedableRng;
@@ -14,9 +14,10 @@ use rand_distr::{Distribution, StandardNormal};
 
 const UNKNOWNS: usize = 64;
 const DRAWS: u64 = 20;
-const RULES: [&str; 5] = [
+const RULES: [&str; 6] = [
     "L-curve",
     "GCV",
+    "likelihood",
     "discrepancy",
     "periodogram",
     "best truncation",
@@ -50,6 +51,7 @@ fn main() -> Result<(), RegularizationError> {
                 let lambdas = [
                     curve.lambda(),
                     Some(gcv(&spectrum)?.point.lambda),
+                    Some(likelihood(&spectrum)?.point.lambda),
                     discrepancy(&spectrum, noise)?.lambda(),
                     Some(periodogram(&spectrum)?.lambda),
                 ];

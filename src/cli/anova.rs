@@ -8,12 +8,13 @@ use errsep_models::anova::recipe::{self, Recipe, Summary};
 use errsep_models::anova::{AnovaError, Group, Groups, OneWay, analyse};
 use serde_json::{Value, json};
 
+use super::quantity::{expanded_words, with_expanded};
 use super::{Answer, CommonArgs};
 use crate::io::replicates::{Replicates, read_replicates};
 use crate::io::units::{per_cent, symbol};
 use crate::io::{CsvTable, Message, Status};
 use crate::report::anova::{FeatureView, page};
-use crate::report::number;
+use crate::report::{budget as budget_block, number};
 
 /// Analysis of variance of replicates: manufacturing against measurement.
 #[derive(Debug, clap::Args)]
@@ -92,7 +93,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         .collect();
     let mut text = format!("Analysis of variance of {}\n", args.replicates.display());
     for one in &analysed {
-        describe(&mut text, one);
+        describe(&mut text, one)?;
     }
     if !open.is_empty() {
         let _ = writeln!(
@@ -117,7 +118,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         json: json!({
             "schema": "errsep.anova/1",
             "confidence": args.confidence,
-            "features": analysed.iter().map(as_json).collect::<Vec<_>>(),
+            "features": analysed.iter().map(as_json).collect::<Result<Vec<_>, _>>()?,
         }),
         tables: vec![components_table(&analysed), parts_table(&analysed)],
         inputs: vec![args.replicates.clone()],
@@ -165,7 +166,7 @@ fn analyse_feature(feature: Replicates, args: &Args) -> Result<Analysed, Message
     })
 }
 
-fn describe(text: &mut String, one: &Analysed) {
+fn describe(text: &mut String, one: &Analysed) -> Result<(), Message> {
     let (r, unit) = (&one.result, symbol(&one.feature.unit));
     let _ = writeln!(
         text,
@@ -175,8 +176,8 @@ fn describe(text: &mut String, one: &Analysed) {
     let mean = number::measured(r.mean.value, Some(r.mean.standard_uncertainty));
     let _ = writeln!(
         text,
-        "  mean              {mean} {unit} (standard uncertainty, {} degrees of freedom)",
-        r.mean.degrees_of_freedom
+        "  mean              {mean} {unit}, {}",
+        expanded_words(&r.mean, r.components.confidence)?
     );
     for (name, component) in [
         ("between parts", &r.components.between),
@@ -212,9 +213,13 @@ fn describe(text: &mut String, one: &Analysed) {
         let u = budget.result.standard_uncertainty;
         let _ = writeln!(
             text,
-            "  a future reading  ± {} {unit} (k = 1)",
-            number::plain(u, 3)
+            "  a future reading  ± {} {unit}, {}",
+            number::plain(u, 3),
+            expanded_words(&budget.result, r.components.confidence)?
         );
+        for line in budget_block::text(budget).lines() {
+            let _ = writeln!(text, "  {line}");
+        }
     }
     if let Some(s) = &one.summary {
         let _ = writeln!(
@@ -227,9 +232,10 @@ fn describe(text: &mut String, one: &Analysed) {
             number::plain(s.future_manufacturing, 4),
         );
     }
+    Ok(())
 }
 
-fn as_json(one: &Analysed) -> Value {
+fn as_json(one: &Analysed) -> Result<Value, Message> {
     let keys: serde_json::Map<String, Value> = one
         .feature
         .keys
@@ -245,17 +251,23 @@ fn as_json(one: &Analysed) -> Value {
                    "std": g.standard_deviation()})
         })
         .collect();
+    let confidence = one.result.components.confidence;
+    let mut analysis = json!(one.result);
+    analysis["mean"] = with_expanded(&one.result.mean, confidence)?;
+    if let Some(budget) = &one.result.future_reading {
+        analysis["future_reading"]["result"] = with_expanded(&budget.result, confidence)?;
+    }
     let mut value = json!({
         "name": one.feature.name,
         "keys": keys,
         "unit": one.feature.unit,
-        "analysis": one.result,
+        "analysis": analysis,
         "parts": parts,
     });
     if let (Value::Object(object), Some(summary)) = (&mut value, &one.summary) {
         object.insert("nistir6868".to_owned(), json!(summary));
     }
-    value
+    Ok(value)
 }
 
 fn components_table(analysed: &[Analysed]) -> CsvTable {

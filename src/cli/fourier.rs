@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use errsep_models::fourier::{
     Combination, FourierError, Scan, Section, Separation, separate, straightness,
 };
+use errsep_models::uncertainty::coverage_factor;
 use serde_json::{Value, json};
 
-use super::quantity::coverage_json;
+use super::quantity::{COVERAGE, coverage_json, coverage_words, unexpandable};
 use super::{Answer, CommonArgs};
 use crate::io::fourier::{FourierSetup, read_scans};
 use crate::io::{CsvTable, Message, Status};
@@ -115,7 +116,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         .join(", ");
     let straight = straightness(&answer.x, &answer.workpiece);
     Ok(Answer {
-        text: in_words(&name, &scans, &answer, &methods, &straight),
+        text: in_words(&name, &scans, &answer, &methods, &straight)?,
         json: as_json(&scans, section, &answer, &methods, &straight, &setup)?,
         page: page(&FourierView {
             data: &name,
@@ -184,7 +185,7 @@ fn in_words(
     s: &Separation,
     methods: &[(String, f64)],
     straight: &[f64],
-) -> String {
+) -> Result<String, Message> {
     let mut text = format!("Fourier separation of {name} ({} scans)\n", scans.len());
     let _ = writeln!(
         text,
@@ -202,6 +203,17 @@ fn in_words(
         number::plain(s.noise.0, 3),
         noise_words(s)
     );
+    if let Some(degrees) = s.degrees_of_freedom {
+        let greatest = s.workpiece_std.iter().copied().fold(0.0, f64::max);
+        let k = coverage_factor(COVERAGE, degrees).map_err(unexpandable)?;
+        let _ = writeln!(
+            text,
+            "  a point of the profile         u up to {} µm, U = {} µm: {}",
+            number::plain(greatest, 3),
+            number::plain(k * greatest, 2),
+            coverage_words(degrees)?
+        );
+    }
     for (what, value) in [
         ("height difference P2 - P3", s.height_difference),
         ("rise over the section", s.rise),
@@ -237,7 +249,7 @@ fn in_words(
             list(&s.lost)
         );
     }
-    text
+    Ok(text)
 }
 
 fn list(orders: &[usize]) -> String {

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use errsep_models::diagonal::{Component, Diagonal, DiagonalReading, Sequence, Target, WorkZone};
+use errsep_models::diagonal::{
+    Component, Diagonal, DiagonalReading, Sequence, Target, Travel, WorkZone,
+};
+use errsep_models::uncertainty::DegreesOfFreedom;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -53,6 +56,8 @@ pub struct MeasuredSetup {
     pub slope: f64,
     /// Its standard uncertainty, µm/mm.
     pub std: f64,
+    /// How well that is known; absent: infinite.
+    pub degrees_of_freedom: Option<DegreesOfFreedom>,
 }
 
 impl DiagonalSetup {
@@ -79,7 +84,7 @@ impl DiagonalSetup {
 }
 
 /// Reads the readings: columns `diagonal`, `sequence`, `x`, `y`, `reading`, and where they apply `z`,
-/// `repeat` and `target`; the work zone is the box that the positions fill.
+/// `repeat`, `direction` and `target`; the work zone is the box that the positions fill.
 ///
 /// # Errors
 /// The table cannot be read, a name is unknown, or the positions make no grid.
@@ -89,7 +94,15 @@ pub fn read_readings(
 ) -> Result<(WorkZone, Vec<DiagonalReading>), Message> {
     let mut table = TableReader::open(path)?;
     table.only(&[
-        "diagonal", "sequence", "target", "repeat", "x", "y", "z", "reading",
+        "diagonal",
+        "sequence",
+        "target",
+        "repeat",
+        "direction",
+        "x",
+        "y",
+        "z",
+        "reading",
     ])?;
     let diagonal = table.column("diagonal")?;
     let sequence = table.column("sequence")?;
@@ -97,6 +110,7 @@ pub fn read_readings(
     let reading = table.column("reading")?;
     let (z, repeat) = (table.optional("z"), table.optional("repeat"));
     let own_target = table.optional("target");
+    let direction = table.optional("direction");
     let mut rows = Vec::new();
     while let Some(row) = table.next_row()? {
         let unknown = |column, what: &str, known: &[&str]| {
@@ -125,6 +139,11 @@ pub fn read_readings(
             },
             None => target.unwrap_or(Target::Mirror),
         };
+        let travel = match &direction {
+            Some(column) => Travel::from_name(row.text(column))
+                .ok_or_else(|| unknown(column, "direction", &Travel::ALL.map(Travel::name)))?,
+            None => Travel::Forward,
+        };
         let position = [
             row.number(&x)?,
             row.number(&y)?,
@@ -132,7 +151,16 @@ pub fn read_readings(
         ];
         let number = repeat.as_ref().map_or(Ok(1), |c| row.count(c))?;
         let value = row.number(&reading)?;
-        rows.push((row.line(), position, along, on_tool, order, number, value));
+        let read = DiagonalReading {
+            diagonal: along,
+            target: on_tool,
+            sequence: order,
+            repeat: number,
+            travel,
+            at: [0; 3],
+            value,
+        };
+        rows.push((row.line(), position, read));
     }
     if rows.is_empty() {
         return Err(table.no_rows());
@@ -154,8 +182,7 @@ pub fn read_readings(
     }
     let zone = WorkZone { travel, steps };
     let mut readings = Vec::with_capacity(rows.len());
-    for (line, position, diagonal, target, sequence, repeat, value) in rows {
-        let mut at = [0; 3];
+    for (line, position, mut reading) in rows {
         for a in 0..3 {
             if travel[a] > 0.0 {
                 let place = (position[a] - least[a]) / travel[a] * steps as f64;
@@ -171,17 +198,10 @@ pub fn read_readings(
                         )
                         .remedy("use the same number of even steps on every axis"));
                 }
-                at[a] = place.round() as usize;
+                reading.at[a] = place.round() as usize;
             }
         }
-        readings.push(DiagonalReading {
-            diagonal,
-            target,
-            sequence,
-            repeat,
-            at,
-            value,
-        });
+        readings.push(reading);
     }
     Ok((zone, readings))
 }

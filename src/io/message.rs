@@ -210,6 +210,13 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, k)| k)
 }
 
+/// The known names, the nearest to a misspelt one first; names equally near keep their order.
+pub fn nearest_first<'a>(name: &str, mut known: Vec<&'a str>) -> Vec<&'a str> {
+    let lower = name.to_lowercase();
+    known.sort_by_cached_key(|k| strsim::damerau_levenshtein(&lower, &k.to_lowercase()));
+    known
+}
+
 /// A list of names for a message: `a, b or c`.
 pub fn list(names: &[&str]) -> String {
     match names {

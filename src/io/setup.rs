@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
-use super::message::{Message, Place, nearest};
+use super::message::{Message, Place, list, nearest, nearest_first};
 
 /// A set-up file as read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,12 +46,17 @@ impl SetupFile {
             let message = e.message();
             match unknown_name(message) {
                 Some((kind, key, known)) => {
-                    let remedy = match nearest(key, known.iter().copied()) {
-                        Some(near) => {
+                    let known = nearest_first(key, known);
+                    let remedy = match (kind, nearest(key, known.iter().copied())) {
+                        ("value", Some(near)) => {
+                            format!("did you mean `{near}`? Write {}", list(&known))
+                        }
+                        ("value", None) => format!("write {}", list(&known)),
+                        (_, Some(near)) => {
                             format!("did you mean `{near}`? Known here: {}", known.join(", "))
                         }
-                        None if known.is_empty() => "remove it: nothing is known here".to_owned(),
-                        None => format!("remove it; known here: {}", known.join(", ")),
+                        _ if known.is_empty() => "remove it: nothing is known here".to_owned(),
+                        _ => format!("remove it; known here: {}", known.join(", ")),
                     };
                     self.bad(span, format!("unknown {kind} `{key}`"), remedy)
                 }

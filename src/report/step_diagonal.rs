@@ -1,9 +1,11 @@
 //! The page of diagonal and step-diagonal tests.
 
 use errsep_models::diagonal::{
-    ClosedForm, Component, ComponentEstimate, Determined, DiagonalTotals, SequenceChoice,
+    ClosedForm, Component, ComponentEstimate, Determined, DiagonalTotals, Motion, SequenceChoice,
     StepDiagonalFit, Total,
 };
+
+use errsep_models::uncertainty::coverage_factor;
 
 use super::plot::{Axis, Chart, Mark, Series};
 use super::{Cell, Figure, Page, Section, Standing, Table, number};
@@ -47,6 +49,7 @@ pub fn page(view: &StepDiagonalView) -> Page {
         .summary(standing, sentence)
         .section(determined(view))
         .section(profiles(view))
+        .section(reversals(view))
         .section(closed(view))
         .section(choices(view))
 }
@@ -109,7 +112,44 @@ fn profiles(view: &StepDiagonalView) -> Section {
         .iter()
         .filter(|c| matches!(c.determined, Determined::Wholly | Determined::ShapeOnly))
         .fold(Section::new("Error functions"), |section, c| {
-            section.figure(profile(c))
+            section.figure(profile(c, ""))
+        })
+}
+
+/// How far the way back determines the reversal of each error.
+fn reversals(view: &StepDiagonalView) -> Section {
+    let mut section = Section::new("Reversal");
+    if view.fit.reversals.is_empty() {
+        return section;
+    }
+    let mut table = Table::new(
+        "Reversal of the 18 error functions: arrived in the positive sense of the axis less in the negative",
+        ["name", "error", "determined"],
+    );
+    for c in &view.fit.reversals {
+        table = table.row([
+            c.component.name().into(),
+            c.component.words().into(),
+            c.determined.words().into(),
+        ]);
+    }
+    section = section.table(table);
+    if !view.totals.reversals.is_empty() {
+        let mut table = Table::new(
+            "Whole diagonals, forward less backward",
+            ["diagonal", "reversal (µm)"],
+        );
+        for (diagonal, value) in &view.totals.reversals {
+            table = table.row([diagonal.name().into(), Cell::number(*value)]);
+        }
+        section = section.table(table);
+    }
+    view.fit
+        .reversals
+        .iter()
+        .filter(|c| matches!(c.determined, Determined::Wholly | Determined::ChangesOnly))
+        .fold(section, |section, c| {
+            section.figure(profile(c, "reversal of "))
         })
 }
 
@@ -121,19 +161,24 @@ fn unit(component: Component) -> (f64, &'static str) {
     }
 }
 
-fn profile(c: &ComponentEstimate) -> Figure {
+fn profile(c: &ComponentEstimate, what: &str) -> Figure {
     let (factor, unit) = unit(c.component);
     let values = c.values.iter().map(|v| factor * v).collect();
     let mut series = Series::line(c.component.name(), c.positions.clone(), values).mark(Mark::Dot);
     if !c.std.is_empty() {
-        series = series.half_band(c.std.iter().map(|u| 1.96 * factor * u).collect());
+        let expanded = c.std.iter().zip(&c.degrees_of_freedom).map(|(u, degrees)| {
+            // Degrees of freedom of an estimate are positive, so that they have a coverage factor.
+            coverage_factor(0.95, *degrees).map_or(f64::NAN, |k| k * factor * u)
+        });
+        series = series.half_band(expanded.collect());
     }
     let caption = match c.determined {
+        Determined::ChangesOnly => "From its first value: the constant is not determined.",
         Determined::ShapeOnly => "From the line through its ends: the slope is not determined.",
-        _ => "With the 95 % band of the reading noise.",
+        _ => "With its expanded uncertainty (95 %) as a band.",
     };
     Figure::new(
-        format!("{}: {}", c.component.name(), c.component.words()),
+        format!("{}: {what}{}", c.component.name(), c.component.words()),
         caption,
         Chart::new(
             Axis::new(format!("position of {}", c.component.axis.letter()), "mm"),
@@ -150,7 +195,8 @@ fn closed(view: &StepDiagonalView) -> Section {
         ["equation", "stands for", "total", "unit"],
     );
     let mut any = false;
-    for form in view.forms {
+    let both = view.forms.iter().filter(|f| f.motion == Motion::Either);
+    for form in both {
         if let (Some(component), Some(total)) = (form.component, form.profile.last()) {
             let (factor, unit) = unit(component);
             table = table.row([

@@ -2,9 +2,9 @@
 //! (11).
 
 use super::components::{Component, Location};
-use super::diagonals::{Diagonal, Sequence, Target, WorkZone};
+use super::diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
 use super::estimators::{ESTIMATORS, Estimator, Scale, cell};
-use super::readings::{DiagonalError, DiagonalReading, Edges, check};
+use super::readings::{DiagonalError, DiagonalReading, Edges, Motion, check};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -15,6 +15,8 @@ pub struct ClosedForm {
     pub equation: String,
     /// Target of the readings used.
     pub target: Target,
+    /// Sense of the motions used. One sense alone gives the unidirectional error.
+    pub motion: Motion,
     /// The error that it stands for if angular errors and mirror misalignment vanish.
     pub component: Option<Component>,
     /// Value at each step i, µm or rad.
@@ -27,7 +29,9 @@ pub struct ClosedForm {
     pub profile_gains: Vec<f64>,
 }
 
-/// Every estimator for which all edges were measured, in the order of [`ESTIMATORS`].
+/// Every estimator for which all edges were measured, in the order of [`ESTIMATORS`]. Where the
+/// diagonals were also run backward, once more for each sense of the moving axis: AC forward and DB
+/// backward, for instance, both move Y in its positive sense.
 ///
 /// # Errors
 /// What [`DiagonalError`] lists for readings that cannot be placed.
@@ -37,14 +41,22 @@ pub fn closed_forms(
 ) -> Result<Vec<ClosedForm>, DiagonalError> {
     check(zone, readings)?;
     let edges = Edges::of(readings);
-    Ok(ESTIMATORS
+    let back = readings.iter().any(|r| r.travel == Travel::Backward);
+    let motions = if back {
+        &[Motion::Either, Motion::Positive, Motion::Negative][..]
+    } else {
+        &[Motion::Either]
+    };
+    Ok(motions
         .iter()
-        .filter_map(|e| apply(e, zone, readings, &edges))
+        .flat_map(|&motion| ESTIMATORS.iter().map(move |e| (e, motion)))
+        .filter_map(|(e, motion)| apply(e, motion, zone, readings, &edges))
         .collect())
 }
 
 fn apply(
     estimator: &Estimator,
+    motion: Motion,
     zone: &WorkZone,
     readings: &[DiagonalReading],
     edges: &Edges,
@@ -53,6 +65,7 @@ fn apply(
     let mut form = ClosedForm {
         equation: estimator.equation.to_owned(),
         target: estimator.target,
+        motion,
         component: estimator.component(),
         steps: Vec::new(),
         step_gains: Vec::new(),
@@ -65,8 +78,8 @@ fn apply(
         for (corners, pattern, sign) in estimator.terms {
             let (diagonal, index) = cell(pattern, i, zone.steps)?;
             let mut letters = corners.chars();
-            let (from, to) = (letters.next()?, letters.next()?);
-            for (reading, w) in edges.weights(diagonal, estimator.target, index, from, to)? {
+            let ends = (letters.next()?, letters.next()?);
+            for (reading, w) in edges.weights(diagonal, estimator.target, index, ends, motion)? {
                 *weights.entry(reading).or_default() += sign * w / divisor;
             }
         }
@@ -115,8 +128,10 @@ pub struct TotalsEstimate {
 /// over the runs.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct DiagonalTotals {
-    /// By diagonal: dD and the number of runs.
+    /// By diagonal: dD and the number of runs, each travel of a run for itself.
     pub errors: BTreeMap<Diagonal, (f64, usize)>,
+    /// By diagonal that was also run backward: forward less backward, the mean over its stops, µm.
+    pub reversals: BTreeMap<Diagonal, f64>,
     /// What they give.
     pub estimates: Vec<TotalsEstimate>,
 }
@@ -134,7 +149,7 @@ pub fn totals(
     let mut runs: BTreeMap<_, (Option<f64>, Option<f64>)> = BTreeMap::new();
     for r in readings {
         let stops = zone.stops(r.diagonal, Sequence::Together);
-        let ends = runs.entry(r.run()).or_default();
+        let ends = runs.entry((r.run(), r.travel)).or_default();
         if stops.first() == Some(&r.at) {
             ends.0 = Some(r.value);
         }
@@ -143,7 +158,7 @@ pub fn totals(
         }
     }
     let mut errors: BTreeMap<Diagonal, (f64, usize)> = BTreeMap::new();
-    for ((diagonal, ..), ends) in runs {
+    for (((diagonal, ..), _), ends) in runs {
         if let (Some(first), Some(last)) = ends {
             let entry = errors.entry(diagonal).or_default();
             entry.0 += last - first;
@@ -188,5 +203,32 @@ pub fn totals(
             gain: std::f64::consts::SQRT_2 / divisor.abs(),
         });
     }
-    Ok(DiagonalTotals { errors, estimates })
+    Ok(DiagonalTotals {
+        errors,
+        reversals: reversals(zone, readings),
+        estimates,
+    })
+}
+
+/// Forward less backward, the mean over the stops of each diagonal that were reached both ways.
+fn reversals(zone: &WorkZone, readings: &[DiagonalReading]) -> BTreeMap<Diagonal, f64> {
+    let mut pairs: BTreeMap<_, [Option<f64>; 2]> = BTreeMap::new();
+    for r in readings {
+        if zone.stops(r.diagonal, Sequence::Together).contains(&r.at) {
+            let pair = pairs.entry((r.run(), r.at)).or_default();
+            pair[usize::from(r.travel == Travel::Backward)] = Some(r.value);
+        }
+    }
+    let mut means: BTreeMap<Diagonal, (f64, f64)> = BTreeMap::new();
+    for (((diagonal, ..), _), pair) in pairs {
+        if let [Some(forward), Some(backward)] = pair {
+            let mean = means.entry(diagonal).or_default();
+            mean.0 += forward - backward;
+            mean.1 += 1.0;
+        }
+    }
+    means
+        .into_iter()
+        .map(|(diagonal, (sum, count))| (diagonal, sum / count))
+        .collect()
 }

@@ -1,7 +1,7 @@
 //! The design matrix of a set of readings, its rank and its null space.
 
 use super::components::{Axis, Component, NodeKind};
-use super::diagonals::{Diagonal, Sequence, Target, WorkZone};
+use super::diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
 use super::prediction::{Parameter, Unknowns, sensitivities};
 use super::readings::{DiagonalError, DiagonalReading, Run};
 use nalgebra::{DMatrix, DVector};
@@ -13,6 +13,23 @@ const RANK_TOLERANCE: f64 = 1e-9;
 
 /// µm that a rotation of 1 rad makes at a lever of 1 mm.
 const UM_PER_RAD_MM: f64 = 1e3;
+
+/// What is tabulated over the positions of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Function {
+    /// The mean of both senses of travel.
+    Error(Component),
+    /// The positive less the negative sense.
+    Reversal(Component),
+}
+
+impl Function {
+    pub(super) const fn component(self) -> Component {
+        match self {
+            Self::Error(component) | Self::Reversal(component) => component,
+        }
+    }
+}
 
 /// A design: rows of readings freed from the zero of their run, columns scaled to µm.
 #[derive(Debug, Clone)]
@@ -50,8 +67,8 @@ impl Design {
         let mut known = BTreeMap::new();
         for r in readings {
             known
-                .entry((r.diagonal, r.target, r.at))
-                .or_insert_with(|| sensitivities(zone, r.diagonal, r.target, r.at));
+                .entry((r.diagonal, r.target, r.at, r.travel))
+                .or_insert_with(|| sensitivities(zone, r.diagonal, r.target, r.at, r.travel));
         }
         // An axis that stands still adds a constant rotation of the tool, which is mirror misalignment
         // under another name.
@@ -61,11 +78,17 @@ impl Design {
                 .any(|r| r.diagonal.signs()[axis.index()] != 0)
         };
         let moving = Axis::ALL.map(moves);
+        // Without a way back the usual analysis, which takes no axis to depend on its sense of travel.
+        let back = readings.iter().any(|r| r.travel == Travel::Backward);
         let touched: BTreeSet<Parameter> = known
             .values()
             .flatten()
             .map(|t| t.0)
-            .filter(|p| !matches!(p, Parameter::Node(c, _) if !moving[c.axis.index()]))
+            .filter(|p| match p {
+                Parameter::Node(c, _) => moving[c.axis.index()],
+                Parameter::Reversal(..) => back,
+                Parameter::Squareness(_) | Parameter::Mirror(..) => true,
+            })
             .filter(|&p| keep(p))
             .collect();
         let unknowns = Unknowns::of(touched);
@@ -73,7 +96,7 @@ impl Design {
         let scale = DVector::from_iterator(
             unknowns.parameters.len(),
             unknowns.parameters.iter().map(|p| match p {
-                Parameter::Node(c, _) if !c.rotation => 1.0,
+                Parameter::Node(c, _) | Parameter::Reversal(c, _) if !c.rotation => 1.0,
                 _ => 1.0 / (UM_PER_RAD_MM * diagonal),
             }),
         );
@@ -87,7 +110,7 @@ impl Design {
         let mut matrix = DMatrix::zeros(readings.len(), unknowns.parameters.len());
         for (row, r) in readings.iter().enumerate() {
             for (parameter, value) in known
-                .get(&(r.diagonal, r.target, r.at))
+                .get(&(r.diagonal, r.target, r.at, r.travel))
                 .into_iter()
                 .flatten()
             {
@@ -217,6 +240,7 @@ pub(super) fn blank_readings(
                     target,
                     sequence,
                     repeat: 1,
+                    travel: Travel::Forward,
                     at,
                     value: 0.0,
                 })
@@ -224,14 +248,17 @@ pub(super) fn blank_readings(
         .collect()
 }
 
-/// Places of the free nodes of a component, in order of their grid index.
-pub(super) fn nodes_of(unknowns: &Unknowns, component: Component) -> Vec<(usize, usize)> {
+/// Places of the free nodes of a function, in order of their grid index.
+pub(super) fn nodes_of(unknowns: &Unknowns, function: Function) -> Vec<(usize, usize)> {
     unknowns
         .parameters
         .iter()
         .enumerate()
         .filter_map(|(place, p)| match p {
-            Parameter::Node(c, index) if *c == component => Some((place, *index)),
+            Parameter::Node(c, index) if Function::Error(*c) == function => Some((place, *index)),
+            Parameter::Reversal(c, index) if Function::Reversal(*c) == function => {
+                Some((place, *index))
+            }
             _ => None,
         })
         .collect()

@@ -2,7 +2,7 @@
 //! measurement would settle it.
 
 use super::components::{Axis, Component, Location, NodeKind};
-use super::design::nodes_of;
+use super::design::{Function, nodes_of};
 use super::prediction::{Parameter, Unknowns};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
@@ -19,6 +19,8 @@ pub enum Determined {
     Wholly,
     /// All but a straight line.
     ShapeOnly,
+    /// All but a constant: its changes along the axis.
+    ChangesOnly,
     /// Some combinations of its values.
     Partly,
     /// No combination of its own values.
@@ -33,6 +35,7 @@ impl Determined {
         match self {
             Self::Wholly => "determined",
             Self::ShapeOnly => "shape only, slope not",
+            Self::ChangesOnly => "changes only, constant not",
             Self::Partly => "in part",
             Self::Nothing => "not determined",
             Self::NotTouched => "not touched by the readings",
@@ -63,6 +66,10 @@ enum Part {
     Whole,
     Slope,
     Shape,
+    /// The constant of a reversal.
+    Constant,
+    /// The rest of it.
+    Changes,
 }
 
 /// A group of parameters that people name as one thing.
@@ -83,8 +90,8 @@ impl Block {
         let along = DMatrix::from_columns(std::slice::from_ref(&self.line));
         match self.part {
             Part::Whole => own,
-            Part::Slope => along.tr_mul(&own),
-            Part::Shape => &own - &along * along.tr_mul(&own),
+            Part::Slope | Part::Constant => along.tr_mul(&own),
+            Part::Shape | Part::Changes => &own - &along * along.tr_mul(&own),
         }
     }
 
@@ -107,9 +114,10 @@ fn blocks(unknowns: &Unknowns) -> Vec<Block> {
         }
     };
     for component in Component::all() {
-        let nodes = nodes_of(unknowns, component);
+        let function = Function::Error(component);
+        let nodes = nodes_of(unknowns, function);
         let rows: Vec<usize> = nodes.iter().map(|n| n.0).collect();
-        let line = line_of(&nodes);
+        let line = open_shape(function, &nodes);
         match component.kind() {
             NodeKind::Angular => add(component.words(), rows, line, Part::Whole, 0),
             NodeKind::Straightness => add(component.words(), rows, line, Part::Whole, 1),
@@ -142,6 +150,27 @@ fn blocks(unknowns: &Unknowns) -> Vec<Block> {
             3,
         );
     }
+    for component in Component::all() {
+        let function = Function::Reversal(component);
+        let nodes = nodes_of(unknowns, function);
+        let rows: Vec<usize> = nodes.iter().map(|n| n.0).collect();
+        let constant = open_shape(function, &nodes);
+        let words = component.words();
+        add(
+            format!("changes of the reversal in the {words}"),
+            rows.clone(),
+            constant.clone(),
+            Part::Changes,
+            1,
+        );
+        add(
+            format!("mean reversal in the {words}"),
+            rows,
+            constant,
+            Part::Constant,
+            1,
+        );
+    }
     let mirrors: Vec<usize> = unknowns
         .parameters
         .iter()
@@ -160,11 +189,16 @@ fn blocks(unknowns: &Unknowns) -> Vec<Block> {
     found
 }
 
-/// Unit vector of a straight line through zero at the origin over the free nodes.
-pub(super) fn line_of(nodes: &[(usize, usize)]) -> DVector<f64> {
-    let line = DVector::from_iterator(nodes.len(), nodes.iter().map(|n| n.1 as f64));
-    let length = line.norm();
-    if length > 0.0 { line / length } else { line }
+/// Unit vector over the free nodes of what tests of this kind leave open most easily: a straight line
+/// through zero at the origin of an error, a constant of a reversal.
+pub(super) fn open_shape(function: Function, nodes: &[(usize, usize)]) -> DVector<f64> {
+    let height = |node: &(usize, usize)| match function {
+        Function::Error(_) => node.1 as f64,
+        Function::Reversal(_) => 1.0,
+    };
+    let shape = DVector::from_iterator(nodes.len(), nodes.iter().map(height));
+    let length = shape.norm();
+    if length > 0.0 { shape / length } else { shape }
 }
 
 /// The part of a null basis that leaves a block alone.
@@ -188,14 +222,14 @@ fn without(basis: &DMatrix<f64>, block: &Block) -> DMatrix<f64> {
     }
 }
 
-/// How far one component is determined, and an orthonormal basis (free nodes × lost) of the
+/// How far one function is determined, and an orthonormal basis (free nodes × lost) of the
 /// combinations of its own values that are not.
 pub(super) fn determination(
     unknowns: &Unknowns,
     null: &DMatrix<f64>,
-    component: Component,
+    function: Function,
 ) -> (Determined, DMatrix<f64>) {
-    let nodes = nodes_of(unknowns, component);
+    let nodes = nodes_of(unknowns, function);
     let rows: Vec<usize> = nodes.iter().map(|n| n.0).collect();
     if rows.is_empty() {
         return (Determined::NotTouched, DMatrix::zeros(0, 0));
@@ -209,12 +243,11 @@ pub(super) fn determination(
     let determined = match &lost[..] {
         [] => Determined::Wholly,
         all if all.len() == rows.len() => Determined::Nothing,
-        [only]
-            if component.kind() != NodeKind::Straightness
-                && only.dot(&line_of(&nodes)).abs() > 1.0 - 1e-6 =>
-        {
-            Determined::ShapeOnly
-        }
+        [only] if only.dot(&open_shape(function, &nodes)).abs() > 1.0 - 1e-6 => match function {
+            Function::Reversal(_) => Determined::ChangesOnly,
+            Function::Error(c) if c.kind() != NodeKind::Straightness => Determined::ShapeOnly,
+            Function::Error(_) => Determined::Partly,
+        },
         _ => Determined::Partly,
     };
     let lost = if lost.is_empty() {
@@ -232,7 +265,11 @@ pub(super) fn ambiguities(unknowns: &Unknowns, null: &DMatrix<f64>) -> Vec<Ambig
     order.sort_by_key(|&b| all[b].rank);
     let mut found: Vec<(Vec<usize>, Ambiguity)> = Vec::new();
     for &subject in order.iter().rev() {
-        if !all[subject].moved_by(null) {
+        // Reversals say for themselves how far they are determined; they may take part here, where the
+        // way back was not measured on every diagonal.
+        if matches!(all[subject].part, Part::Constant | Part::Changes)
+            || !all[subject].moved_by(null)
+        {
             continue;
         }
         let mut basis = null.clone();

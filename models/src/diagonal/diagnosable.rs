@@ -10,7 +10,7 @@ use super::design::{Design, is_definition};
 use super::effects;
 use super::prediction::{Parameter, sensitivities};
 use super::readings::{DiagonalError, DiagonalReading, check};
-use super::{Component, Diagonal, Sequence, Target, WorkZone};
+use super::{Component, Diagonal, Sequence, Target, Travel, WorkZone};
 use crate::model::{Effect, FittedModel, Freedom, Place};
 
 /// Readings whose laser was on one diagonal with one target, in one order of motions.
@@ -53,29 +53,31 @@ impl DiagonalRuns {
             .collect();
         channels.sort_unstable();
         channels.dedup();
-        let mut runs: BTreeMap<(usize, u32), Vec<(f64, usize)>> = BTreeMap::new();
+        let mut runs: BTreeMap<(usize, u32, Travel), Vec<(f64, usize)>> = BTreeMap::new();
         for (order, r) in readings.iter().enumerate() {
             let channel = channels.partition_point(|c| *c < (r.diagonal, r.target, r.sequence));
             let from_start = zone.position(r.at) - r.diagonal.start(zone);
             let along = r.diagonal.direction(zone).dot(&from_start);
-            runs.entry((channel, r.repeat))
+            runs.entry((channel, r.repeat, r.travel))
                 .or_default()
                 .push((along, order));
         }
         let (mut places, mut traces, mut ordered) = (Vec::new(), Vec::new(), Vec::new());
         let mut cells = BTreeMap::new();
-        for ((channel, repeat), mut run) in runs {
+        for ((channel, repeat, travel), mut run) in runs {
             run.sort_by(|a, b| a.0.total_cmp(&b.0));
             let start = places.len();
             for (along, order) in run {
                 let next = cells.len();
-                let cell = *cells.entry((channel, readings[order].at)).or_insert(next);
+                let cell = *cells
+                    .entry((channel, readings[order].at, travel))
+                    .or_insert(next);
                 places.push(Place {
                     channel,
                     x: along,
                     time: order as f64,
                     repeat,
-                    direction: 1.0,
+                    direction: f64::from(travel.sign()),
                     cell,
                 });
                 ordered.push(readings[order]);
@@ -84,7 +86,8 @@ impl DiagonalRuns {
         }
         let design = Design::of(zone, &ordered, |p| {
             !is_definition(p, zone.steps)
-                && !matches!(p, Parameter::Node(c, _) if zero.contains(&c))
+                && !matches!(p, Parameter::Node(c, _) | Parameter::Reversal(c, _)
+                    if zero.contains(&c))
         });
         let unknowns = design.matrix.ncols();
         let mut columns = design
@@ -102,7 +105,7 @@ impl DiagonalRuns {
             terms: Arc::new(
                 ordered
                     .iter()
-                    .map(|r| sensitivities(zone, r.diagonal, r.target, r.at))
+                    .map(|r| sensitivities(zone, r.diagonal, r.target, r.at, r.travel))
                     .collect(),
             ),
             observed: DVector::from_iterator(ordered.len(), ordered.iter().map(|r| r.value)),

@@ -83,6 +83,11 @@ impl Diagonal {
         self.signs()[2] != 0
     }
 
+    /// Sense in which each axis approaches its stops on this travel: +1, −1, or 0 where it stands still.
+    pub fn approach(self, travel: Travel) -> [i8; 3] {
+        self.signs().map(|s| s * travel.sign())
+    }
+
     /// First corner, mm.
     pub fn start(self, zone: &WorkZone) -> Vector3<f64> {
         let signs = self.signs();
@@ -104,6 +109,45 @@ impl Diagonal {
             vec![horizontal, n.cross(&horizontal)]
         } else {
             vec![Vector3::z()]
+        }
+    }
+}
+
+/// Sense of travel along a diagonal.
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Travel {
+    /// Away from the laser.
+    #[default]
+    Forward,
+    /// Back to it, in the same run: the laser is not zeroed at the turn.
+    Backward,
+}
+
+impl Travel {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Forward, Self::Backward];
+
+    /// Name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Forward => "forward",
+            Self::Backward => "backward",
+        }
+    }
+
+    /// The travel of a name in a file.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|t| t.name() == name)
+    }
+
+    /// +1 forward, −1 backward.
+    pub const fn sign(self) -> i8 {
+        match self {
+            Self::Forward => 1,
+            Self::Backward => -1,
         }
     }
 }

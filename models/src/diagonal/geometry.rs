@@ -2,7 +2,7 @@
 //! folded by the retro-reflector. Shares nothing with the linear prediction but the sign conventions.
 
 use super::components::{Axis, Location};
-use super::diagonals::{Diagonal, Target, WorkZone};
+use super::diagonals::{Diagonal, Target, Travel, WorkZone};
 use super::errors::ErrorTables;
 use nalgebra::{Rotation3, Vector3};
 
@@ -10,7 +10,8 @@ use nalgebra::{Rotation3, Vector3};
 const UM: f64 = 1e3;
 
 /// Error of the displacement read at grid indices `at`, µm, relative to the start of the diagonal,
-/// with the mirror of this set-up misaligned by `mirror` (rotation vector, rad).
+/// with the mirror of this set-up misaligned by `mirror` (rotation vector, rad). The start is left, and
+/// on the way forward every stop reached, in the forward sense.
 pub fn exact_reading(
     zone: &WorkZone,
     errors: &ErrorTables,
@@ -18,19 +19,20 @@ pub fn exact_reading(
     target: Target,
     mirror: Vector3<f64>,
     at: [usize; 3],
+    travel: Travel,
 ) -> f64 {
     let n = diagonal.direction(zone);
     let laser = diagonal.start(zone);
     let start = zone.stops(diagonal, super::Sequence::Together)[0];
-    let displacement = |index: [usize; 3]| {
-        let (tool, orientation) = pose(zone, errors, index);
+    let displacement = |index: [usize; 3], travel: Travel| {
+        let (tool, orientation) = pose(zone, errors, index, diagonal.approach(travel));
         match target {
             Target::Mirror => to_mirror(laser, n, tool, orientation, mirror),
             Target::RetroReflector => folded(laser, n, tool, mirror),
         }
     };
     let nominal = n.dot(&(zone.position(at) - zone.position(start)));
-    UM * (displacement(at) - displacement(start) - nominal)
+    UM * (displacement(at, travel) - displacement(start, Travel::Forward) - nominal)
 }
 
 /// Position of the tool, mm, and orientation: X carries Y carries Z carries the tool, each rotation
@@ -39,6 +41,7 @@ fn pose(
     zone: &WorkZone,
     errors: &ErrorTables,
     index: [usize; 3],
+    approach: [i8; 3],
 ) -> (Vector3<f64>, Rotation3<f64>) {
     let nominal = zone.position(index);
     let [xy, xz, yz] = Location::ALL.map(|l| errors.squareness_of(l));
@@ -51,9 +54,10 @@ fn pose(
     let mut orientation = Rotation3::identity();
     for axis in Axis::ALL {
         let a = axis.index();
-        let moved = along[a] * nominal[a] + errors.vector(axis, false, index[a]) / UM;
+        let moved = along[a] * nominal[a] + errors.vector(axis, false, index[a], approach[a]) / UM;
         tool += orientation * moved;
-        orientation *= Rotation3::from_scaled_axis(errors.vector(axis, true, index[a]));
+        orientation *=
+            Rotation3::from_scaled_axis(errors.vector(axis, true, index[a], approach[a]));
     }
     (tool, orientation)
 }

@@ -16,6 +16,7 @@ mod diagnosable;
 mod diagonals;
 mod effects;
 mod errors;
+mod estimates;
 mod estimators;
 mod geometry;
 mod plan;
@@ -30,15 +31,15 @@ pub use components::{Axis, Component, Location, NodeKind};
 pub use design::{Identifiability, identifiability};
 pub use determination::{Ambiguity, Determined, Remedy};
 pub use diagnosable::DiagonalRuns;
-pub use diagonals::{Diagonal, Sequence, Target, WorkZone};
+pub use diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
 pub use errors::ErrorTables;
+pub use estimates::{
+    Assumptions, ComponentEstimate, LocationEstimate, Measured, MirrorEstimate, StepDiagonalFit,
+};
 pub use estimators::{ESTIMATORS, Estimator};
 pub use geometry::exact_reading;
 pub use plan::{SequenceChoice, choose_sequences, determined_by};
 pub use prediction::{Parameter, Unknowns, predicted_reading};
-pub use readings::{DiagonalError, DiagonalReading, Edges};
-pub use regression::{
-    Assumptions, ComponentEstimate, LocationEstimate, Measured, MirrorEstimate, StepDiagonalFit,
-    regress,
-};
+pub use readings::{DiagonalError, DiagonalReading, Edges, Motion};
+pub use regression::regress;
 pub use simulate::{DiagonalSimulation, Disturbance, Misalignments, simulate, simulate_disturbed};

@@ -1,7 +1,7 @@
 //! Before measuring: what a choice of diagonals, targets and sequences will determine.
 
 use super::components::Component;
-use super::design::{Design, blank_readings, decompose, is_definition};
+use super::design::{Design, Function, blank_readings, decompose, is_definition};
 use super::determination::{Determined, determination};
 use super::diagonals::{Diagonal, Sequence, Target, WorkZone};
 use super::readings::DiagonalError;
@@ -19,7 +19,12 @@ pub fn determined_by(
     let design = Design::of(zone, &readings, |p| !is_definition(p, zone.steps));
     let null = decompose(&design.matrix)?.null;
     Ok(Component::all()
-        .map(|c| (c, determination(&design.unknowns, &null, c).0))
+        .map(|c| {
+            (
+                c,
+                determination(&design.unknowns, &null, Function::Error(c)).0,
+            )
+        })
         .collect())
 }
 

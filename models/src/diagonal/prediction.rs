@@ -1,7 +1,7 @@
 //! The reading as a linear function of the 21 errors and the mirror angles: equations (1) and (4).
 
 use super::components::{Axis, Component, Location};
-use super::diagonals::{Diagonal, Target, WorkZone};
+use super::diagonals::{Diagonal, Target, Travel, WorkZone};
 use super::errors::ErrorTables;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -18,6 +18,9 @@ pub enum Parameter {
     Squareness(Location),
     /// Misalignment of the mirror of a set-up about one of [`Diagonal::mirror_axes`], rad.
     Mirror(Diagonal, Target, usize),
+    /// Reversal value of an error function at a grid index: arrived in the positive sense of the axis
+    /// less in the negative, µm or rad.
+    Reversal(Component, usize),
 }
 
 /// The unknowns that the readings touch, with their places in the parameter vector.
@@ -53,31 +56,33 @@ pub(super) fn sensitivities(
     diagonal: Diagonal,
     target: Target,
     at: [usize; 3],
+    travel: Travel,
 ) -> Vec<(Parameter, f64)> {
     let n = diagonal.direction(zone);
     let start = zone.stops(diagonal, super::Sequence::Together)[0];
     let (p3, p1) = (zone.position(at), zone.position(start));
     let offset = p1 - p3;
     let mut terms: Vec<(Parameter, f64)> = Vec::new();
+    let approach = |travel| diagonal.approach(travel).map(|s| 0.5 * f64::from(s));
+    let (arrived, left) = (approach(travel), approach(Travel::Forward));
     for component in Component::all() {
         let (a, c) = (component.axis.index(), component.direction.index());
         let unit = Vector3::ith(c, 1.0);
-        if component.rotation {
+        let (here, there) = if component.rotation {
             let here = n.dot(&unit.cross(&lever(component.axis, p3)));
             let there = n.dot(&unit.cross(&lever(component.axis, p1)));
             let seen = match target {
                 Target::Mirror => n.dot(&unit.cross(&offset)),
                 Target::RetroReflector => 0.0,
             };
-            terms.push((
-                Parameter::Node(component, at[a]),
-                UM_PER_RAD_MM * (here + seen),
-            ));
-            terms.push((Parameter::Node(component, start[a]), -UM_PER_RAD_MM * there));
+            (UM_PER_RAD_MM * (here + seen), -UM_PER_RAD_MM * there)
         } else {
-            terms.push((Parameter::Node(component, at[a]), n[c]));
-            terms.push((Parameter::Node(component, start[a]), -n[c]));
-        }
+            (n[c], -n[c])
+        };
+        terms.push((Parameter::Node(component, at[a]), here));
+        terms.push((Parameter::Node(component, start[a]), there));
+        terms.push((Parameter::Reversal(component, at[a]), arrived[a] * here));
+        terms.push((Parameter::Reversal(component, start[a]), left[a] * there));
     }
     for location in Location::ALL {
         let moved = squareness_shift(location, p3) - squareness_shift(location, p1);
@@ -134,14 +139,19 @@ pub fn predicted_reading(
     target: Target,
     mirror: Vector3<f64>,
     at: [usize; 3],
+    travel: Travel,
 ) -> f64 {
     let axes = diagonal.mirror_axes(zone);
-    sensitivities(zone, diagonal, target, at)
+    sensitivities(zone, diagonal, target, at, travel)
         .into_iter()
         .map(|(parameter, coefficient)| {
             let value = match parameter {
                 Parameter::Node(component, index) => {
                     errors.of(component).get(index).copied().unwrap_or(0.0)
+                }
+                Parameter::Reversal(component, index) => {
+                    let values = errors.reversal_of(component);
+                    values.get(index).copied().unwrap_or(0.0)
                 }
                 Parameter::Squareness(location) => errors.squareness_of(location),
                 Parameter::Mirror(_, _, k) => axes.get(k).map_or(0.0, |axis| axis.dot(&mirror)),

@@ -1,7 +1,7 @@
 //! Readings along diagonals and the single-axis edges between them.
 
 use super::components::Axis;
-use super::diagonals::{Diagonal, Sequence, Target, WorkZone};
+use super::diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -17,6 +17,8 @@ pub struct DiagonalReading {
     pub sequence: Sequence,
     /// Repeat number, from 1.
     pub repeat: u32,
+    /// Sense of travel; the way back belongs to the same run.
+    pub travel: Travel,
     /// Grid indices of the machine position.
     pub at: [usize; 3],
     /// Displacement read less the nominal one, µm.
@@ -72,8 +74,8 @@ pub enum DiagonalError {
     },
     /// The same stop twice in one run.
     #[error(
-        "reading {} repeats a stop of diagonal {}, sequence {}, repeat {repeat}: number the repeats",
-        index + 1, diagonal.name(), sequence.name()
+        "reading {} repeats a stop of diagonal {}, sequence {}, repeat {repeat}, {}: number the repeats",
+        index + 1, diagonal.name(), sequence.name(), travel.name()
     )]
     Duplicate {
         /// Place in the list, from 0.
@@ -84,6 +86,8 @@ pub enum DiagonalError {
         sequence: Sequence,
         /// Repeat.
         repeat: u32,
+        /// Sense of travel.
+        travel: Travel,
     },
     /// A measured quantity whose standard uncertainty is not positive.
     #[error("the standard uncertainty of the measured {what} must be greater than zero")]
@@ -133,46 +137,67 @@ pub(super) fn check(zone: &WorkZone, readings: &[DiagonalReading]) -> Result<(),
                 sequence: r.sequence,
             });
         }
-        if !seen.insert((r.run(), r.at)) {
+        if !seen.insert((r.run(), r.travel, r.at)) {
             return Err(DiagonalError::Duplicate {
                 index,
                 diagonal: r.diagonal,
                 sequence: r.sequence,
                 repeat: r.repeat,
+                travel: r.travel,
             });
         }
     }
     Ok(())
 }
 
-/// One motion of one axis: the run it belongs to, where it begins, which axis moves.
-type Motion = (Diagonal, Target, [usize; 3], Axis);
+/// In which sense the axis moves that makes a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Motion {
+    /// In either; the mean of all.
+    Either,
+    /// Towards greater positions.
+    Positive,
+    /// Towards smaller positions.
+    Negative,
+}
+
+/// One step of one axis: the set-up it belongs to, where its lower end is, which axis moves and in
+/// which sense.
+type Step = (Diagonal, Target, [usize; 3], Axis, Motion);
 
 /// The readings at both ends of every single-axis motion, the lower end first.
 #[derive(Debug, Clone, Default)]
 pub struct Edges {
-    ends: BTreeMap<Motion, Vec<(usize, usize)>>,
+    ends: BTreeMap<Step, Vec<(usize, usize)>>,
 }
 
 impl Edges {
     /// Finds the edges of all runs.
     pub fn of(readings: &[DiagonalReading]) -> Self {
-        let mut runs: BTreeMap<Run, BTreeMap<[usize; 3], usize>> = BTreeMap::new();
+        let mut runs: BTreeMap<(Run, Travel), BTreeMap<[usize; 3], usize>> = BTreeMap::new();
         for (index, r) in readings.iter().enumerate() {
-            runs.entry(r.run()).or_default().insert(r.at, index);
+            let stops = runs.entry((r.run(), r.travel)).or_default();
+            stops.insert(r.at, index);
         }
         let mut edges = Self::default();
-        for ((diagonal, target, _, _), stops) in &runs {
+        for (((diagonal, target, _, _), travel), stops) in &runs {
+            let approach = diagonal.approach(*travel);
             for (&at, &low) in stops {
                 for axis in Axis::ALL {
                     let mut next = at;
                     next[axis.index()] += 1;
-                    if let Some(&high) = stops.get(&next) {
-                        edges
-                            .ends
-                            .entry((*diagonal, *target, at, axis))
-                            .or_default()
-                            .push((low, high));
+                    let Some(&high) = stops.get(&next) else {
+                        continue;
+                    };
+                    let own = if approach[axis.index()] > 0 {
+                        Motion::Positive
+                    } else {
+                        Motion::Negative
+                    };
+                    for motion in [Motion::Either, own] {
+                        let step = (*diagonal, *target, at, axis, motion);
+                        edges.ends.entry(step).or_default().push((low, high));
                     }
                 }
             }
@@ -187,8 +212,8 @@ impl Edges {
         diagonal: Diagonal,
         target: Target,
         cell: [usize; 3],
-        from: char,
-        to: char,
+        (from, to): (char, char),
+        motion: Motion,
     ) -> Option<Vec<(usize, f64)>> {
         let (p, q) = (corner(from)?, corner(to)?);
         let axis = Axis::ALL.into_iter().find(|a| {
@@ -197,7 +222,7 @@ impl Edges {
         })?;
         let forward = q[axis.index()] > p[axis.index()];
         let low: [usize; 3] = std::array::from_fn(|a| cell[a] + p[a].min(q[a]));
-        let ends = self.ends.get(&(diagonal, target, low, axis))?;
+        let ends = self.ends.get(&(diagonal, target, low, axis, motion))?;
         let share = if forward { 1.0 } else { -1.0 } / ends.len() as f64;
         Some(
             ends.iter()

@@ -1,114 +1,18 @@
 //! All identifiable combinations of the errors at once, from all readings.
 
-use super::components::{Axis, Component, Location};
-use super::design::{Decomposition, Design, decompose, is_definition, nodes_of};
+use super::components::{Component, Location};
+use super::design::{Decomposition, Design, Function, decompose, is_definition, nodes_of};
 use super::determination::{
-    Ambiguity, Determined, Remedy, ambiguities, determination, end_slope, line_of, remedies,
+    Determined, ambiguities, determination, end_slope, open_shape, remedies,
 };
-use super::diagonals::{Diagonal, Target, WorkZone};
+use super::diagonals::{Travel, WorkZone};
+use super::estimates::{
+    Assumptions, ComponentEstimate, LocationEstimate, MirrorEstimate, StepDiagonalFit,
+};
 use super::prediction::Parameter;
 use super::readings::{DiagonalError, DiagonalReading, check};
-use crate::uncertainty::DegreesOfFreedom;
-use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
-
-/// A positioning slope measured by other means.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
-    /// Axis.
-    pub axis: Axis,
-    /// Slope by end points, µm/mm.
-    pub slope: f64,
-    /// Its standard uncertainty, µm/mm.
-    pub std: f64,
-}
-
-/// What is taken from elsewhere.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Assumptions {
-    /// Errors taken as zero: the usual analysis takes all nine angular ones.
-    pub zero: Vec<Component>,
-    /// Slopes that were measured.
-    pub slopes: Vec<Measured>,
-    /// Standard deviation of one reading, µm, where it is known.
-    pub noise: Option<f64>,
-}
-
-/// One error function.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ComponentEstimate {
-    /// Which.
-    pub component: Component,
-    /// How far the readings determine it.
-    pub determined: Determined,
-    /// Grid positions, mm.
-    pub positions: Vec<f64>,
-    /// Values there, µm or rad: from corner A where determined wholly (straightness: from the line
-    /// through its ends), from the line through the ends where only the shape is, else the determined
-    /// part. Empty where nothing is.
-    pub values: Vec<f64>,
-    /// Standard uncertainties; empty where the noise is not known.
-    pub std: Vec<f64>,
-}
-
-/// One squareness error.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct LocationEstimate {
-    /// Which.
-    pub location: Location,
-    /// Whether it is determined.
-    pub determined: Determined,
-    /// The paper's S, rad, where determined.
-    pub value: Option<f64>,
-    /// Its standard uncertainty, rad.
-    pub std: Option<f64>,
-}
-
-/// One misalignment angle of the mirror of one set-up.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct MirrorEstimate {
-    /// Diagonal.
-    pub diagonal: Diagonal,
-    /// Target.
-    pub target: Target,
-    /// Number of the direction in [`Diagonal::mirror_axes`].
-    pub direction: usize,
-    /// Angle, rad, where determined.
-    pub value: Option<f64>,
-    /// Its standard uncertainty, rad.
-    pub std: Option<f64>,
-}
-
-/// The result of the regression.
-#[derive(Debug, Clone)]
-pub struct StepDiagonalFit {
-    /// The 18 functions, in the order of [`Component::all`].
-    pub components: Vec<ComponentEstimate>,
-    /// The three squareness errors.
-    pub squareness: Vec<LocationEstimate>,
-    /// The mirrors.
-    pub mirrors: Vec<MirrorEstimate>,
-    /// Unknowns, definitions taken out.
-    pub parameters: usize,
-    /// Independent combinations determined.
-    pub rank: usize,
-    /// What cannot be told apart.
-    pub ambiguities: Vec<Ambiguity>,
-    /// What would settle it.
-    pub remedies: Vec<Remedy>,
-    /// Standard deviation of one reading, µm: given or estimated; none without redundancy.
-    pub noise: Option<f64>,
-    /// How well that is known: infinite where it was given.
-    pub noise_degrees_of_freedom: Option<DegreesOfFreedom>,
-    /// Readings and measured slopes less runs less rank.
-    pub degrees_of_freedom: usize,
-    /// Reading less model, µm, in the order of the readings.
-    pub residuals: Vec<f64>,
-    /// Sensitivity of each reading to each of `names`, per µm or rad, freed from the zero of its run.
-    pub jacobian: DMatrix<f64>,
-    /// The parameters of the columns.
-    pub names: Vec<Parameter>,
-}
+use crate::uncertainty::{DegreesOfFreedom, welch_satterthwaite};
+use nalgebra::{DMatrix, DVector, Dyn};
 
 /// Estimates everything that the readings determine.
 ///
@@ -129,7 +33,8 @@ pub fn regress(
     }
     let design = Design::of(zone, readings, |p| {
         !is_definition(p, zone.steps)
-            && !matches!(p, Parameter::Node(c, _) if assumptions.zero.contains(&c))
+            && !matches!(p, Parameter::Node(c, _) | Parameter::Reversal(c, _)
+                if assumptions.zero.contains(&c))
     });
     let mut observed = DVector::from_iterator(readings.len(), readings.iter().map(|r| r.value));
     design.free_of_zero(&mut observed);
@@ -148,7 +53,7 @@ pub fn regress(
         None => (None, None),
     };
     // Measured slopes join as further rows, weighted by the noise of a reading over their own.
-    let extra = extra_rows(&design, zone, assumptions, noise);
+    let extra = slope_rows(&design, zone, assumptions, noise);
     let (solution, freedom) = if extra.is_empty() {
         (from_readings, readings_alone)
     } else {
@@ -162,21 +67,35 @@ pub fn regress(
     let estimate = Estimate {
         design: &design,
         solution: &solution,
-        noise,
-    };
-    Ok(StepDiagonalFit {
-        components: Component::all()
-            .map(|c| estimate.component(zone, c))
+        noise: noise.zip(noise_degrees_of_freedom),
+        slopes: extra
+            .iter()
+            .map(|row| (row.place, row.coefficient, row.degrees_of_freedom))
             .collect(),
+    };
+    let functions = |of: fn(Component) -> Function| {
+        Component::all()
+            .map(|c| estimate.function(zone, of(c)))
+            .collect()
+    };
+    let back = readings.iter().any(|r| r.travel == Travel::Backward);
+    Ok(StepDiagonalFit {
+        components: functions(Function::Error),
+        reversals: if back {
+            functions(Function::Reversal)
+        } else {
+            Vec::new()
+        },
         squareness: Location::ALL
             .into_iter()
             .map(|location| {
-                let single = estimate.single(Parameter::Squareness(location));
+                let (determined, value, spread) = estimate.single(Parameter::Squareness(location));
                 LocationEstimate {
                     location,
-                    determined: single.0,
-                    value: single.1,
-                    std: single.2,
+                    determined,
+                    value,
+                    std: spread.map(|s| s.0),
+                    degrees_of_freedom: spread.map(|s| s.1),
                 }
             })
             .collect(),
@@ -186,13 +105,14 @@ pub fn regress(
             .iter()
             .filter_map(|&p| match p {
                 Parameter::Mirror(diagonal, target, direction) => {
-                    let (_, value, std) = estimate.single(p);
+                    let (_, value, spread) = estimate.single(p);
                     Some(MirrorEstimate {
                         diagonal,
                         target,
                         direction,
                         value,
-                        std,
+                        std: spread.map(|s| s.0),
+                        degrees_of_freedom: spread.map(|s| s.1),
                     })
                 }
                 _ => None,
@@ -259,34 +179,45 @@ impl Solution {
 struct Estimate<'a> {
     design: &'a Design,
     solution: &'a Solution,
-    noise: Option<f64>,
+    noise: Option<(f64, DegreesOfFreedom)>,
+    /// Rows of measured slopes: place, weighted coefficient, degrees of freedom.
+    slopes: Vec<(usize, f64, DegreesOfFreedom)>,
 }
 
 impl Estimate<'_> {
-    fn component(&self, zone: &WorkZone, component: Component) -> ComponentEstimate {
+    fn function(&self, zone: &WorkZone, function: Function) -> ComponentEstimate {
+        let component = function.component();
         let unknowns = &self.design.unknowns;
-        let (determined, lost) =
-            determination(unknowns, &self.solution.decomposition.null, component);
-        let nodes = nodes_of(unknowns, component);
+        let null = &self.solution.decomposition.null;
+        let (determined, lost) = determination(unknowns, null, function);
+        let nodes = nodes_of(unknowns, function);
         let mut estimate = ComponentEstimate {
             component,
             determined,
             positions: Vec::new(),
             values: Vec::new(),
             std: Vec::new(),
+            degrees_of_freedom: Vec::new(),
         };
         let count = nodes.len();
         let functionals: DMatrix<f64> = match determined {
             Determined::NotTouched | Determined::Nothing => return estimate,
             Determined::Wholly => DMatrix::identity(count, count),
             Determined::ShapeOnly => {
-                let line = line_of(&nodes);
+                let line = open_shape(function, &nodes);
                 let mut less_line = DMatrix::identity(count, count);
                 let end = line[count - 1];
                 for i in 0..count {
                     less_line[(i, count - 1)] -= line[i] / end;
                 }
                 less_line
+            }
+            Determined::ChangesOnly => {
+                let mut less_first = DMatrix::identity(count, count);
+                for i in 0..count {
+                    less_first[(i, 0)] -= 1.0;
+                }
+                less_first
             }
             Determined::Partly => DMatrix::identity(count, count) - &lost * lost.transpose(),
         };
@@ -297,24 +228,48 @@ impl Estimate<'_> {
         let pitch = zone.step()[component.axis.index()];
         estimate.positions = (0..=zone.steps).map(|i| pitch * i as f64).collect();
         estimate.values = vec![0.0; zone.steps + 1];
-        estimate.std = vec![
-            0.0;
-            if self.noise.is_some() {
-                zone.steps + 1
-            } else {
-                0
-            }
-        ];
+        if let Some((_, degrees)) = self.noise {
+            estimate.std = vec![0.0; zone.steps + 1];
+            estimate.degrees_of_freedom = vec![degrees; zone.steps + 1];
+        }
         for (k, &(_, index)) in nodes.iter().enumerate() {
             estimate.values[index] = scale * values[k];
-            if let Some(sigma) = self.noise {
-                estimate.std[index] = scale * sigma * halves.row(k).norm();
+            if let Some((u, degrees)) = self.spread(halves.row(k)) {
+                estimate.std[index] = scale * u;
+                estimate.degrees_of_freedom[index] = degrees;
             }
         }
         estimate
     }
 
-    fn single(&self, parameter: Parameter) -> (Determined, Option<f64>, Option<f64>) {
+    /// Standard uncertainty, in scaled parameters, and effective degrees of freedom of a functional c
+    /// from c W.
+    ///
+    /// It weighs the row a_k of a measured slope by c W Wᵀ a_kᵀ, which is what that slope contributes;
+    /// the rest of c W comes from the readings.
+    fn spread(&self, half: RowDVectorView) -> Option<(f64, DegreesOfFreedom)> {
+        let (sigma, degrees) = self.noise?;
+        let square = half.norm_squared();
+        if self.slopes.is_empty() {
+            return Some((sigma * square.sqrt(), degrees));
+        }
+        let mut parts = Vec::with_capacity(self.slopes.len() + 1);
+        let mut from_slopes = 0.0;
+        for &(place, coefficient, degrees) in &self.slopes {
+            let own = self.solution.half_covariance.row(place);
+            let weight = coefficient * own.dot(&half);
+            from_slopes += weight * weight;
+            parts.push((weight, degrees));
+        }
+        // Rounding may leave some 1e-16 where everything comes from a slope.
+        parts.push(((square - from_slopes).max(0.0).sqrt(), degrees));
+        Some((sigma * square.sqrt(), welch_satterthwaite(&parts)))
+    }
+
+    fn single(
+        &self,
+        parameter: Parameter,
+    ) -> (Determined, Option<f64>, Option<(f64, DegreesOfFreedom)>) {
         let Some(place) = self.design.unknowns.index_of(parameter) else {
             return (Determined::NotTouched, None, None);
         };
@@ -323,24 +278,33 @@ impl Estimate<'_> {
             return (Determined::Nothing, None, None);
         }
         let scale = self.design.scale[place];
-        let std = self
-            .noise
-            .map(|sigma| scale * sigma * self.solution.half_covariance.row(place).norm());
+        let spread = self
+            .spread(self.solution.half_covariance.row(place))
+            .map(|(u, degrees)| (scale * u, degrees));
         (
             Determined::Wholly,
             Some(scale * self.solution.parameters[place]),
-            std,
+            spread,
         )
     }
 }
 
-/// A measured slope as (place, coefficient, value), weighted to the noise of a reading.
-fn extra_rows(
+type RowDVectorView<'a> = nalgebra::MatrixView<'a, f64, nalgebra::U1, Dyn, nalgebra::U1, Dyn>;
+
+/// A measured slope as a row of the design, weighted to the noise of a reading.
+struct SlopeRow {
+    place: usize,
+    coefficient: f64,
+    value: f64,
+    degrees_of_freedom: DegreesOfFreedom,
+}
+
+fn slope_rows(
     design: &Design,
     zone: &WorkZone,
     assumptions: &Assumptions,
     noise: Option<f64>,
-) -> Vec<(usize, f64, f64)> {
+) -> Vec<SlopeRow> {
     assumptions
         .slopes
         .iter()
@@ -349,11 +313,12 @@ fn extra_rows(
             let (place, gradient) = end_slope(&design.unknowns, m.axis, travel, zone.steps)?;
             // Without any redundancy the readings' noise is taken as that of the slope over the travel.
             let weight = noise.unwrap_or(m.std * travel) / m.std;
-            Some((
+            Some(SlopeRow {
                 place,
-                weight * gradient * design.scale[place],
-                weight * m.slope,
-            ))
+                coefficient: weight * gradient * design.scale[place],
+                value: weight * m.slope,
+                degrees_of_freedom: m.degrees_of_freedom,
+            })
         })
         .collect()
 }
@@ -361,14 +326,14 @@ fn extra_rows(
 fn stacked(
     matrix: &DMatrix<f64>,
     right: &DVector<f64>,
-    extra: &[(usize, f64, f64)],
+    extra: &[SlopeRow],
 ) -> (DMatrix<f64>, DVector<f64>) {
     let (rows, columns) = matrix.shape();
     let mut taller = matrix.clone().resize(rows + extra.len(), columns, 0.0);
     let mut longer = right.clone().resize_vertically(rows + extra.len(), 0.0);
-    for (k, &(place, coefficient, value)) in extra.iter().enumerate() {
-        taller[(rows + k, place)] = coefficient;
-        longer[rows + k] = value;
+    for (k, row) in extra.iter().enumerate() {
+        taller[(rows + k, row.place)] = row.coefficient;
+        longer[rows + k] = row.value;
     }
     (taller, longer)
 }

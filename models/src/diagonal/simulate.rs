@@ -1,7 +1,7 @@
 //! Step-diagonal data of a machine with known errors.
 
 use super::components::{Component, NodeKind};
-use super::diagonals::{Diagonal, Sequence, Target, WorkZone};
+use super::diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
 use super::errors::ErrorTables;
 use super::geometry::exact_reading;
 use super::readings::DiagonalReading;
@@ -33,6 +33,12 @@ pub struct DiagonalSimulation {
     pub mirror: f64,
     /// Standard deviation of each reading, µm.
     pub noise: f64,
+    /// Whether each run goes back to its start.
+    pub backward: bool,
+    /// Size of the reversal of the translational errors, µm.
+    pub reversal: f64,
+    /// Size of the reversal of the angular errors, rad.
+    pub reversal_rotation: f64,
 }
 
 impl Default for DiagonalSimulation {
@@ -50,6 +56,9 @@ impl Default for DiagonalSimulation {
             rotation: 20e-6,
             mirror: 50e-6,
             noise: 0.2,
+            backward: false,
+            reversal: 0.0,
+            reversal_rotation: 0.0,
         }
     }
 }
@@ -140,6 +149,14 @@ pub fn simulate_disturbed(
             }
         }
     }
+    // A stream of its own, so that a seed gives the same machine with and without reversal.
+    let mut apart = ChaCha8Rng::seed_from_u64(seed);
+    apart.set_stream(1);
+    random_reversals(&mut errors, what, &mut apart);
+    let travels = match what.backward {
+        true => &Travel::ALL[..],
+        false => &[Travel::Forward],
+    };
     let mut mirrors = BTreeMap::new();
     let mut readings = Vec::new();
     for &target in &what.targets {
@@ -149,16 +166,22 @@ pub fn simulate_disturbed(
             for &sequence in &what.sequences {
                 let turned = turned_mirror(zone, disturbances, diagonal, sequence, mirror);
                 for repeat in 1..=what.repeats.max(1) {
-                    for at in distinct(zone.stops(diagonal, sequence)) {
-                        let exact = exact_reading(zone, &errors, diagonal, target, turned, at);
-                        readings.push(DiagonalReading {
+                    for &travel in travels {
+                        let mut stops = distinct(zone.stops(diagonal, sequence));
+                        if travel == Travel::Backward {
+                            stops.reverse();
+                        }
+                        readings.extend(stops.into_iter().map(|at| DiagonalReading {
                             diagonal,
                             target,
                             sequence,
                             repeat,
+                            travel,
                             at,
-                            value: exact + what.noise * normal(&mut rng),
-                        });
+                            value: exact_reading(
+                                zone, &errors, diagonal, target, turned, at, travel,
+                            ) + what.noise * normal(&mut rng),
+                        }));
                     }
                 }
             }
@@ -254,4 +277,22 @@ fn random_errors(
     }
     errors.squareness = std::array::from_fn(|_| rotation * normal(rng));
     errors
+}
+
+/// A constant and a change along the axis in each.
+fn random_reversals(errors: &mut ErrorTables, what: &DiagonalSimulation, rng: &mut ChaCha8Rng) {
+    for component in Component::all() {
+        let size = if component.rotation {
+            what.reversal_rotation
+        } else {
+            what.reversal
+        };
+        let (constant, change) = (normal(rng), 0.5 * normal(rng));
+        let values = errors.reversal_of_mut(component);
+        let last = values.len().saturating_sub(1).max(1) as f64;
+        for (i, value) in values.iter_mut().enumerate() {
+            let t = i as f64 / last;
+            *value = size * (constant + change * t * (2.0 - t));
+        }
+    }
 }

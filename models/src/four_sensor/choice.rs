@@ -2,6 +2,7 @@
 
 use errsep_solvers::regularization::{
     CornerStatus, Discrepancy, Family, LCurve, Penalty, Point, discrepancy, gcv_among, l_curve,
+    likelihood_among,
 };
 use serde::{Deserialize, Serialize};
 
@@ -50,6 +51,9 @@ pub enum Choice {
     LCurve,
     /// Generalized cross-validation.
     Gcv,
+    /// Restricted maximum likelihood: the noise over the scatter of what is penalised, both from the
+    /// outputs. Of all rules the smallest errors in the simulation of the paper.
+    Likelihood,
     /// The discrepancy principle with the standard deviation of one reading, µm.
     Discrepancy {
         /// Standard deviation of one reading, µm.
@@ -64,7 +68,7 @@ pub enum Choice {
 pub struct Chosen {
     /// The point taken.
     pub point: Point,
-    /// The rule that gave it: `l-curve`, `gcv`, `discrepancy` or `fixed`.
+    /// The rule that gave it: `l-curve`, `gcv`, `likelihood`, `discrepancy` or `fixed`.
     pub rule: &'static str,
     /// Why another rule than the one asked for was followed.
     pub instead: Option<&'static str>,
@@ -96,6 +100,14 @@ pub(super) fn choose<F: Family + ?Sized>(
     let (point, rule, instead) = match choice {
         Choice::Fixed(lambda) => (family.point(lambda)?, "fixed", None),
         Choice::Gcv => (cross, "gcv", None),
+        Choice::Likelihood => {
+            let likeliest = likelihood_among(family, &curve.points)?;
+            let (_, largest) = family.range();
+            if likeliest.at_edge && likeliest.point.lambda > 0.5 * largest {
+                return Err(FourSensorError::NoChoice);
+            }
+            (likeliest.point, "likelihood", None)
+        }
         Choice::LCurve => match curve.lambda() {
             Some(lambda) => (family.point(lambda)?, "l-curve", None),
             None => (cross, "gcv", Some(no_corner(curve.status))),

@@ -1,13 +1,19 @@
 //! Propagation of distributions through the machine to any feature (NISTIR 6868, equations 46 to
 //! 49; JCGM 101).
+//!
+//! A component whose uncertainty rests on ν degrees of freedom is drawn from Student's distribution
+//! (JCGM 101, 6.4.9): a normal deviation times √(ν/χ²_ν), the same for the coefficients and the scatter
+//! of one component, because both rest on the same sum of squares. Its deviations spread by
+//! √(ν/(ν − 2)) more than the law of propagation has it, and by no finite amount for ν ≤ 2; their
+//! coverage intervals hold what they say. Infinite degrees of freedom make them normal.
 
 use nalgebra::{DMatrix, Vector3};
 use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::{ChiSquared, Distribution, StandardNormal};
 
 use super::model::coordinate;
 use super::{Independence, Kind, Machine, MachineError, Position, Prediction};
-use crate::uncertainty::{Trials, simulate};
+use crate::uncertainty::{DegreesOfFreedom, Trials, simulate};
 
 /// A component as the sampler needs it.
 #[derive(Debug, Clone)]
@@ -24,6 +30,9 @@ struct Influence {
     scatter: f64,
     /// One draw of the scatter serves all points.
     common_scatter: bool,
+    /// Degrees of freedom ν of its standard deviations with the distribution of χ²_ν; `None` when they
+    /// are infinite.
+    degrees: Option<(f64, ChiSquared<f64>)>,
 }
 
 /// Draws the deviations of a set of points. Everything that does not change from draw to draw is
@@ -90,6 +99,12 @@ impl Sampler {
                 own,
                 scatter: scatter.sqrt(),
                 common_scatter: error.component.kind == Kind::Squareness,
+                degrees: match spread.degrees {
+                    DegreesOfFreedom::Infinite => None,
+                    DegreesOfFreedom::Finite(number) => ChiSquared::new(number)
+                        .ok()
+                        .map(|squares| (number, squares)),
+                },
             });
         }
         let coordinates = variances.iter().map(|v| v.map(f64::sqrt)).collect();
@@ -101,6 +116,16 @@ impl Sampler {
         })
     }
 
+    /// Takes the standard deviations of all components as known, so that their draws are normal: for
+    /// simulating a machine rather than what is known of one.
+    #[must_use]
+    pub fn with_known_spreads(mut self) -> Self {
+        for influence in &mut self.influences {
+            influence.degrees = None;
+        }
+        self
+    }
+
     /// Number of points.
     #[must_use]
     pub fn points(&self) -> usize {
@@ -108,6 +133,9 @@ impl Sampler {
     }
 
     /// Draws the deviation of every point, um. Points beyond the slice are left out.
+    ///
+    /// [`Independence::Coordinates`] draws each coordinate from a normal distribution, as the report
+    /// does: what it adds up to has no one number of degrees of freedom.
     pub fn draw(&self, rng: &mut impl Rng, deviations: &mut [Vector3<f64>]) {
         for (deviation, mean) in deviations.iter_mut().zip(&self.means) {
             *deviation = *mean;
@@ -122,7 +150,7 @@ impl Sampler {
                 for influence in &self.influences {
                     let parts = influence.motions.iter().zip(&influence.own);
                     for (deviation, (motion, u)) in deviations.iter_mut().zip(parts) {
-                        *deviation += motion * (u * normal(rng));
+                        *deviation += motion * (u * influence.widening(rng) * normal(rng));
                     }
                 }
             }
@@ -136,30 +164,35 @@ impl Sampler {
 }
 
 impl Influence {
+    /// √(ν/χ²_ν), which makes a normal deviate one of Student's; 1 for infinite degrees of freedom.
+    fn widening(&self, rng: &mut impl Rng) -> f64 {
+        self.degrees.as_ref().map_or(1.0, |(number, squares)| {
+            (number / squares.sample(rng)).sqrt()
+        })
+    }
+
     fn draw_common(&self, rng: &mut impl Rng, deviations: &mut [Vector3<f64>]) {
         let terms = self.factor.nrows();
+        let widening = self.widening(rng);
+        let scatter = widening * self.scatter;
         // Few coefficients: a fixed array keeps the draw free of allocation.
         let mut coefficients = [0.0; MOST_TERMS];
         for k in 0..terms {
-            let z = normal(rng);
+            let z = widening * normal(rng);
             for (i, c) in coefficients.iter_mut().enumerate().take(terms).skip(k) {
                 *c += self.factor[(i, k)] * z;
             }
         }
         let common = if self.common_scatter {
-            self.scatter * normal(rng)
+            scatter * normal(rng)
         } else {
             0.0
         };
-        let fresh = !self.common_scatter && self.scatter > 0.0;
+        let fresh = !self.common_scatter && scatter > 0.0;
         for (i, (deviation, motion)) in deviations.iter_mut().zip(&self.motions).enumerate() {
             let powers = &self.powers[i * terms..(i + 1) * terms];
             let mut value: f64 = powers.iter().zip(&coefficients).map(|(p, c)| p * c).sum();
-            value += if fresh {
-                self.scatter * normal(rng)
-            } else {
-                common
-            };
+            value += if fresh { scatter * normal(rng) } else { common };
             *deviation += motion * value;
         }
     }

@@ -192,7 +192,8 @@ pub fn simulate_parts_disturbed(
         });
     }
     let points: Vec<Position> = features.iter().map(|(_, p)| *p).collect();
-    let sampler = Sampler::new(machine, &points, Independence::Scatter, Prediction::Future)?;
+    let sampler = Sampler::new(machine, &points, Independence::Scatter, Prediction::Future)?
+        .with_known_spreads();
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     let mut deviations = vec![Position::zeros(); points.len()];
     let mut readings = Vec::new();

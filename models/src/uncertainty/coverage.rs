@@ -1,7 +1,7 @@
 //! Coverage factor and expanded uncertainty (GUM chapter 6 and annex G).
 
+use errsep_solvers::uncertainty::student_quantile;
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use super::{DegreesOfFreedom, Quantity, UncertaintyError};
 
@@ -17,13 +17,14 @@ pub fn coverage_factor(
     if !(probability > 0.0 && probability < 1.0) {
         return Err(UncertaintyError::BadProbability { found: probability });
     }
-    let upper = 0.5 + 0.5 * probability;
-    match degrees_of_freedom {
-        DegreesOfFreedom::Infinite => Ok(Normal::standard().inverse_cdf(upper)),
-        DegreesOfFreedom::Finite(number) => StudentsT::new(0.0, 1.0, number)
-            .map(|student| student.inverse_cdf(upper))
-            .map_err(|_| UncertaintyError::BadDegreesOfFreedom { found: number }),
+    // From the lower tail, which keeps its digits where the coverage is close to 1.
+    let k = -student_quantile(0.5 * (1.0 - probability), degrees_of_freedom.as_f64());
+    if k.is_nan() {
+        return Err(UncertaintyError::BadDegreesOfFreedom {
+            found: degrees_of_freedom.as_f64(),
+        });
     }
+    Ok(k)
 }
 
 /// An expanded uncertainty `U = k u` and its interval.

@@ -10,6 +10,7 @@
 //! |---|---|---|
 //! | [`l_curve`] | nothing | the noise level is not known; it says when there is no corner |
 //! | [`gcv`] | nothing | the noise is white |
+//! | [`likelihood`](fn@likelihood) | nothing | the noise is white and Lx scatters evenly: less erratic than [`gcv`] |
 //! | [`discrepancy`] | the noise level | the noise level is known |
 //! | [`periodogram`](fn@periodogram) | residuals in their natural order | the noise is white and the signal is not |
 //!
@@ -24,6 +25,7 @@ mod error;
 mod factored;
 mod gcv;
 mod l_curve;
+mod likelihood;
 mod penalty;
 mod periodogram;
 pub mod problems;
@@ -39,6 +41,7 @@ pub use error::RegularizationError;
 pub use factored::{Combination, Factored};
 pub use gcv::{Gcv, gcv, gcv_among};
 pub use l_curve::{Corner, CornerStatus, LCurve, l_curve, l_curve_between};
+pub use likelihood::{Likelihood, likelihood, likelihood_among};
 pub use penalty::Penalty;
 pub use periodogram::{Periodogram, periodogram, whiteness_distance};
 pub use spectrum::Spectrum;

@@ -5,3 +5,6 @@
 
 pub mod bootstrap;
 pub mod profile;
+mod student;
+
+pub use student::student_quantile;

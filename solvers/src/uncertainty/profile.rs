@@ -5,8 +5,9 @@
 //! model is linear along the profile, which is far weaker than linear in all parameters (Bates &
 //! Watts 1988, 6.1.2). The interval ends where |τ| reaches the quantile.
 
+use super::student_quantile;
 use nalgebra::DVector;
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::bounds::Bounds;
 use crate::fit::fit;
@@ -105,7 +106,7 @@ pub fn profile_interval<P: Problem + ?Sized>(
     let (variance, quantile) = match scale {
         ResidualScale::Known => (1.0, normal_quantile(probability)),
         ResidualScale::Estimated => match fit.residual_deviation() {
-            Some(s) => (s * s, student_quantile(probability, freedom)),
+            Some(s) => (s * s, student_quantile(probability, freedom as f64)),
             None => {
                 return wrong(
                     "scale",
@@ -142,13 +143,6 @@ pub fn profile_interval<P: Problem + ?Sized>(
 
 fn normal_quantile(probability: f64) -> f64 {
     Normal::standard().inverse_cdf(probability)
-}
-
-fn student_quantile(probability: f64, freedom: usize) -> f64 {
-    StudentsT::new(0.0, 1.0, freedom as f64).map_or_else(
-        |_| normal_quantile(probability),
-        |t| t.inverse_cdf(probability),
-    )
 }
 
 struct Profile<'a, P: ?Sized> {

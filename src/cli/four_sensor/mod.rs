@@ -35,7 +35,7 @@ set-up gives the distance of each sensor to the one before and, if known, the no
     noise = 0.1                  # um
     [separation]                 # all optional
     penalty = \"profile\"          # or slope, curvature
-    choice = \"l-curve\"           # or gcv, discrepancy; or lambda = 0.02
+    choice = \"l-curve\"           # or likelihood, gcv, discrepancy; or lambda = 0.02
     line = \"end-points\"          # or least-squares
     [parabola]                   # optional, one of
     tilt_slope = 1e-8            # rad/mm; surface_curvature, um/mm2; zero_adjustment, um
@@ -130,7 +130,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         }
     };
     Ok(Answer {
-        text: words::text(&found, &args.data),
+        text: words::text(&found, &args.data)?,
         json: json::json(&found)?,
         page: page::page(&found, &args.data),
         tables: tables(&found),

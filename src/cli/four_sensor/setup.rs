@@ -41,6 +41,7 @@ enum Rule {
     #[default]
     LCurve,
     Gcv,
+    Likelihood,
     Discrepancy,
 }
 
@@ -102,12 +103,13 @@ impl Setup {
             (Some(lambda), _, _) => Choice::Fixed(positive(lambda, "lambda")?),
             (None, Rule::LCurve, _) => Choice::LCurve,
             (None, Rule::Gcv, _) => Choice::Gcv,
+            (None, Rule::Likelihood, _) => Choice::Likelihood,
             (None, Rule::Discrepancy, Some(noise)) => Choice::Discrepancy { noise },
             (None, Rule::Discrepancy, None) => {
                 return Err(file.bad(
                     sensors.spacing.span(),
                     "the discrepancy principle needs the noise of one reading",
-                    "add noise = … (um) to [sensors], or choose l-curve or gcv",
+                    "add noise = … (um) to [sensors], or choose l-curve, gcv or likelihood",
                 ));
             }
         };

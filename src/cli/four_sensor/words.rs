@@ -4,13 +4,16 @@ use std::fmt::Write;
 use std::path::Path;
 
 use errsep_models::four_sensor::Parabola;
+use errsep_models::uncertainty::coverage_factor;
 use errsep_solvers::regularization::{CornerStatus, Discrepancy};
 use nalgebra::DVector;
 
 use super::Found;
+use crate::cli::quantity::{COVERAGE, coverage_words, unexpandable};
+use crate::io::Message;
 use crate::io::units::{arcsec_from_rad, urad_from_rad};
 
-pub(super) fn text(found: &Found, data: &Path) -> String {
+pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
     let s = &found.separation;
     let mut text = format!(
         "Four-sensor separation of {} ({} slide positions, {} points of surface)\n",
@@ -43,6 +46,17 @@ pub(super) fn text(found: &Found, data: &Path) -> String {
         s.noise,
         noise_source(found)
     );
+    if let Some(degrees) = found.degrees_of_freedom() {
+        let k = coverage_factor(COVERAGE, degrees).map_err(unexpandable)?;
+        let _ = writeln!(
+            text,
+            "  expanded         U = k u: S up to {:.3} µm, gamma up to {:.2} µrad, f up to {:.3} µm",
+            k * s.straightness.std.max(),
+            urad_from_rad(k * s.tilt.std.max()),
+            k * s.surface.std.max()
+        );
+        let _ = writeln!(text, "                   {}", coverage_words(degrees)?);
+    }
     let _ = writeln!(
         text,
         "  lambda           {:.3e} by {}; penalty on the {}; {}",
@@ -68,7 +82,7 @@ pub(super) fn text(found: &Found, data: &Path) -> String {
     for sentence in not_determined(found) {
         let _ = writeln!(text, "  - {sentence}");
     }
-    text
+    Ok(text)
 }
 
 pub(super) fn not_determined(found: &Found) -> Vec<String> {

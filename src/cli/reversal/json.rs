@@ -5,10 +5,12 @@ use errsep_models::reversal::{Convention, NOT_SHOWN};
 use serde_json::{Map, Value, json};
 
 use super::outcome::Outcome;
+use crate::cli::quantity::{quantity_json, unexpandable};
+use crate::io::Message;
 use crate::io::reversal::ReversalData;
 
-pub fn json(data: &ReversalData, o: &Outcome) -> Value {
-    json!({
+pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
+    Ok(json!({
         "schema": "errsep.reversal/1",
         "method": o.method,
         "convention": match o.convention {
@@ -18,12 +20,12 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Value {
         "channels": data.observations.channels().iter().map(|c| c.name()).collect::<Vec<_>>(),
         "readings": data.observations.readings.len(),
         "input": data.in_words(),
-        "tilts": tilts(o),
-        "tilt_combinations": combinations(o),
-        "contrasts": contrasts(o),
+        "tilts": tilts(o)?,
+        "tilt_combinations": combinations(o)?,
+        "contrasts": contrasts(o)?,
         "closure": match &o.closure {
             Some(c) => json!({
-                "slope": angle(c.slope),
+                "slope": angle(o, "closure slope", c.slope)?,
                 "rms": {"value": c.rms, "unit": "um"},
                 "expected_rms": {"value": c.expected_rms, "unit": "um"},
                 "x": c.x,
@@ -52,48 +54,50 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Value {
         })).collect::<Vec<_>>(),
         "warnings": o.warnings,
         "not_shown": NOT_SHOWN.iter().map(|(name, _)| *name).collect::<Vec<_>>(),
-    })
+    }))
 }
 
-fn angle(v: Measured) -> Value {
-    json!({"value": v.value, "std": v.std, "unit": "rad"})
+/// An angle with its degrees of freedom and expanded uncertainty.
+fn angle(o: &Outcome, label: &str, v: Measured) -> Result<Value, Message> {
+    quantity_json(&o.quantity(label, v).map_err(unexpandable)?)
 }
 
 /// Every tilt of the convention by its name; null where these channels do not determine it.
-fn tilts(o: &Outcome) -> Map<String, Value> {
+fn tilts(o: &Outcome) -> Result<Map<String, Value>, Message> {
     o.convention
         .tilts()
         .into_iter()
         .map(|contrast| {
             let found = o.tilts.iter().find(|t| t.contrast == Some(contrast));
-            (
-                contrast.name(o.convention).replace('-', "_"),
-                found.map_or(Value::Null, |t| angle(t.angle)),
-            )
+            let key = contrast.name(o.convention).replace('-', "_");
+            let value = found.map_or(Ok(Value::Null), |t| angle(o, &t.name, t.angle))?;
+            Ok((key, value))
         })
         .collect()
 }
 
-fn combinations(o: &Outcome) -> Vec<Value> {
+fn combinations(o: &Outcome) -> Result<Vec<Value>, Message> {
     let together = o.tilts.iter().filter(|t| t.contrast.is_none());
     together
-        .map(|t| json!({"name": t.name, "value": t.angle.value, "std": t.angle.std, "unit": "rad"}))
+        .map(|t| {
+            let mut value = angle(o, &t.name, t.angle)?;
+            value["name"] = json!(t.name);
+            Ok(value)
+        })
         .collect()
 }
 
-fn contrasts(o: &Outcome) -> Vec<Value> {
+fn contrasts(o: &Outcome) -> Result<Vec<Value>, Message> {
     o.contrasts
         .iter()
         .flatten()
         .map(|(contrast, v)| {
-            json!({
-                "pattern": contrast.pattern(),
-                "name": contrast.name(o.convention),
-                "value": v.value,
-                "std": v.std,
-                "unit": "rad",
-                "meaning": contrast.meaning(o.convention),
-            })
+            let name = contrast.name(o.convention);
+            let mut value = angle(o, name, *v)?;
+            value["pattern"] = json!(contrast.pattern());
+            value["name"] = json!(name);
+            value["meaning"] = json!(contrast.meaning(o.convention));
+            Ok(value)
         })
         .collect()
 }

@@ -3,6 +3,7 @@
 use errsep_models::reversal::staged::Value;
 use errsep_models::reversal::{Channel, Contrast, Convention};
 use errsep_models::straightness::{ReferenceLine, straightness};
+use errsep_models::uncertainty::{DegreesOfFreedom, Quantity, UncertaintyError};
 
 use crate::report;
 
@@ -69,6 +70,9 @@ pub struct Outcome {
     pub noise_words: String,
     pub channel_noise: Vec<(Channel, f64)>,
     pub degrees_of_freedom: f64,
+    /// How well the noise is known that every standard uncertainty is made of: infinite where it was
+    /// declared.
+    pub noise_freedom: DegreesOfFreedom,
     /// Name, root mean square in µm, where it comes from.
     pub method_errors: Vec<(String, f64, String)>,
     pub convergence: Convergence,
@@ -84,6 +88,15 @@ impl Outcome {
             (Some(first), Some(last)) => last - first,
             _ => 0.0,
         }
+    }
+
+    /// An angle in the vocabulary of the GUM.
+    ///
+    /// # Errors
+    /// A value or an uncertainty that is not finite.
+    pub fn quantity(&self, label: &str, angle: Value) -> Result<Quantity, UncertaintyError> {
+        Ok(Quantity::new(label, angle.value, angle.std, "rad")?
+            .with_degrees_of_freedom(self.noise_freedom))
     }
 
     /// What an angle means.

@@ -3,9 +3,11 @@
 use std::path::Path;
 
 use errsep_models::reversal::NOT_SHOWN;
+use errsep_models::uncertainty::coverage_factor;
 
 use super::outcome::Outcome;
 use super::text::summary;
+use crate::cli::quantity::COVERAGE;
 use crate::io::reversal::{ReversalData, ReversalSetup};
 use crate::report::reversal::{
     Angle, Closure, Contrast, Convergence, Form, Residual, Straightness, View, page as lay_out,
@@ -70,13 +72,14 @@ pub fn page(file: &Path, data: &ReversalData, setup: &ReversalSetup, o: &Outcome
             .residuals
             .iter()
             .map(|r| Residual {
-                channel: r.channel.name().to_owned(),
+                channel: r.channel.name(),
                 repeat: r.repeat as usize,
                 backward: r.backward,
                 x: r.x,
                 residual: r.residual,
             })
             .collect(),
+        coverage_factor: coverage_factor(COVERAGE, o.noise_freedom).unwrap_or_default(),
         noise_um: Some(o.noise),
         noise_source: o.noise_words.clone(),
         channel_noise: o

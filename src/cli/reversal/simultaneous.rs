@@ -6,6 +6,7 @@ use errsep_models::reversal::simultaneous::{
     self, ChannelNoise, KnotVerdict, Knots, Noise, Options, ReversalError, Simultaneous, Thickness,
 };
 use errsep_models::reversal::{Channel, Contrast, Observations};
+use errsep_models::uncertainty::DegreesOfFreedom;
 
 use super::outcome::{Angle, Closure, Convergence, Form, Outcome, Residual};
 use super::refusal::OTHER_UNITS;
@@ -166,6 +167,10 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         },
         channel_noise: fit.noise.iter().map(|n| (n.channel, n.sigma)).collect(),
         degrees_of_freedom: fit.degrees_of_freedom,
+        noise_freedom: match setup.noise {
+            Some(_) => DegreesOfFreedom::Infinite,
+            None => DegreesOfFreedom::Finite(fit.degrees_of_freedom.max(1.0)),
+        },
         method_errors: Vec::new(),
         convergence: Convergence {
             reason: fit.convergence.ending.to_string(),

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use errsep_models::reversal::Convention;
 use errsep_models::reversal::staged::{self, NoiseSource, Options, Removal, Staged, Value};
+use errsep_models::uncertainty::DegreesOfFreedom;
 
 use super::outcome::{Angle, Closure, Convergence, Form, Outcome, Residual};
 use super::refusal;
@@ -72,6 +73,7 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         noise_words: noise_words(&s),
         channel_noise: Vec::new(),
         degrees_of_freedom: s.residual.degrees_of_freedom as f64,
+        noise_freedom: freedom(s.noise.degrees_of_freedom),
         method_errors: method_errors(&s),
         convergence: Convergence {
             reason: "solved in stages, without iteration".to_owned(),
@@ -93,6 +95,12 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
             .collect(),
         x: s.x,
     }
+}
+
+fn freedom(of_noise: Option<f64>) -> DegreesOfFreedom {
+    of_noise.map_or(DegreesOfFreedom::Infinite, |n| {
+        DegreesOfFreedom::Finite(n.max(1.0))
+    })
 }
 
 fn noise_words(s: &Staged) -> String {

@@ -5,8 +5,10 @@ use std::path::Path;
 
 use errsep_models::reversal::staged::Value;
 use errsep_models::reversal::{Channel, NOT_SHOWN};
+use errsep_models::uncertainty::coverage_factor;
 
 use super::outcome::Outcome;
+use crate::cli::quantity::COVERAGE;
 use crate::io::reversal::ReversalData;
 use crate::io::units::{arcsec_from_rad, um_from_mm, urad_from_rad};
 use crate::report::number;
@@ -82,13 +84,22 @@ fn write_all(t: &mut String, file: &Path, data: &ReversalData, o: &Outcome) -> s
         data.in_words()
     )?;
     writeln!(t, "\n{}\n", summary(o))?;
-    writeln!(t, "Tilts (value ± standard uncertainty, k = 1)")?;
+    // Degrees of freedom are positive, so that they have a coverage factor.
+    let k = coverage_factor(COVERAGE, o.noise_freedom).unwrap_or(f64::NAN);
+    writeln!(
+        t,
+        "Tilts (value ± standard uncertainty; U expanded, {}, k = {}, {} degrees of freedom)",
+        number::percent(COVERAGE),
+        number::plain(k, 3),
+        o.noise_freedom
+    )?;
     for tilt in &o.tilts {
         writeln!(
             t,
-            "  {:13} {} µrad ({}″)  {}",
+            "  {:13} {} µrad, U = {} µrad ({}″)  {}",
             tilt.name,
             measured_urad(tilt.angle),
+            number::plain(urad_from_rad(k * tilt.angle.std), 2),
             number::plain(arcsec_from_rad(tilt.angle.value), 4),
             o.meaning(tilt)
         )?;

@@ -66,6 +66,20 @@ pub struct Args {
     /// several times. Sizes are in um or rad.
     #[arg(long = "effect", value_name = "NAME=VALUE")]
     effects: Vec<String>,
+    /// Each run goes back to its start, without zeroing the laser.
+    #[arg(long)]
+    backward: bool,
+    /// Size of the reversal of the translational errors, um.
+    #[arg(long, default_value_t = 1.0, value_name = "UM", requires = "backward")]
+    reversal: f64,
+    /// Size of the reversal of the angular errors, rad.
+    #[arg(
+        long,
+        default_value_t = 5e-6,
+        value_name = "RAD",
+        requires = "backward"
+    )]
+    reversal_rotation: f64,
     #[command(flatten)]
     pub(in crate::cli) common: CommonArgs,
 }
@@ -84,7 +98,15 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         return Err(Message::bad_input("--travel needs three numbers").remedy("--travel X Y Z"));
     };
     let travel = [x, y, z];
-    let sizes = [args.translation, args.rotation, args.mirror, args.noise];
+    let sizes = [
+        args.translation,
+        args.rotation,
+        args.mirror,
+        args.noise,
+        args.reversal,
+        args.reversal_rotation,
+    ];
+    let back = |size: f64| if args.backward { size } else { 0.0 };
     if args.steps == 0
         || travel.iter().any(|t| !(*t > 0.0 && t.is_finite()))
         || sizes.iter().any(|s| !s.is_finite())
@@ -118,6 +140,9 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         rotation: args.rotation,
         mirror: args.mirror,
         noise: args.noise,
+        backward: args.backward,
+        reversal: back(args.reversal),
+        reversal_rotation: back(args.reversal_rotation),
     };
     let seed = args.common.seed;
     let disturbances = super::effects(&args.effects, &Disturbance::NAMES, |name, size| {
@@ -147,6 +172,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
                 Target::RetroReflector => "retro-reflector".to_owned(),
             }),
         )
+        .texts("direction", text(&|i| readings[i].travel.name().to_owned()))
         .numbers("x", position(0))
         .numbers("y", position(1))
         .numbers("z", position(2))
@@ -154,9 +180,11 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             "reading",
             readings.iter().map(|r| r.value).collect::<Vec<_>>(),
         );
-    let functions: serde_json::Map<String, Value> = Component::all()
-        .map(|c| (c.name(), json!(errors.of(c))))
-        .collect();
+    let tabulated = |of: &dyn Fn(Component) -> Value| -> serde_json::Map<String, Value> {
+        Component::all().map(|c| (c.name(), of(c))).collect()
+    };
+    let functions = tabulated(&|c| json!(errors.of(c)));
+    let reversals = tabulated(&|c| json!(errors.reversal_of(c)));
     let squareness: serde_json::Map<String, Value> = Location::ALL
         .into_iter()
         .map(|l| {
@@ -176,6 +204,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         json!({
             "simulation": what,
             "functions": functions,
+            "reversals": reversals,
             "squareness": squareness,
             "mirrors": misaligned,
             "effects": args.effects,

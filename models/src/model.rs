@@ -341,6 +341,11 @@ pub trait FittedModel: Sized + Send + Sync {
         true
     }
 
+    /// Whether a single wrong reading is an effect of the catalogue, and not to be calmed as noise.
+    fn names_single_readings(&self) -> bool {
+        false
+    }
+
     /// Standard deviation of one reading where the user states it.
     fn stated_noise(&self) -> Option<f64> {
         None

@@ -216,6 +216,10 @@ impl FittedModel for CirclePoints {
             .collect()
     }
 
+    fn names_single_readings(&self) -> bool {
+        true
+    }
+
     fn stated_noise(&self) -> Option<f64> {
         self.noise
     }

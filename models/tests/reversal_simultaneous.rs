@@ -10,7 +10,7 @@ use errsep_models::reversal::{
     Channel, Convention, Direction, Observations, Reading, simultaneous, staged,
 };
 use errsep_solvers::loss::Loss;
-use errsep_solvers::structured::{Parameters, evaluate};
+use errsep_solvers::structured::{Parameters, evaluate, minimise};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -266,6 +266,62 @@ fn a_dense_method_finds_the_same_minimum() {
     for (j, t) in solution.tilts().iter().enumerate() {
         let error = point.border[j] - t.angle.value;
         assert!(error.abs() < 1e-5 * t.angle.std, "{}: {error:e}", t.name);
+    }
+}
+
+#[test]
+fn from_a_head_start_the_minimum_is_that_over_all_readings() {
+    // 150 readings a cell and channel: the start comes from 24 of them.
+    let (plan, basis) = spline_plan(6, 900, 0.05, 17);
+    let (observations, _) = simulate(&plan, &[]).unwrap();
+    let channels = ChannelReadings::sort(&observations);
+    let unknowns = Unknowns::new(Channel::ALL.to_vec(), Convention::Seed, false, 9);
+    let axis = Axis::of(&channels).unwrap();
+    let lines = simultaneous::lines(&channels).unwrap();
+    let seed = simultaneous::tilts(&unknowns, &lines);
+    let start = simultaneous::start(&unknowns, &seed, &lines, 42.0);
+    for noise in [Noise::Equal, Noise::PerChannel] {
+        let solution = fit(&observations, &options(&basis, 42.0, noise)).unwrap();
+        let weights: Vec<f64> = match noise {
+            Noise::Equal => vec![1.0; 4],
+            _ => solution.noise.iter().map(|n| 1.0 / n.sigma).collect(),
+        };
+        let problem = Reversal::new(
+            &channels,
+            unknowns.clone(),
+            vec![basis.clone(); 3],
+            axis,
+            42.0,
+            weights.clone(),
+        );
+        let plain = minimise(&problem, start.clone(), Default::default()).unwrap();
+        assert!(plain.converged(), "{}", plain.ending);
+        let cost: f64 = observations
+            .readings
+            .iter()
+            .zip(&solution.residuals)
+            .map(|(reading, r)| 0.5 * (weights[reading.channel.index()] * r).powi(2))
+            .sum();
+        // Truncation: both stop within 1e-12 of the cost.
+        assert!(
+            (cost / plain.cost - 1.0).abs() < 1e-11,
+            "{cost} and {}",
+            plain.cost
+        );
+        for (j, t) in solution.tilts().iter().enumerate() {
+            let error = plain.parameters.border[j] - t.angle.value;
+            // Truncation: 1e-12 of a cost of 1800 lets a tilt move by 6e-5 of its uncertainty.
+            assert!(error.abs() < 1e-4 * t.angle.std, "{}: {error:e}", t.name);
+        }
+        if noise == Noise::PerChannel {
+            // The fixed point: under these weights the noise comes out as one in every channel.
+            for n in &solution.noise {
+                let left = n.readings as f64 * n.residual_rms.powi(2);
+                let again = (left / n.degrees_of_freedom).sqrt();
+                // Truncation: where the rounds end, a change of 1e-4.
+                assert!((again / n.sigma - 1.0).abs() < 2e-4, "{n:?}");
+            }
+        }
     }
 }
 

@@ -14,6 +14,24 @@ pub enum Values {
     Numbers(Vec<f64>),
     /// Text.
     Texts(Vec<String>),
+    /// One of a few words a row: the words, and which of them each row has.
+    Words(Vec<&'static str>, Vec<u8>),
+}
+
+impl Values {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Numbers(v) => v.len(),
+            Self::Texts(v) => v.len(),
+            Self::Words(_, v) => v.len(),
+        }
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
 }
 
 /// A table to be written as CSV.
@@ -50,6 +68,19 @@ impl CsvTable {
         self
     }
 
+    /// Adds a column of words: which of `words` each row has.
+    #[must_use]
+    pub fn words(
+        mut self,
+        name: impl Into<String>,
+        words: impl Into<Vec<&'static str>>,
+        which: impl Into<Vec<u8>>,
+    ) -> Self {
+        self.columns
+            .push((name.into(), Values::Words(words.into(), which.into())));
+        self
+    }
+
     /// Writes the table: UTF-8, LF, comma, decimal point. A shorter column ends in empty fields.
     ///
     /// # Errors
@@ -57,16 +88,7 @@ impl CsvTable {
     pub fn write(&self, writer: impl std::io::Write) -> Result<(), csv::Error> {
         let mut csv = csv::Writer::from_writer(writer);
         csv.write_record(self.columns.iter().map(|(name, _)| name))?;
-        let length = |values: &Values| match values {
-            Values::Numbers(v) => v.len(),
-            Values::Texts(v) => v.len(),
-        };
-        let rows = self
-            .columns
-            .iter()
-            .map(|(_, v)| length(v))
-            .max()
-            .unwrap_or(0);
+        let rows = self.columns.iter().map(|(_, v)| v.len()).max().unwrap_or(0);
         for row in 0..rows {
             for (_, values) in &self.columns {
                 match values {
@@ -74,6 +96,10 @@ impl CsvTable {
                         Some(x) if !x.is_nan() => csv.write_field(x.to_string())?,
                         _ => csv.write_field("")?,
                     },
+                    Values::Words(words, v) => {
+                        let word = v.get(row).and_then(|w| words.get(usize::from(*w)));
+                        csv.write_field(word.copied().unwrap_or(""))?;
+                    }
                     Values::Texts(v) => csv.write_field(v.get(row).map_or("", String::as_str))?,
                 }
             }

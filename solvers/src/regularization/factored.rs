@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{BandedSystem, Point, RegularizationError};
-use crate::linear::banded::{BandInverse, BandTriangle, RowStack, Tall, compress};
+use crate::linear::banded::{BandInverse, BandTriangle, RowStack, Tall, compress, stencil_trace};
 
 /// The factors of a banded system at one λ.
 #[derive(Debug, Clone)]
@@ -92,10 +92,14 @@ impl<'a> Factored<'a> {
         self.forward(&mut pulled);
         self.project(&mut pulled);
         let slope = -4.0 * self.lambda * pulled.iter().map(|v| v * v).sum::<f64>();
-        let inverse = self.inverse();
-        let stopped: f64 = (0..system.penalty_rows())
-            .map(|row| inverse.form(row, system.stencil, None))
-            .sum();
+        // tr L(RᵀR)⁻¹Lᵀ, part by part of the inverse as in `Inverse`, and nothing of it kept.
+        let along = |mut v: Vec<f64>| -> f64 {
+            self.backward(&mut v);
+            system.penalised(&v[..system.band]).map(|x| x * x).sum()
+        };
+        let gained: f64 = (0..system.border).map(|j| along(self.unit(j))).sum();
+        let lost: f64 = self.taken.iter().map(|d| along(d.clone())).sum();
+        let stopped = stencil_trace(&self.triangle, system.stencil) + gained - lost;
         let unknowns = (system.band + system.border - system.conditions.len()) as f64;
         Point {
             lambda: self.lambda,
@@ -122,7 +126,7 @@ impl<'a> Factored<'a> {
         let inverse = self.inverse();
         combinations
             .iter()
-            .map(|w| inverse.form(w.first, &w.band, Some(&w.border)))
+            .map(|w| inverse.form(w.first, &w.band, &w.border))
             .collect()
     }
 
@@ -223,8 +227,14 @@ impl<'a> Factored<'a> {
         }
     }
 
+    /// The unit vector of a border unknown.
+    fn unit(&self, j: usize) -> Vec<f64> {
+        let mut v = vec![0.0; self.system.band + self.system.border];
+        v[self.system.band + j] = 1.0;
+        v
+    }
+
     fn inverse(&self) -> Inverse {
-        let (band, border) = (self.system.band, self.system.border);
         let columns = |start: &dyn Fn(usize) -> Vec<f64>, count: usize| -> Vec<Vec<f64>> {
             (0..count)
                 .map(|k| {
@@ -234,16 +244,11 @@ impl<'a> Factored<'a> {
                 })
                 .collect()
         };
-        let unit = |j: usize| {
-            let mut v = vec![0.0; band + border];
-            v[band + j] = 1.0;
-            v
-        };
         Inverse {
             band: BandInverse::of(&self.triangle),
-            border: columns(&unit, border),
+            border: columns(&|j| self.unit(j), self.system.border),
             taken: columns(&|k| self.taken[k].clone(), self.taken.len()),
-            unknowns: band,
+            unknowns: self.system.band,
         }
     }
 }
@@ -258,7 +263,7 @@ struct Inverse {
 }
 
 impl Inverse {
-    fn form(&self, first: usize, weights: &[f64], border: Option<&[f64]>) -> f64 {
+    fn form(&self, first: usize, weights: &[f64], border: &[f64]) -> f64 {
         let mut form = 0.0;
         for (i, a) in weights.iter().enumerate() {
             for (j, b) in weights.iter().enumerate() {
@@ -266,7 +271,7 @@ impl Inverse {
             }
         }
         let along = |v: &Vec<f64>| {
-            let of_border = border.map_or(0.0, |weights| dot(weights, &v[self.unknowns..]));
+            let of_border = dot(border, &v[self.unknowns..]);
             (dot(weights, &v[first..]) + of_border).powi(2)
         };
         form + self.border.iter().map(along).sum::<f64>()

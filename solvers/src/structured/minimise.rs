@@ -77,7 +77,17 @@ pub struct Minimiser {
     scales: Option<(Vec<f64>, Vec<f64>)>,
     damping: f64,
     growth: f64,
+    undamped_end: UndampedEnd,
     iterations: Vec<Iteration>,
+}
+
+/// What became of full steps near the end: where residuals are large they may lead away from a
+/// minimum that damped steps approach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum UndampedEnd {
+    NotTried,
+    Tried,
+    LedAway,
 }
 
 /// The result of a minimisation.
@@ -137,6 +147,18 @@ impl Fit {
     }
 }
 
+/// A step that changes the rows by no more than this, relative to them, is a few roundings.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// A step that fails though it changes the rows by no more than this fails for the rounding of the
+/// cost: a wrong Jacobian leads astray long before.
+const FAILED_BY_ROUNDING: f64 = 1e-12;
+/// A step that promises no more than this share of the cost is near the end.
+const NEAR: f64 = 1e-9;
+/// Costs that differ by no more than this share are the same up to rounding.
+const SAME_COST: f64 = 1e-12;
+/// A damped step that promises nothing says that this is the end up to this damping; above it, the
+/// damping itself may be why.
+const LITTLE_DAMPING: f64 = 1.0;
 /// First damping after a failed Gauss–Newton step, relative to the squared column norms.
 const FIRST_DAMPING: f64 = 1e-3;
 /// Damping below this is none.
@@ -190,6 +212,7 @@ impl Minimiser {
             scales: None,
             damping: 0.0,
             growth: 2.0,
+            undamped_end: UndampedEnd::NotTried,
             iterations: Vec::new(),
         }
     }
@@ -284,9 +307,11 @@ impl Minimiser {
         let trial = self.at.stepped(&solved.band, &solved.border);
         let settled = self.settled_by(predicted, &solved);
         let accepted = self.iterations.last().is_some_and(|i| i.accepted);
-        if settled.is_some() && self.damping > 0.0 && accepted {
+        let near = settled.is_some() || predicted <= NEAR * cost;
+        if near && self.damping > 0.0 && accepted && self.undamped_end != UndampedEnd::LedAway {
             // The undamped step shows whether it is the end.
             self.damping = 0.0;
+            self.undamped_end = UndampedEnd::Tried;
             return self.advance(problem);
         }
         if let (Some(by), true) = (settled, self.damping == 0.0) {
@@ -301,6 +326,10 @@ impl Minimiser {
                 Ending::NotIdentifiable { by, combinations }
             });
         }
+        if let Some(by) = settled.filter(|_| self.damping <= LITTLE_DAMPING) {
+            // The undamped step has been tried and leads away from a minimum that damped ones found.
+            return self.end_here(problem, by);
+        }
         if self.iterations.len() >= self.options.max_iterations {
             return Progress::Done(Ending::IterationLimit);
         }
@@ -311,7 +340,9 @@ impl Minimiser {
         };
         match next {
             Ok((next, gathered))
-                if next.cost.is_finite() && cost - next.cost > ACCEPTED_GAIN * predicted =>
+                if next.cost.is_finite()
+                    && (cost - next.cost > ACCEPTED_GAIN * predicted
+                        || self.polishes(predicted, next.cost)) =>
             {
                 let gain = (cost - next.cost) / predicted;
                 self.at = trial;
@@ -325,7 +356,14 @@ impl Minimiser {
                 }
             }
             _ => {
+                let failed_by_rounding = self.change(&solved) <= FAILED_BY_ROUNDING;
                 self.record(predicted, false);
+                if self.damping == 0.0 && self.undamped_end == UndampedEnd::Tried {
+                    self.undamped_end = UndampedEnd::LedAway;
+                }
+                if failed_by_rounding {
+                    return self.end_here(problem, Convergence::Step);
+                }
                 self.damping = if self.damping == 0.0 {
                     FIRST_DAMPING
                 } else {
@@ -340,16 +378,49 @@ impl Minimiser {
         Progress::Continue
     }
 
+    /// Ends at the best point so far.
+    fn end_here<P: StructuredProblem>(&mut self, problem: &P, by: Convergence) -> Progress {
+        let constraints = problem.constraints();
+        let missing = constraints.missing(&self.at.band, &self.at.border);
+        let system = &self.evaluation.system;
+        let Ok(solved) = system.solve(constraints, &missing, problem.held()) else {
+            return Progress::Done(Ending::NoDescent);
+        };
+        let combinations = undetermined(problem, system, &solved);
+        self.solved = Some(solved);
+        Progress::Done(if combinations.is_empty() {
+            Ending::Converged(by)
+        } else {
+            Ending::NotIdentifiable { by, combinations }
+        })
+    }
+
     /// Why a step is the last, if it is.
     fn settled_by(&self, predicted: f64, step: &Solved) -> Option<Convergence> {
-        let Evaluation { cost, system } = &self.evaluation;
-        if predicted <= self.options.cost_tolerance * cost {
+        if predicted <= self.options.cost_tolerance * self.evaluation.cost {
             Some(Convergence::Cost)
-        } else if system.change_is_rounding(step, &self.at.band, &self.at.border) {
+        } else if self.change(step) <= ROUNDING {
             Some(Convergence::Step)
         } else {
             None
         }
+    }
+
+    /// Whether a full step is worth taking though it is too small to show in the cost: the promises
+    /// still fall.
+    fn polishes(&self, predicted: f64, next: f64) -> bool {
+        let cost = self.evaluation.cost;
+        self.damping == 0.0
+            && (next - cost).abs() <= SAME_COST * cost
+            && self.iterations.last().is_some_and(|last| {
+                last.accepted && last.damping == 0.0 && predicted < 0.5 * last.predicted
+            })
+    }
+
+    /// By how much a step changes the rows, relative to what they are.
+    fn change(&self, step: &Solved) -> f64 {
+        let system = &self.evaluation.system;
+        system.relative_change(step, &self.at.band, &self.at.border)
     }
 
     /// The result.
@@ -403,7 +474,7 @@ pub fn minimise<P: StructuredProblem>(
     }
 }
 
-/// Diagonals of the band below this share of the largest count as zero.
+/// Diagonals of the band below this share of their column count as zero.
 const BAND_RANK_TOLERANCE: f64 = 1e-11;
 
 /// A share in an undetermined combination below this is rounding.

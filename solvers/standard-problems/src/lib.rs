@@ -4,6 +4,7 @@
 //! the collection of Moré, Garbow & Hillstrom. Models are written once, over any [`Scalar`]; their
 //! derivatives come from the chain rule on [`Dual`] numbers and are exact to rounding.
 
+pub mod banded;
 pub mod dual;
 pub mod mgh;
 pub mod separable;

@@ -14,10 +14,12 @@ use std::time::Instant;
 
 use clap::ValueEnum;
 use errsep_models::reversal::staged::Removal;
+use serde_json::Value;
 
-use super::{Answer, CommonArgs};
+use super::{Answer, CommonArgs, Format};
 use crate::io::reversal::{ColumnMap, ReversalData, ReversalSetup, read};
 use crate::io::{Message, Status};
+use crate::report::Page;
 use outcome::Outcome;
 
 /// Reversal: the tilt between slide and spindle, the form of the slide and of the artefact.
@@ -82,11 +84,25 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     progress.finish_and_clear();
     let mut inputs = vec![args.data.clone()];
     inputs.extend(args.setup.clone());
+    // Of a million readings each of these is as large as the data: made only where asked for.
+    let folder = args.common.out.is_some();
+    let (page, tables) = if folder {
+        (
+            page::page(&args.data, &data, &setup, &outcome),
+            tables::tables(&outcome),
+        )
+    } else {
+        (Page::new("Reversal", String::new()), Vec::new())
+    };
     Ok(Answer {
         text: text::text(&args.data, &data, &outcome),
-        json: json::json(&data, &outcome)?,
-        page: page::page(&args.data, &data, &setup, &outcome),
-        tables: tables::tables(&outcome),
+        json: if folder || args.common.format == Format::Json {
+            json::json(&data, &outcome)?
+        } else {
+            Value::Null
+        },
+        page,
+        tables,
         inputs,
         seed: None,
         status: Status::Done,

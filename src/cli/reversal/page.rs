@@ -72,7 +72,7 @@ pub fn page(file: &Path, data: &ReversalData, setup: &ReversalSetup, o: &Outcome
             .residuals
             .iter()
             .map(|r| Residual {
-                channel: r.channel.name().to_owned(),
+                channel: r.channel.name(),
                 repeat: r.repeat as usize,
                 backward: r.backward,
                 x: r.x,

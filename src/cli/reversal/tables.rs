@@ -1,5 +1,7 @@
 //! The profiles and residuals as CSV.
 
+use errsep_models::reversal::Channel;
+
 use super::outcome::Outcome;
 use crate::io::CsvTable;
 
@@ -21,16 +23,22 @@ pub fn tables(o: &Outcome) -> Vec<CsvTable> {
         );
     }
     if !o.residuals.is_empty() {
-        let of = |f: fn(&super::outcome::Residual) -> String| {
-            o.residuals.iter().map(f).collect::<Vec<_>>()
-        };
+        let rows = &o.residuals;
+        let channels = rows.iter().map(|r| r.channel.index() as u8);
+        let repeats = rows.iter().map(|r| f64::from(r.repeat));
+        let directions = rows.iter().map(|r| u8::from(r.backward));
         tables.push(
             CsvTable::new("residuals.csv")
-                .texts("channel", of(|r| r.channel.name().to_owned()))
-                .texts("repeat", of(|r| r.repeat.to_string()))
-                .texts(
+                .words(
+                    "channel",
+                    Channel::ALL.map(Channel::name),
+                    channels.collect::<Vec<_>>(),
+                )
+                .numbers("repeat", repeats.collect::<Vec<_>>())
+                .words(
                     "direction",
-                    of(|r| if r.backward { "backward" } else { "forward" }.to_owned()),
+                    ["forward", "backward"],
+                    directions.collect::<Vec<_>>(),
                 )
                 .numbers("x_mm", o.residuals.iter().map(|r| r.x).collect::<Vec<_>>())
                 .numbers(

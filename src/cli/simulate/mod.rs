@@ -79,8 +79,7 @@ fn summary(answer: &Answer) -> String {
     );
     for table in &answer.tables {
         let rows = match table.columns.first() {
-            Some((_, Values::Numbers(column))) => column.len(),
-            Some((_, Values::Texts(column))) => column.len(),
+            Some((_, column)) => column.len(),
             None => 0,
         };
         let _ = writeln!(text, "  {}: {rows} rows", table.file_name);
@@ -133,6 +132,11 @@ pub(super) fn answer(
                         .collect::<Vec<_>>()
                 ),
                 Values::Texts(v) => json!(v),
+                Values::Words(words, v) => json!(
+                    v.iter()
+                        .map(|w| words.get(usize::from(*w)))
+                        .collect::<Vec<_>>()
+                ),
             };
             (name.clone(), values)
         })

@@ -3,6 +3,8 @@
 
 mod view;
 
+use std::collections::BTreeSet;
+
 pub use view::{Angle, Closure, Contrast, Convergence, Form, Knots, Residual, Straightness, View};
 
 use super::plot::{Axis, Chart, Mark, Panels, Series};
@@ -173,11 +175,8 @@ fn residuals(view: &View) -> Section {
     section
 }
 
-fn channels(view: &View) -> Vec<&str> {
-    let mut names: Vec<&str> = view.residuals.iter().map(|r| r.channel.as_str()).collect();
-    names.sort_unstable();
-    names.dedup();
-    names
+fn channels(view: &View) -> BTreeSet<&str> {
+    view.residuals.iter().map(|r| r.channel).collect()
 }
 
 /// The residuals of one channel in one direction of travel, in order of position.

@@ -108,7 +108,7 @@ pub struct Straightness {
 #[derive(Debug, Clone, Default)]
 pub struct Residual {
     /// `1A`, `1B`, `2A` or `2B`.
-    pub channel: String,
+    pub channel: &'static str,
     /// Number of the repeat.
     pub repeat: usize,
     /// Whether the slide moved backward.

@@ -10,5 +10,5 @@ mod triangle;
 
 pub use compress::{Tall, compress};
 pub use fold::RowStack;
-pub use inverse::BandInverse;
+pub use inverse::{BandInverse, stencil_trace};
 pub use triangle::BandTriangle;

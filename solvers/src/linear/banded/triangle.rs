@@ -63,13 +63,26 @@ impl BandTriangle {
         self.values[i * self.stride]
     }
 
-    /// Unknowns whose diagonal is below `tolerance` times the largest: the rows do not determine
-    /// them.
+    /// Unknowns whose diagonal is at most `tolerance` times the norm of their column: the rows do not
+    /// determine them beside those before.
     pub fn undetermined(&self, tolerance: f64) -> Vec<usize> {
-        let largest = (0..self.n).fold(0.0_f64, |m, i| m.max(self.diagonal(i).abs()));
+        let mut squares = vec![0.0; self.n];
+        for i in 0..self.n {
+            for (sum, r) in squares[i..].iter_mut().zip(self.band(i)) {
+                *sum += r * r;
+            }
+        }
         (0..self.n)
-            .filter(|&i| self.diagonal(i).abs() <= tolerance * largest)
+            .filter(|&i| self.diagonal(i).abs() <= tolerance * squares[i].sqrt())
             .collect()
+    }
+
+    /// Takes row i out and leaves zeros: its band after the diagonal, then its dense columns.
+    pub(crate) fn take_row(&mut self, i: usize) -> Vec<f64> {
+        let mut row = self.band(i)[1..].to_vec();
+        row.extend_from_slice(self.tail_row(i));
+        self.values[i * self.stride..(i + 1) * self.stride].fill(0.0);
+        row
     }
 
     /// x ← R⁻¹x. Unknowns with a zero diagonal get zero.

@@ -13,6 +13,9 @@ pub struct Share {
     pub weight: f64,
 }
 
+/// A diagonal of the band at or below this share of its column is rounding.
+const BAND_ROUNDING: f64 = 1e-13;
+
 /// A group of rows that see the same unknowns, already compressed to a triangle.
 ///
 /// Columns of the border that are combinations of the local columns cost nothing a row: they are
@@ -128,7 +131,7 @@ impl Bordered {
             return;
         }
         if self.pending.rows() == Tall::CAPACITY {
-            self.finish();
+            self.bring_in();
         }
         let at = self.pending.rows();
         self.pending.reset(at + 1, self.border + 1);
@@ -137,8 +140,36 @@ impl Bordered {
         }
     }
 
-    /// Brings rows still waiting into the triangle of the border.
+    /// Ends the building: brings rows still waiting into the triangle of the border, and takes out
+    /// unknowns of the band that the rows do not determine.
     pub fn finish(&mut self) {
+        self.bring_in();
+        self.take_out_undetermined();
+        self.bring_in();
+    }
+
+    /// Where only rounding is left on the diagonal, the rest of the row belongs to the unknowns after
+    /// it: it is folded in there, and the diagonal becomes zero, for which a solution gives no step.
+    fn take_out_undetermined(&mut self) {
+        for i in self.triangle.undetermined(BAND_ROUNDING) {
+            let row = self.triangle.take_row(i);
+            let (band, tail) = row.split_at(row.len() - self.border - 1);
+            if band.iter().all(|r| *r == 0.0) {
+                self.push_border_row(tail);
+                continue;
+            }
+            let mut stack = std::mem::take(&mut self.stack);
+            stack.reset(i + 1, band.len(), self.border + 1, 1);
+            stack.row_mut(0).copy_from_slice(&row);
+            self.triangle.fold(&mut stack);
+            for tail in stack.tails() {
+                self.push_border_row(tail);
+            }
+            self.stack = stack;
+        }
+    }
+
+    fn bring_in(&mut self) {
         compress(&mut self.pending, &mut self.corner);
         self.pending.reset(0, self.border + 1);
     }

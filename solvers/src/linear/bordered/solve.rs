@@ -142,11 +142,9 @@ impl Bordered {
         })
     }
 
-    /// Whether a step changes the rows' linear prediction by no more than a few roundings of it:
-    /// ‖Rδ‖ ≤ 4 ε ‖R p‖.
-    pub fn change_is_rounding(&self, step: &Solved, band: &[f64], border: &[f64]) -> bool {
-        self.image_norm(&step.band, &step.border)
-            <= 4.0 * f64::EPSILON * self.image_norm(band, border)
+    /// By how much a step changes the rows' linear prediction, relative to it: ‖Rδ‖/‖R p‖.
+    pub fn relative_change(&self, step: &Solved, band: &[f64], border: &[f64]) -> f64 {
+        self.image_norm(&step.band, &step.border) / self.image_norm(band, border)
     }
 
     fn image_norm(&self, band: &[f64], border: &[f64]) -> f64 {

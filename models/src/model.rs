@@ -185,6 +185,11 @@ impl Shape {
             steps: Vec::new(),
         }
     }
+
+    /// Number of parameters that the search may change.
+    pub fn free(&self) -> usize {
+        self.steps.iter().filter(|step| **step != 0.0).count()
+    }
 }
 
 /// What people should know of an effect.
@@ -230,6 +235,18 @@ pub trait Effect<M>: Send + Sync {
     /// The shape that belongs to estimated amplitudes, for effects whose signature depends on
     /// their size.
     fn settled(&self, _shape: &Shape, _amplitudes: &[f64]) -> Option<Shape> {
+        None
+    }
+
+    /// The readings without this effect, where taking its change out of them does not suffice
+    /// because the effect hides a part of the state: from the readings with it and those less its
+    /// change, `clean`.
+    fn restored(
+        &self,
+        _model: &M,
+        _readings: &DVector<f64>,
+        _clean: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
         None
     }
 

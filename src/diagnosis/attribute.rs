@@ -8,7 +8,8 @@
 use errsep_models::model::FittedModel;
 use nalgebra::DVector;
 
-use super::bench::{Bench, Cause, Remainder, finer};
+use super::bench::{Bench, Cause, Remainder, finer, raw_signatures};
+use super::quantify::held_out_square;
 
 /// A set of causes whose remainder is less probable than this is not adequate.
 const ADEQUATE: f64 = 0.002;
@@ -20,6 +21,8 @@ const HOPELESS: f64 = 80.0;
 const TIED: f64 = 9.2;
 /// Most rounds of fitting the state without the causes.
 const ROUNDS: usize = 8;
+/// Number of pairs that are fitted with everything else free.
+const PAIRS: usize = 3;
 /// Greatest number of effects in one verdict.
 const MOST: usize = 3;
 
@@ -64,7 +67,49 @@ pub(super) fn attribute<M: FittedModel>(
         causes.clone_from(&answer.causes);
         best_partial = Some(answer);
     }
-    best_partial
+    pairs(bench, readings, first)
+        .into_iter()
+        .map(|causes| confidence_set(bench, readings, &causes))
+        .find(|answer| answer.complete)
+        .or(best_partial)
+}
+
+/// Pairs of effects of which each stands out beside the other though neither need do so alone, the
+/// best fits first.
+fn pairs<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    first: &Remainder,
+) -> Vec<Vec<Cause>> {
+    let mut found: Vec<(f64, Vec<Cause>)> = Vec::new();
+    for effect in 0..bench.catalogue.len() {
+        let Some(start) = bench.start(first, effect) else {
+            continue;
+        };
+        let one = vec![bench.cause(bench.model, effect, start.clone())];
+        let beside = bench.remainder(readings, &one);
+        for other in effect + 1..bench.catalogue.len() {
+            if bench.p_value(&beside, other) > EARNED {
+                continue;
+            }
+            let Some(start) = bench.start(&beside, other) else {
+                continue;
+            };
+            let second = bench.cause(bench.model, other, start.clone());
+            let pair = vec![one[0].clone(), second];
+            found.push((bench.misfit(readings, &pair), pair));
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Coarse fits further above the best than this cannot become the best by refining.
+    let reach = found.first().map_or(0.0, |(least, _)| 1.3 * least);
+    found.retain(|(misfit, _)| *misfit <= reach);
+    found.truncate(PAIRS);
+    let polished = found.into_iter().map(|(_, mut pair)| {
+        polish(bench, readings, &mut pair);
+        pair
+    });
+    polished.collect()
 }
 
 /// The refined effect with the greatest statistic beside the causes.
@@ -187,13 +232,31 @@ fn confidence_set<M: FittedModel>(
         || (0..best.len()).all(|k| {
             let remainder = bench.remainder(readings, &without(&best, k));
             bench.p_value(&remainder, best[k].effect) < EARNED
-        });
+        }) && predicts(bench, readings, &best);
     Answer {
         causes: best,
         groups,
         adequacy,
         complete: needed && adequacy > ADEQUATE,
     }
+}
+
+/// Whether each of several causes makes the prediction of held-out repeats better; a cause that
+/// happened once cannot be judged so.
+fn predicts<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> bool {
+    let noise = bench.law.sigma().powi(2);
+    let square = |causes: &[Cause]| {
+        let signatures = raw_signatures(bench, causes);
+        held_out_square(bench.model, readings, &signatures, noise)
+    };
+    let Some(with) = square(causes) else {
+        return true;
+    };
+    (0..causes.len()).all(|k| square(&without(causes, k)).is_none_or(|s| s > with))
 }
 
 /// The effects that are adequate in the place of cause `k`, the best fit first.

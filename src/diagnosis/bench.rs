@@ -1,11 +1,14 @@
 //! The workbench of one pass: state of the model, noise, space, dictionary and their null law.
 
+use std::sync::Arc;
+
 use errsep_models::model::{Column, Effect, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector};
 
 use rayon::prelude::*;
 
-use super::dictionary::{Dictionary, Entry, Meaning, products, statistic, surprise};
+use super::dictionary::{Dictionary, Entry, Meaning, Places, products, statistic, surprise};
+use super::folding::Sums;
 use super::noise::NoiseLaw;
 use super::null::NullLaw;
 use super::search::compass;
@@ -24,7 +27,7 @@ pub(super) struct Bench<'a, M: FittedModel> {
     pub law: NoiseLaw,
     pub space: Space,
     pub dictionary: Dictionary,
-    pub null: NullLaw,
+    pub null: Arc<NullLaw>,
 }
 
 /// A cause at a shape, with its whitened, projected signature.
@@ -46,6 +49,7 @@ pub(super) struct Remainder {
 }
 
 impl<'a, M: FittedModel> Bench<'a, M> {
+    /// A bench with a null law of its own.
     pub fn new(
         model: &'a M,
         catalogue: &'a [Box<dyn Effect<M>>],
@@ -53,9 +57,10 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         draws: usize,
         seed: u64,
     ) -> Self {
+        let places = Arc::new(Places::new(model));
         let space = Space::new(model, &law);
-        let dictionary = Dictionary::new(model, catalogue, &space, &law);
-        let null = NullLaw::simulate(&dictionary, &space, &law, draws, seed);
+        let dictionary = Dictionary::new(model, catalogue, places, &space, &law);
+        let null = Arc::new(NullLaw::simulate(&dictionary, &space, &law, draws, seed));
         Self {
             model,
             catalogue,
@@ -63,6 +68,26 @@ impl<'a, M: FittedModel> Bench<'a, M> {
             space,
             dictionary,
             null,
+        }
+    }
+
+    /// The bench of another state and law of noise of the same readings. The null law is kept: it
+    /// is one of standardised scores, so it knows the noise only through the angles between the
+    /// signatures, and a state some hundredths away leaves those as they are.
+    pub fn moved<'b>(&self, model: &'b M, law: NoiseLaw) -> Bench<'b, M>
+    where
+        'a: 'b,
+    {
+        let space = Space::new(model, &law);
+        let places = Arc::clone(&self.dictionary.places);
+        let dictionary = Dictionary::new(model, self.catalogue, places, &space, &law);
+        Bench {
+            model,
+            catalogue: self.catalogue,
+            law,
+            space,
+            dictionary,
+            null: Arc::clone(&self.null),
         }
     }
 
@@ -103,9 +128,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
                 break;
             }
             last = Some(amplitudes.clone());
-            let state = self
-                .model
-                .refit(readings - self.change(&causes, &amplitudes));
+            let state = self.without(readings, &causes, &amplitudes);
             for k in 0..causes.len() {
                 let mut others = causes.clone();
                 let own = others.remove(k);
@@ -116,20 +139,43 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         causes
     }
 
+    /// The state fitted to readings without causes at given amplitudes.
+    pub fn without(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+        amplitudes: &DVector<f64>,
+    ) -> M {
+        let mut clean = readings - self.change(causes, amplitudes);
+        let mut at = 0;
+        for cause in causes {
+            let count = cause.columns.len();
+            let own = amplitudes.rows(at, count).clone_owned();
+            at += count;
+            let with = &clean + self.change(std::slice::from_ref(cause), &own);
+            if let Some(restored) = self.catalogue[cause.effect].restored(self.model, &with, &clean)
+            {
+                clean = restored;
+            }
+        }
+        self.model.refit(clean)
+    }
+
     /// Scores of everything beside some causes.
     pub fn remainder(&self, readings: &DVector<f64>, causes: &[Cause]) -> Remainder {
         let whole = self.residual(readings);
         let basis = span(causes, self.space.readings());
         let residual = &whole - &basis * basis.tr_mul(&whole);
-        let adjoint = column(self.space.adjoint(as_matrix(&residual)));
-        let directions: Vec<DVector<f64>> = self
+        let sums = |c: DVector<f64>| self.dictionary.places.sums(&c);
+        let adjoint = sums(column(self.space.adjoint(as_matrix(&residual))));
+        let directions: Vec<Sums> = self
             .space
             .adjoint(basis.clone())
             .column_iter()
-            .map(|c| c.clone_owned())
+            .map(|c| sums(c.clone_owned()))
             .collect();
         let surprise_of = |entry: &Entry| -> f64 {
-            let score = products(&entry.columns, &adjoint);
+            let score = entry.products(&adjoint);
             let t = if directions.is_empty() {
                 statistic(&entry.gram, &score, entry.positive)
             } else {
@@ -140,7 +186,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
                 }
                 statistic(&left, &score, entry.positive)
             };
-            surprise(t, entry.columns.len())
+            surprise(t, entry.order())
         };
         let surprises: Vec<f64> = self
             .dictionary
@@ -191,11 +237,18 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         let model = &self.catalogue[effect];
         let amplitudes = model.amplitudes();
         let positive = amplitudes.len() == 1 && amplitudes[0].low >= 0.0;
+        let adjoint = column(self.space.adjoint(as_matrix(&residual)));
+        let directions = self.space.adjoint(basis);
+        let directions: Vec<DVector<f64>> =
+            directions.column_iter().map(|c| c.clone_owned()).collect();
         let value = |shape: &Shape| {
-            let projected = self.space.forward_columns(&model.columns(state, shape)).0;
-            let clear = &projected - &basis * basis.tr_mul(&projected);
-            let gram = clear.tr_mul(&clear);
-            let score = clear.tr_mul(&residual);
+            let columns = model.columns(state, shape);
+            let mut gram = self.space.gram(&columns, 0.0).matrix;
+            for direction in &directions {
+                let along = products(&columns, direction);
+                gram -= &along * along.transpose();
+            }
+            let score = products(&columns, &adjoint);
             (statistic(&gram, &score, positive), gram, score)
         };
         let mut shape = start.clone();
@@ -300,10 +353,10 @@ impl<'a, M: FittedModel> Bench<'a, M> {
     }
 }
 
-fn overlaps(entry: &Entry, directions: &[DVector<f64>]) -> DMatrix<f64> {
-    let mut overlap = DMatrix::zeros(entry.columns.len(), directions.len());
+fn overlaps(entry: &Entry, directions: &[Sums]) -> DMatrix<f64> {
+    let mut overlap = DMatrix::zeros(entry.order(), directions.len());
     for (j, direction) in directions.iter().enumerate() {
-        overlap.set_column(j, &products(&entry.columns, direction));
+        overlap.set_column(j, &entry.products(direction));
     }
     overlap
 }
@@ -324,6 +377,24 @@ pub(super) fn stack(causes: &[Cause], readings: usize) -> DMatrix<f64> {
         .collect();
     if columns.is_empty() {
         DMatrix::zeros(readings, 0)
+    } else {
+        DMatrix::from_columns(&columns)
+    }
+}
+
+/// Signatures as they stand in the readings, readings × amplitudes.
+pub(super) fn raw_signatures<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    causes: &[Cause],
+) -> DMatrix<f64> {
+    let n = bench.space.readings();
+    let columns: Vec<DVector<f64>> = causes
+        .iter()
+        .flat_map(|c| &c.columns)
+        .map(|c| c.dense(n))
+        .collect();
+    if columns.is_empty() {
+        DMatrix::zeros(n, 0)
     } else {
         DMatrix::from_columns(&columns)
     }

@@ -3,10 +3,13 @@
 //! The score of a signature E on a projected residual e is T = |(EᵀPE)^(−½) Eᵀ a|², a = L⁻ᵀ P e:
 //! chi-squared with as many degrees of freedom as E has columns when nothing is there.
 
+use std::sync::Arc;
+
 use errsep_models::model::{Column, Effect, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::folding::{BatchSums, Folded, Folding, Sums};
 use super::localise::{Item, scan_items};
 use super::noise::NoiseLaw;
 use super::space::Space;
@@ -29,7 +32,7 @@ pub struct Entry {
     /// What it stands for.
     pub meaning: Meaning,
     /// Its columns.
-    pub columns: Vec<Column>,
+    columns: Vec<Folded>,
     /// EᵀPE.
     pub gram: DMatrix<f64>,
     /// Part of its whitened length that the fit does not absorb.
@@ -53,6 +56,66 @@ pub struct Family {
     pub visible: f64,
 }
 
+impl Entry {
+    /// Number of columns.
+    pub fn order(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Eᵀ a.
+    pub fn products(&self, adjoint: &Sums) -> DVector<f64> {
+        DVector::from_iterator(
+            self.columns.len(),
+            self.columns.iter().map(|c| c.dot(adjoint)),
+        )
+    }
+
+    /// Eᵀ a for several a.
+    pub fn batch_products<const BATCH: usize>(
+        &self,
+        adjoint: &BatchSums<BATCH>,
+    ) -> Vec<[f32; BATCH]> {
+        self.columns.iter().map(|c| c.batch_dot(adjoint)).collect()
+    }
+}
+
+/// The places to look at: the same for every state and every law of noise.
+#[derive(Debug)]
+pub struct Places {
+    folding: Folding,
+    axes: Vec<(&'static str, Vec<(Item, Vec<Folded>)>)>,
+}
+
+impl Places {
+    /// All places at which a model's readings can be looked.
+    pub fn new<M: FittedModel>(model: &M) -> Self {
+        let folding = Folding::new(model.places());
+        let axes = scan_items(model)
+            .into_iter()
+            .map(|(axis, items)| {
+                let folded = items
+                    .into_iter()
+                    .map(|(item, columns)| {
+                        (item, columns.iter().map(|c| folding.fold(c)).collect())
+                    })
+                    .collect();
+                (axis, folded)
+            })
+            .collect();
+        Self { folding, axes }
+    }
+
+    /// A vector with its sums, for [`Entry::products`].
+    pub fn sums(&self, vector: &DVector<f64>) -> Sums {
+        self.folding.sums(vector)
+    }
+
+    /// The columns of a matrix with their sums, for [`Entry::batch_products`].
+    pub fn batch_sums<const BATCH: usize>(&self, columns: &DMatrix<f64>) -> BatchSums<BATCH> {
+        self.folding.batch_sums(columns)
+    }
+}
+
 /// The dictionary of one model, state and law of noise.
 #[derive(Debug, Clone)]
 pub struct Dictionary {
@@ -60,6 +123,8 @@ pub struct Dictionary {
     pub entries: Vec<Entry>,
     /// Families: the effects of the catalogue in its order, then the axes.
     pub families: Vec<Family>,
+    /// The places to look at.
+    pub places: Arc<Places>,
 }
 
 impl Dictionary {
@@ -67,50 +132,59 @@ impl Dictionary {
     pub fn new<M: FittedModel>(
         model: &M,
         catalogue: &[Box<dyn Effect<M>>],
+        places: Arc<Places>,
         space: &Space,
         law: &NoiseLaw,
     ) -> Self {
         let mut dictionary = Self {
             entries: Vec::new(),
             families: Vec::new(),
+            places: Arc::clone(&places),
         };
+        let folding = &places.folding;
         for effect in catalogue {
             let amplitudes = effect.amplitudes();
             let positive = amplitudes.len() == 1 && amplitudes[0].low >= 0.0;
-            let signatures: Vec<(Meaning, Vec<Column>)> = effect
+            let built = effect
                 .grid(model)
                 .into_par_iter()
                 .map(|shape| {
                     let columns = effect.columns(model, &shape);
-                    (Meaning::Effect(shape), columns)
+                    let folded = columns.iter().map(|c| folding.fold(c)).collect();
+                    entry(
+                        Meaning::Effect(shape),
+                        &columns,
+                        folded,
+                        positive,
+                        space,
+                        law,
+                    )
                 })
                 .collect();
-            dictionary.add(effect.name(), true, signatures, positive, space, law);
+            dictionary.add(effect.name(), true, built);
         }
-        for (axis, items) in scan_items(model) {
-            let signatures = items
-                .into_iter()
-                .map(|(item, columns)| (Meaning::Place(item), columns))
+        for (axis, items) in &places.axes {
+            let built = items
+                .par_iter()
+                .map(|(item, folded)| {
+                    let columns: Vec<Column> = folded.iter().map(|c| folding.unfold(c)).collect();
+                    let meaning = Meaning::Place(item.clone());
+                    entry(meaning, &columns, folded.clone(), false, space, law)
+                })
                 .collect();
-            dictionary.add(axis, false, signatures, false, space, law);
+            dictionary.add(axis, false, built);
         }
         dictionary
     }
 
-    fn add(
-        &mut self,
-        name: &str,
-        is_effect: bool,
-        signatures: Vec<(Meaning, Vec<Column>)>,
-        positive: bool,
-        space: &Space,
-        law: &NoiseLaw,
-    ) {
+    /// The columns of an entry.
+    pub fn columns(&self, entry: &Entry) -> Vec<Column> {
+        let folding = &self.places.folding;
+        entry.columns.iter().map(|c| folding.unfold(c)).collect()
+    }
+
+    fn add(&mut self, name: &str, is_effect: bool, built: Vec<Option<Entry>>) {
         let start = self.entries.len();
-        let built: Vec<Option<Entry>> = signatures
-            .into_par_iter()
-            .map(|(meaning, columns)| entry(meaning, columns, positive, space, law))
-            .collect();
         let mut visible: f64 = 0.0;
         for entry in built.into_iter().flatten() {
             visible = visible.max(entry.visible);
@@ -144,31 +218,23 @@ pub(super) fn products(columns: &[Column], adjoint: &DVector<f64>) -> DVector<f6
 
 fn entry(
     meaning: Meaning,
-    columns: Vec<Column>,
+    columns: &[Column],
+    folded: Vec<Folded>,
     positive: bool,
     space: &Space,
     law: &NoiseLaw,
 ) -> Option<Entry> {
-    let (projected, sizes) = space.forward_columns(&columns);
-    let gram = projected.tr_mul(&projected);
-    let whole: f64 = sizes.iter().map(|s| s * s).sum();
-    if columns.is_empty() || whole.is_nan() || whole <= 0.0 {
+    let gram = space.gram(columns, law.shift);
+    if columns.is_empty() || gram.whole.is_nan() || gram.whole <= 0.0 {
         return None;
     }
-    let visible = (gram.trace() / whole).clamp(0.0, 1.0);
-    let unit = {
-        let column = projected.column(0);
-        column / column.norm().max(f64::MIN_POSITIVE)
-    };
     Some(Entry {
-        shift_share: space
-            .shift_share(&unit.clone_owned(), law.shift)
-            .clamp(0.0, 1.0),
         meaning,
-        columns,
-        gram,
-        visible,
+        columns: folded,
+        visible: (gram.matrix.trace() / gram.whole).clamp(0.0, 1.0),
+        gram: gram.matrix,
         positive,
+        shift_share: gram.shift_share,
     })
 }
 
@@ -177,17 +243,22 @@ pub(super) fn statistic(gram: &DMatrix<f64>, score: &DVector<f64>, positive: boo
     if positive && score[0] <= 0.0 {
         return 0.0;
     }
-    match (gram.nrows(), gram[(0, 0)]) {
-        (1, size) => score[0] * score[0] / size.max(f64::MIN_POSITIVE),
-        _ => {
-            // A breath of ridge: two columns may coincide at the ends of a grid.
-            let ridge = 1e-9 * gram.trace();
-            let lifted = gram + DMatrix::identity(gram.nrows(), gram.nrows()) * ridge;
-            lifted
-                .cholesky()
-                .map_or(0.0, |factor| score.dot(&factor.solve(score)))
-        }
+    if gram.nrows() == 1 {
+        return score[0] * score[0] / gram[(0, 0)].max(f64::MIN_POSITIVE);
     }
+    score.dot(&(inverse(gram) * score)).max(0.0)
+}
+
+/// (EᵀPE)⁻¹ with a breath of ridge: two columns may coincide at the ends of a grid.
+pub(super) fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = gram.nrows();
+    if n == 1 {
+        return DMatrix::from_element(1, 1, 1.0 / gram[(0, 0)].max(f64::MIN_POSITIVE));
+    }
+    let lifted = gram + DMatrix::identity(n, n) * (1e-9 * gram.trace());
+    lifted
+        .cholesky()
+        .map_or_else(|| DMatrix::zeros(n, n), |factor| factor.inverse())
 }
 
 /// −2 ln of the chi-squared tail beyond T.

@@ -6,12 +6,14 @@
 //! probability, from 2.33/(|Ê| sin θ/2) (difference of two chi-squared statistics as a product of
 //! two normal variables).
 
+use std::sync::Arc;
+
 use errsep_models::model::{Effect, FittedModel};
 use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::Options;
-use super::dictionary::{Dictionary, Meaning, products, statistic};
+use super::dictionary::{Dictionary, Meaning, Places, statistic};
 use super::noise::NoiseLaw;
 use super::null::NullLaw;
 use super::space::Space;
@@ -52,9 +54,11 @@ pub fn certificate<M: FittedModel>(
     options: &Options,
 ) -> Vec<Diagnosability> {
     let space = Space::new(model, law);
-    let dictionary = Dictionary::new(model, catalogue, &space, law);
+    let places = Arc::new(Places::new(model));
+    let dictionary = Dictionary::new(model, catalogue, places, &space, law);
     let null = NullLaw::simulate(&dictionary, &space, law, options.draws, options.seed);
     let quantities = model.quantities();
+    let level = null.level(options.false_alarm);
     let n = space.readings();
     let mut rows = Vec::new();
     for effect in catalogue {
@@ -97,20 +101,21 @@ pub fn certificate<M: FittedModel>(
         if visible >= 0.01 && !entries.is_empty() {
             // The middle of the grid stands for the family.
             let entry = &entries[entries.len() / 2];
-            let (projected, _) = space.forward_columns(&entry.columns);
+            let (projected, _) = space.forward_columns(&dictionary.columns(entry));
             let length = projected.column(0).norm();
             let unit = projected.column(0) / length.max(f64::MIN_POSITIVE);
             let adjoint = space
                 .adjoint(DMatrix::from_column_slice(n, 1, unit.as_slice()))
                 .column(0)
                 .clone_owned();
+            let adjoint = dictionary.places.sums(&adjoint);
             for other in dictionary
                 .families
                 .iter()
                 .filter(|f| f.is_effect && f.name != effect.name())
             {
                 for candidate in &dictionary.entries[other.entries.clone()] {
-                    let score = products(&candidate.columns, &adjoint);
+                    let score = candidate.products(&adjoint);
                     let cosine = statistic(&candidate.gram, &score, false)
                         .clamp(0.0, 1.0)
                         .sqrt();
@@ -120,7 +125,7 @@ pub fn certificate<M: FittedModel>(
                     }
                 }
             }
-            let threshold = null.threshold(family, options.false_alarm);
+            let threshold = null.threshold(family, level);
             let smallest = (threshold.sqrt() + POWER) / length;
             row.detectable = Some(smallest);
             row.visible_rms = Some(smallest * length * law.sigma() / (n as f64).sqrt());

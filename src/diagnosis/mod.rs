@@ -6,18 +6,25 @@
 
 mod attribute;
 mod bench;
+mod candidates;
 mod dictionary;
+mod folding;
 mod geometry;
+mod hidden;
 mod localise;
 mod noise;
 mod null;
+mod places;
 mod prove;
 mod quantify;
 mod report;
 mod search;
 mod space;
+mod spikes;
+mod statement;
 mod tabulated;
 mod verdict;
+mod whitening;
 
 use errsep_models::model::{Effect, FittedModel};
 use nalgebra::DVector;
@@ -73,43 +80,86 @@ pub fn diagnose_with<M: FittedModel>(
         .filter(|effect| !options.without.iter().any(|name| name == effect.name()))
         .collect();
     let readings = model.linearised();
+    let (calm, spikes) = spikes::pulled_in(model, &readings);
+    let calmed;
+    let (model, readings) = if spikes == 0 {
+        (model, readings)
+    } else {
+        calmed = model.refit(model.observed() + (calm - &readings));
+        let readings = calmed.linearised();
+        (&calmed, readings)
+    };
     let law = noise_of(model, &readings);
     let bench = Bench::new(model, &catalogue, law, options.draws, options.seed);
-    let first = bench.remainder(&readings, &[]);
-    if first.global > options.false_alarm {
-        return report::compose(&bench, &readings, &first, first.global, None, options);
-    }
-    let found = attribute(&bench, &readings, &first);
-    second_pass(model, &catalogue, &bench, &readings, first, found, options)
+    examined(&bench, &readings, options.false_alarm, |examined| {
+        report::compose(&examined, spikes, options)
+    })
+}
+
+/// What a diagnosis has come to before it is put in words.
+struct Examined<'a, M: FittedModel> {
+    bench: &'a Bench<'a, M>,
+    readings: &'a DVector<f64>,
+    first: &'a Remainder,
+    /// Probability of as much standing out with nothing there.
+    detected: f64,
+    found: Option<Answer>,
 }
 
 /// Causes bend the fitted state and swell the noise; both are found again without them, and the
 /// diagnosis is made once more from there.
-fn second_pass<M: FittedModel>(
-    model: &M,
-    catalogue: &[Box<dyn Effect<M>>],
+fn examined<M: FittedModel, R>(
     bench: &Bench<'_, M>,
     readings: &DVector<f64>,
-    first: Remainder,
-    found: Option<Answer>,
-    options: &Options,
-) -> Diagnosis {
+    false_alarm: f64,
+    then: impl FnOnce(Examined<'_, M>) -> R,
+) -> R {
+    let first = bench.remainder(readings, &[]);
     let detected = first.global;
-    let change = found
-        .as_ref()
+    if detected > false_alarm {
+        return then(Examined {
+            bench,
+            readings,
+            first: &first,
+            detected,
+            found: None,
+        });
+    }
+    let found = attribute(bench, readings, &first);
+    let none = || {
+        (
+            DVector::zeros(readings.len()),
+            bench.model.refit(bench.model.observed().clone()),
+        )
+    };
+    let (change, state) = found
         .and_then(|answer| {
             let (amplitudes, _) = bench.amplitudes(readings, &answer.causes)?;
-            Some(bench.change(&answer.causes, &amplitudes))
+            let change = bench.change(&answer.causes, &amplitudes);
+            let observed = bench.model.observed().clone();
+            Some((
+                change,
+                bench.without(&observed, &answer.causes, &amplitudes),
+            ))
         })
-        .unwrap_or_else(|| DVector::zeros(readings.len()));
-    let state = model.refit(model.observed() - &change);
-    let clean = state.linearised();
+        .unwrap_or_else(none);
+    // The readings themselves keep what an effect had hidden of the state.
+    let clean = bench
+        .model
+        .refit(bench.model.observed() - &change)
+        .linearised();
     let law = noise_of(&state, &clean);
-    let bench = Bench::new(&state, catalogue, law, options.draws, options.seed);
+    let bench = bench.moved(&state, law);
     let readings = clean + change;
     let first = bench.remainder(&readings, &[]);
     let found = attribute(&bench, &readings, &first);
-    report::compose(&bench, &readings, &first, detected, found, options)
+    then(Examined {
+        bench: &bench,
+        readings: &readings,
+        first: &first,
+        detected,
+        found,
+    })
 }
 
 fn noise_of<M: FittedModel>(model: &M, readings: &DVector<f64>) -> NoiseLaw {

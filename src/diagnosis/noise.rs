@@ -12,6 +12,7 @@ use errsep_models::model::{FittedModel, Place};
 use nalgebra::{DMatrix, DVector};
 
 use super::search::compass;
+use super::space::Space;
 
 /// How far the noise is known from the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,6 +92,13 @@ impl NoiseLaw {
 
 /// White noise from second differences of the residuals, (e₋ − 2e₀ + e₊)/√6, by their median.
 fn neighbours(traces: &[Range<usize>], residual: &DVector<f64>) -> NoiseLaw {
+    let (sigma, freedom) = second_differences(traces, residual);
+    let sigma = sigma.max(f64::MIN_POSITIVE.sqrt());
+    NoiseLaw::white(sigma, freedom, NoiseSource::Neighbours)
+}
+
+/// Standard deviation of the residuals as neighbours tell it, and its degrees of freedom.
+fn second_differences(traces: &[Range<usize>], residual: &DVector<f64>) -> (f64, f64) {
     let mut differences: Vec<f64> = traces
         .iter()
         .flat_map(|trace| {
@@ -106,11 +114,49 @@ fn neighbours(traces: &[Range<usize>], residual: &DVector<f64>) -> NoiseLaw {
     // 0.6745: the median of the absolute value of a standard normal number. The median uses 37 %
     // of the information of overlapping differences, which hold 35/18 times that of one reading.
     let freedom = 0.37 * differences.len() as f64 * 18.0 / 35.0;
-    NoiseLaw::white(
-        (median / 0.6745).max(f64::MIN_POSITIVE.sqrt()),
-        freedom.max(1.0),
-        NoiseSource::Neighbours,
-    )
+    (median / 0.6745, freedom.max(1.0))
+}
+
+/// The scatter of neighbouring readings against what the repeats say of it.
+pub(super) struct Scatter {
+    pub seen: f64,
+    pub expected: f64,
+    /// Of their ratio.
+    pub relative_std: f64,
+}
+
+/// The scatter of neighbours in readings free of causes, where there are enough of them.
+pub(super) fn neighbour_scatter<M: FittedModel>(
+    model: &M,
+    law: &NoiseLaw,
+    clean: &DVector<f64>,
+) -> Option<Scatter> {
+    let unit = NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated);
+    let space = Space::new(model, &unit);
+    let residual = space.forward_vector(clean);
+    let (seen, freedom) = second_differences(model.traces(), &residual);
+    let gaps: Vec<f64> = model
+        .traces()
+        .iter()
+        .flat_map(|t| {
+            model.places()[t.clone()]
+                .windows(2)
+                .map(|w| (w[1].x - w[0].x).abs())
+        })
+        .collect();
+    if freedom < 20.0 || gaps.is_empty() {
+        return None;
+    }
+    let spacing = gaps.iter().sum::<f64>() / gaps.len() as f64;
+    let along = (-spacing / law.length).exp();
+    // Variance of (e₋ − 2e₀ + e₊)/√6 under the law; the fit has taken its part of the white noise.
+    let correlated = law.correlated * (6.0 - 8.0 * along + 2.0 * along * along) / 6.0;
+    let kept = space.degrees_of_freedom() as f64 / space.readings().max(1) as f64;
+    Some(Scatter {
+        seen,
+        expected: (kept * (law.white + correlated)).sqrt(),
+        relative_std: (0.5 / freedom + 0.5 / law.freedom.max(1.0)).sqrt(),
+    })
 }
 
 /// Differences between repeats of a trace, each with the covariance of one trace.

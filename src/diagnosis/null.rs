@@ -6,18 +6,18 @@
 //! of the noise is itself an estimate: each draw scales the statistics by a chi-squared factor of
 //! the degrees of freedom behind the parts of the noise that each signature sees.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::dictionary::{Dictionary, Entry, statistic, surprise};
+use super::dictionary::{Dictionary, inverse, surprise};
 use super::noise::NoiseLaw;
 use super::space::Space;
 
 /// Draws handled at once.
-const BATCH: usize = 50;
+const BATCH: usize = 64;
 
 /// The law of the greatest score of every family, and of the smallest tail probability.
 #[derive(Debug, Clone)]
@@ -111,6 +111,20 @@ impl NullLaw {
         high
     }
 
+    /// The tail probability of one family at which any family stands out with a probability.
+    pub fn level(&self, probability: f64) -> f64 {
+        let (mut low, mut high) = (-700.0, 0.0);
+        for _ in 0..60 {
+            let middle: f64 = 0.5 * (low + high);
+            if self.smallest.beyond(-2.0 * middle) > probability {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        low.exp()
+    }
+
     fn smallest_of(&self, surprises: &[f64]) -> f64 {
         surprises
             .iter()
@@ -140,7 +154,7 @@ fn greatest(
     let draws = DMatrix::from_fn(space.readings(), BATCH, |_, _| {
         StandardNormal.sample(&mut random)
     });
-    let adjoint = space.adjoint(draws).transpose();
+    let adjoint = dictionary.places.batch_sums::<BATCH>(&space.adjoint(draws));
     let mut factor = |freedom: f64| -> Vec<f64> {
         (0..BATCH)
             .map(|_| match ChiSquared::new(freedom) {
@@ -153,18 +167,19 @@ fn greatest(
     let mut rows: Vec<Vec<f64>> = vec![vec![0.0; dictionary.families.len()]; BATCH];
     for (place, family) in dictionary.families.iter().enumerate() {
         for entry in &dictionary.entries[family.entries.clone()] {
-            let products = batch_products(entry, &adjoint);
+            let products = entry.batch_products(&adjoint);
+            let inverse = inverse(&entry.gram);
             for (draw, row) in rows.iter_mut().enumerate() {
                 let known =
                     entry.shift_share * shift[draw] + (1.0 - entry.shift_share) * rest[draw];
-                let t = match products.as_slice() {
-                    [only] if entry.positive && only[draw] <= 0.0 => 0.0,
-                    [only] => only[draw] * only[draw] / entry.gram[(0, 0)].max(f64::MIN_POSITIVE),
-                    several => {
-                        let score =
-                            DVector::from_iterator(several.len(), several.iter().map(|p| p[draw]));
-                        statistic(&entry.gram, &score, entry.positive)
-                    }
+                let t = if entry.positive && products[0][draw] <= 0.0 {
+                    0.0
+                } else {
+                    let score = |k: usize| f64::from(products[k][draw]);
+                    (0..products.len())
+                        .flat_map(|i| (0..products.len()).map(move |j| (i, j)))
+                        .map(|(i, j)| score(i) * inverse[(i, j)] * score(j))
+                        .sum()
                 };
                 row[place] = row[place].max(t / known.max(1e-6));
             }
@@ -172,28 +187,10 @@ fn greatest(
         // All entries of a family have the same number of columns.
         let freedom = dictionary.entries[family.entries.clone()]
             .first()
-            .map_or(1, |e| e.columns.len());
+            .map_or(1, |e| e.order());
         for row in &mut rows {
             row[place] = surprise(row[place], freedom);
         }
     }
     rows
-}
-
-/// Eᵀ a for each draw, one vector a column, from the transposed adjoints.
-fn batch_products(entry: &Entry, adjoint: &DMatrix<f64>) -> Vec<[f64; BATCH]> {
-    let draws = adjoint.as_slice();
-    entry
-        .columns
-        .iter()
-        .map(|column| {
-            let mut sum = [0.0; BATCH];
-            for (&row, &value) in column.rows.iter().zip(&column.values) {
-                for (s, a) in sum.iter_mut().zip(&draws[row * BATCH..(row + 1) * BATCH]) {
-                    *s += value * a;
-                }
-            }
-            sum
-        })
-        .collect()
 }

@@ -15,11 +15,10 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::attribute::attribute;
 use super::bench::Bench;
 use super::noise::{NoiseLaw, NoiseSource};
 use super::space::Space;
-use super::{Options, noise_of};
+use super::{Examined, Options, examined, noise_of};
 
 /// Effects of which less than this part is visible are not put in.
 const SHOWN: f64 = 0.01;
@@ -153,16 +152,28 @@ fn sealed_change<M: FittedModel>(
     None
 }
 
+/// The whole diagnosis of a trial, its noise estimated anew; only the null law is kept.
 fn answer<M: FittedModel>(
     bench: &Bench<'_, M>,
-    readings: &DVector<f64>,
+    sealed: &DVector<f64>,
     options: &Options,
 ) -> String {
-    let first = bench.remainder(readings, &[]);
-    if first.global > options.false_alarm {
+    let shift = bench.model.observed() - bench.model.linearised();
+    let model = bench.model.refit(sealed + shift);
+    let readings = model.linearised();
+    let law = noise_of(&model, &readings);
+    let bench = bench.moved(&model, law);
+    examined(&bench, &readings, options.false_alarm, |examined| {
+        said(&examined, options)
+    })
+}
+
+fn said<M: FittedModel>(examined: &Examined<'_, M>, options: &Options) -> String {
+    if examined.detected > options.false_alarm {
         return "none".to_owned();
     }
-    match attribute(bench, readings, &first) {
+    let bench = examined.bench;
+    match &examined.found {
         Some(answer) if answer.complete && answer.groups.iter().all(|g| g.len() == 1) => {
             let mut names: Vec<&str> = answer
                 .causes

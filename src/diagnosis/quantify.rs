@@ -14,6 +14,8 @@ use super::verdict::{Bias, HeldOut, Size};
 
 /// Draws of the noise for its expected part in a sum of squares.
 const DRAWS: usize = 48;
+/// Draws behind the floor of the held-out repeats.
+const FLOOR_DRAWS: usize = 8;
 /// Greatest number of ways in which repeats are split.
 const SPLITS: usize = 6;
 
@@ -81,45 +83,27 @@ impl GapMeter {
         readings: &DVector<f64>,
         signatures: &DMatrix<f64>,
     ) -> Option<HeldOut> {
-        let repeats: Vec<u32> = model
-            .places()
-            .iter()
-            .map(|p| p.repeat)
-            .collect::<BTreeSet<_>>()
-            .into_iter()
-            .collect();
-        let half = repeats.len() / 2;
-        if half == 0 {
-            return None;
-        }
-        let few = self.noise.columns(0, 8).clone_owned();
         let none = DMatrix::zeros(readings.len(), 0);
         let (mut before, mut after, mut floor, mut count) = (0.0, 0.0, 0.0, 0.0);
-        for chosen in halves(repeats.len()).into_iter().take(SPLITS) {
-            let inside = |t: usize| {
-                let repeat = model.places()[model.traces()[t].start].repeat;
-                repeats
-                    .iter()
-                    .position(|r| *r == repeat)
-                    .is_some_and(|k| chosen >> k & 1 == 1)
-            };
-            let split = Split::new(model, inside)?;
-            if !split.shows(signatures) {
+        let noise = self.sigma * self.sigma;
+        for split in splits(model)? {
+            let fit = split.fit(signatures);
+            let Some(fit) = fit.filter(|fit| fit.shows(signatures)) else {
                 continue;
+            };
+            before += split.square(readings, &split.fit(&none)?.predict(readings), noise);
+            after += split.square(readings, &fit.predict(readings), noise);
+            // What a perfect model would still show: the prediction made of noise alone.
+            for draw in 0..FLOOR_DRAWS {
+                let predicted = fit.predict(&self.noise.column(draw).clone_owned());
+                floor += split.mean(&predicted, |v| v * v) / FLOOR_DRAWS as f64;
             }
-            before += split.mean_square(readings, &none);
-            after += split.mean_square(readings, signatures);
-            let noise: f64 = few
-                .column_iter()
-                .map(|z| split.mean_square(&z.clone_owned(), signatures))
-                .sum();
-            floor += noise / few.ncols() as f64;
             count += 1.0;
         }
         if count == 0.0 {
             return None;
         }
-        let gap = |sum: f64| (sum / count - self.sigma * self.sigma).max(0.0).sqrt();
+        let gap = |sum: f64| (sum / count).max(0.0).sqrt();
         let (before, after, floor) = (gap(before), gap(after), gap(floor));
         Some(HeldOut {
             before,
@@ -128,6 +112,50 @@ impl GapMeter {
             floor,
         })
     }
+}
+
+/// Mean square of what a model with effects misses of held-out repeats; nothing where they are
+/// too few, or where an effect does not show in every half.
+pub(super) fn held_out_square<M: FittedModel>(
+    model: &M,
+    readings: &DVector<f64>,
+    signatures: &DMatrix<f64>,
+    noise: f64,
+) -> Option<f64> {
+    let mut sum = 0.0;
+    let splits = splits(model)?;
+    for split in &splits {
+        let fit = split.fit(signatures).filter(|fit| fit.shows(signatures))?;
+        sum += split.square(readings, &fit.predict(readings), noise);
+    }
+    Some(sum / splits.len() as f64)
+}
+
+/// The ways in which the repeats are split.
+fn splits<M: FittedModel>(model: &M) -> Option<Vec<Split>> {
+    let repeats: Vec<u32> = model
+        .places()
+        .iter()
+        .map(|p| p.repeat)
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .collect();
+    if repeats.len() < 2 {
+        return None;
+    }
+    halves(repeats.len())
+        .into_iter()
+        .take(SPLITS)
+        .map(|chosen| {
+            Split::new(model, |t: usize| {
+                let repeat = model.places()[model.traces()[t].start].repeat;
+                repeats
+                    .iter()
+                    .position(|r| *r == repeat)
+                    .is_some_and(|k| chosen >> k & 1 == 1)
+            })
+        })
+        .collect()
 }
 
 /// 1 − after / before; zero where there was nothing.
@@ -155,8 +183,21 @@ fn halves(repeats: usize) -> Vec<u32> {
 struct Split {
     space: Space,
     rows: Vec<usize>,
+    /// The cell of each row, counted from zero among those of the chosen traces.
     cells: Vec<usize>,
-    others: Vec<(usize, usize)>,
+    counts: Vec<f64>,
+    /// Held-out readings that differ in the repeat only: row and cell.
+    groups: Vec<Vec<(usize, usize)>>,
+}
+
+/// A fit of the chosen traces with effects beside the model.
+struct SplitFit<'a> {
+    split: &'a Split,
+    columns: DMatrix<f64>,
+    projected: DMatrix<f64>,
+    /// Amplitudes from scores.
+    inverse: DMatrix<f64>,
+    signatures: &'a DMatrix<f64>,
 }
 
 impl Split {
@@ -170,65 +211,127 @@ impl Split {
             .iter()
             .flat_map(|t| model.traces()[*t].clone())
             .collect();
-        let cells: Vec<usize> = rows.iter().map(|k| model.places()[*k].cell).collect();
-        let known: BTreeSet<usize> = cells.iter().copied().collect();
-        let others: Vec<(usize, usize)> = others
+        let mut known: BTreeMap<usize, usize> = BTreeMap::new();
+        let cells: Vec<usize> = rows
             .iter()
-            .flat_map(|t| model.traces()[*t].clone())
-            .map(|k| (k, model.places()[k].cell))
-            .filter(|(_, cell)| known.contains(cell))
+            .map(|k| {
+                let next = known.len();
+                *known.entry(model.places()[*k].cell).or_insert(next)
+            })
             .collect();
-        if others.is_empty() {
+        let mut counts = vec![0.0; known.len()];
+        for cell in &cells {
+            counts[*cell] += 1.0;
+        }
+        let mut groups: BTreeMap<(usize, bool), Vec<(usize, usize)>> = BTreeMap::new();
+        for row in others.iter().flat_map(|t| model.traces()[*t].clone()) {
+            let place = &model.places()[row];
+            if let Some(cell) = known.get(&place.cell) {
+                let group = groups
+                    .entry((place.cell, place.direction < 0.0))
+                    .or_default();
+                group.push((row, *cell));
+            }
+        }
+        if groups.is_empty() {
             return None;
         }
         Some(Self {
             space: Space::of_traces(model, &unit_noise(), &chosen),
             rows,
             cells,
-            others,
+            counts,
+            groups: groups.into_values().collect(),
         })
     }
 
+    fn fit<'a>(&'a self, signatures: &'a DMatrix<f64>) -> Option<SplitFit<'a>> {
+        let columns = signatures.select_rows(&self.rows);
+        let (projected, _) = self.space.forward(columns.clone());
+        let gram = projected.tr_mul(&projected);
+        let inverse = if gram.is_empty() {
+            gram
+        } else {
+            gram.pseudo_inverse(1e-9).ok()?
+        };
+        Some(SplitFit {
+            split: self,
+            columns,
+            projected,
+            inverse,
+            signatures,
+        })
+    }
+
+    /// Mean over the groups of a function of predictions, one a held-out reading.
+    fn mean(&self, predicted: &[Vec<f64>], value: impl Fn(f64) -> f64) -> f64 {
+        let of =
+            |group: &Vec<f64>| group.iter().map(|p| value(*p)).sum::<f64>() / group.len() as f64;
+        predicted.iter().map(of).sum::<f64>() / predicted.len() as f64
+    }
+
+    /// Mean square of what the predictions miss, without the noise of the held-out readings: by
+    /// products of different repeats, whose noise is independent; of a single repeat, less the
+    /// variance of the noise.
+    fn square(&self, readings: &DVector<f64>, predicted: &[Vec<f64>], noise: f64) -> f64 {
+        let of = |(group, predicted): (&Vec<(usize, usize)>, &Vec<f64>)| {
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for ((row, _), p) in group.iter().zip(predicted) {
+                let missed = readings[*row] - p;
+                sum += missed;
+                squares += missed * missed;
+            }
+            match group.len() as f64 {
+                n if n > 1.0 => (sum * sum - squares) / (n * (n - 1.0)),
+                _ => squares - noise,
+            }
+        };
+        self.groups.iter().zip(predicted).map(of).sum::<f64>() / self.groups.len() as f64
+    }
+}
+
+impl SplitFit<'_> {
     /// Whether the chosen traces show every signature: what happened once, in a repeat that is
     /// held out, cannot be predicted.
     fn shows(&self, signatures: &DMatrix<f64>) -> bool {
-        let (projected, _) = self.space.forward(signatures.select_rows(&self.rows));
-        projected
+        self.projected
             .column_iter()
             .zip(signatures.column_iter())
             .all(|(inside, whole)| inside.norm() > 0.05 * whole.norm())
     }
 
-    /// Mean square of the prediction's error on the other traces.
-    fn mean_square(&self, readings: &DVector<f64>, signatures: &DMatrix<f64>) -> f64 {
-        let mut inside = readings.select_rows(&self.rows);
-        let mut amplitudes = DVector::zeros(signatures.ncols());
-        if signatures.ncols() > 0 {
-            let columns = signatures.select_rows(&self.rows);
-            let (projected, _) = self.space.forward(columns.clone());
-            let residual = self.space.forward_vector(&inside);
-            if let Ok(pseudo) = (projected.tr_mul(&projected)).pseudo_inverse(1e-9) {
-                amplitudes = pseudo * projected.tr_mul(&residual);
-            }
-            inside -= &columns * &amplitudes;
+    /// The held-out readings by the fit of the chosen ones.
+    fn predict(&self, readings: &DVector<f64>) -> Vec<Vec<f64>> {
+        let split = self.split;
+        let mut inside = readings.select_rows(&split.rows);
+        let mut residual = split.space.forward_vector(&inside);
+        let amplitudes = &self.inverse * self.projected.tr_mul(&residual);
+        if !amplitudes.is_empty() {
+            inside -= &self.columns * &amplitudes;
+            residual -= &self.projected * &amplitudes;
         }
-        let fitted = &inside - self.space.forward_vector(&inside);
-        let mut by_cell: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
-        for (cell, value) in self.cells.iter().zip(fitted.iter()) {
-            let sum = by_cell.entry(*cell).or_default();
-            sum.0 += value;
-            sum.1 += 1.0;
+        let mut means = vec![0.0; split.counts.len()];
+        for ((cell, y), e) in split.cells.iter().zip(inside.iter()).zip(residual.iter()) {
+            means[*cell] += (y - e) / split.counts[*cell];
         }
-        let sum: f64 = self
-            .others
+        let effect = |row: usize| -> f64 {
+            let signature = self.signatures.row(row);
+            signature
+                .iter()
+                .zip(amplitudes.iter())
+                .map(|(s, a)| s * a)
+                .sum()
+        };
+        split
+            .groups
             .iter()
-            .filter_map(|(row, cell)| {
-                let (total, count) = by_cell.get(cell)?;
-                let effect = (signatures.row(*row) * &amplitudes)[(0, 0)];
-                Some((readings[*row] - total / count - effect).powi(2))
+            .map(|group| {
+                group
+                    .iter()
+                    .map(|(row, cell)| means[*cell] + effect(*row))
+                    .collect()
             })
-            .sum();
-        sum / self.others.len() as f64
+            .collect()
     }
 }
 

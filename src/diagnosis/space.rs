@@ -12,6 +12,7 @@ use errsep_models::model::{Column, FittedModel, Profiles};
 use nalgebra::{DMatrix, DVector};
 
 use super::noise::NoiseLaw;
+use super::whitening::Whitening;
 
 /// Columns that project to less than this part of their length lie in the span of the others.
 const DEPENDENT: f64 = 1e-7;
@@ -21,8 +22,10 @@ const DEPENDENT: f64 = 1e-7;
 pub struct Space {
     readings: usize,
     traces: Vec<Range<usize>>,
+    /// The trace of every reading.
+    trace_of: Vec<u32>,
     /// L⁻¹ of each trace.
-    whitening: Vec<Arc<DMatrix<f64>>>,
+    whitening: Vec<Arc<Whitening>>,
     /// Orthonormal patterns over the traces, traces × functions.
     patterns: Option<DMatrix<f64>>,
     /// Directions inside the patterns that the model does not have, given back; orthonormal.
@@ -45,8 +48,8 @@ impl Space {
     /// The space of the readings of some traces, in the order of those traces.
     pub fn of_traces<M: FittedModel>(model: &M, law: &NoiseLaw, chosen: &[usize]) -> Self {
         let mut traces = Vec::new();
-        let mut whitening: Vec<Arc<DMatrix<f64>>> = Vec::new();
-        let mut cache: Vec<(Vec<f64>, Arc<DMatrix<f64>>)> = Vec::new();
+        let mut whitening: Vec<Arc<Whitening>> = Vec::new();
+        let mut cache: Vec<(Vec<f64>, Arc<Whitening>)> = Vec::new();
         let mut rows = Vec::new();
         let mut start = 0;
         for &t in chosen {
@@ -56,7 +59,7 @@ impl Space {
             let inverse = if let Some((_, inverse)) = known {
                 Arc::clone(inverse)
             } else {
-                let inverse = Arc::new(inverse_factor(&law.covariance(&x)));
+                let inverse = Arc::new(Whitening::new(law, &x));
                 cache.push((x, Arc::clone(&inverse)));
                 inverse
             };
@@ -66,10 +69,16 @@ impl Space {
             rows.extend(trace);
         }
         let freedom = model.freedom();
-        let ones = whitening.iter().map(|w| w.column_sum()).collect();
+        let ones = whitening.iter().map(|w| w.ones()).collect();
+        let trace_of = traces
+            .iter()
+            .enumerate()
+            .flat_map(|(t, trace): (usize, &Range<usize>)| trace.clone().map(move |_| t as u32))
+            .collect();
         let mut space = Self {
             readings: start,
             traces,
+            trace_of,
             whitening,
             patterns: None,
             returned: DMatrix::zeros(start, 0),
@@ -82,7 +91,11 @@ impl Space {
         space.whiten(&mut whitened);
         let sizes: Vec<f64> = whitened.column_iter().map(|c| c.norm()).collect();
         if let Some(profiles) = &freedom.profiles {
-            space.free_profiles(profiles, chosen);
+            let x: Vec<f64> = chosen.first().map_or_else(Vec::new, |t| {
+                let trace = model.traces()[*t].clone();
+                model.places()[trace].iter().map(|p| p.x).collect()
+            });
+            space.free_profiles(profiles, chosen, &law.covariance(&x));
         }
         space.project_profiles(&mut whitened);
         space.absorbed = orthonormal(&whitened, &sizes);
@@ -90,7 +103,7 @@ impl Space {
         space
     }
 
-    fn free_profiles(&mut self, profiles: &Profiles, chosen: &[usize]) {
+    fn free_profiles(&mut self, profiles: &Profiles, chosen: &[usize], covariance: &DMatrix<f64>) {
         let patterns = profiles.patterns.select_rows(chosen);
         let sizes: Vec<f64> = patterns.column_iter().map(|c| c.norm()).collect();
         let basis = orthonormal(&patterns, &sizes);
@@ -106,15 +119,12 @@ impl Space {
             if own.norm() < 1e-6 * patterns.column(*function).norm() {
                 continue;
             }
-            // The span of {L⁻¹ f : fᵀ profile = 0} has the normal Lᵀ profile.
-            let Some(factor) = self
-                .whitening
-                .first()
-                .and_then(|w| w.clone().as_ref().clone().try_inverse())
-            else {
+            // The span of {L⁻¹ f : fᵀ profile = 0} has the normal Lᵀ profile = L⁻¹ V profile.
+            let Some(whitening) = self.whitening.first() else {
                 continue;
             };
-            let normal = factor.tr_mul(profile);
+            let mut normal = covariance * profile;
+            whitening.whiten(normal.as_mut_slice());
             let mut column = DVector::zeros(self.readings);
             for (t, trace) in self.traces.iter().enumerate() {
                 column
@@ -142,14 +152,11 @@ impl Space {
     }
 
     fn whiten(&self, columns: &mut DMatrix<f64>) {
-        for (trace, inverse) in self.traces.iter().zip(&self.whitening) {
-            let block = columns.rows(trace.start, trace.len()).clone_owned();
-            if block.iter().all(|v| *v == 0.0) {
-                continue;
+        let n = self.readings.max(1);
+        for column in columns.as_mut_slice().chunks_mut(n) {
+            for (trace, whitening) in self.traces.iter().zip(&self.whitening) {
+                whitening.whiten(&mut column[trace.clone()]);
             }
-            columns
-                .rows_mut(trace.start, trace.len())
-                .gemm(1.0, inverse, &block, 0.0);
         }
     }
 
@@ -216,46 +223,184 @@ impl Space {
     /// L⁻ᵀ P of each column: what a signature is multiplied with to get its score.
     pub fn adjoint(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
         self.project(&mut columns);
-        for (trace, inverse) in self.traces.iter().zip(&self.whitening) {
-            let block = columns.rows(trace.start, trace.len()).clone_owned();
-            columns
-                .rows_mut(trace.start, trace.len())
-                .gemm_tr(1.0, inverse, &block, 0.0);
+        let n = self.readings.max(1);
+        for column in columns.as_mut_slice().chunks_mut(n) {
+            for (trace, whitening) in self.traces.iter().zip(&self.whitening) {
+                whitening.adjoint(&mut column[trace.clone()]);
+            }
         }
         columns
     }
 
-    /// The part of a projected, whitened unit vector's variance that the shifts of traces make up.
-    pub fn shift_share(&self, unit: &DVector<f64>, shift: f64) -> f64 {
-        self.traces
-            .iter()
-            .zip(&self.ones)
-            .map(|(trace, ones)| shift * unit.rows(trace.start, trace.len()).dot(ones).powi(2))
-            .sum()
+    /// EᵀPE of sparse signatures without ever making P L⁻¹E: the cost is that of the traces in
+    /// which a signature is.
+    pub fn gram(&self, columns: &[Column], shift: f64) -> Gram {
+        let parts: Vec<Part> = columns.iter().map(|c| self.part(c)).collect();
+        let gram = DMatrix::from_fn(parts.len(), parts.len(), |i, j| {
+            if j < i {
+                0.0
+            } else {
+                parts[i].product(&parts[j], self)
+            }
+        });
+        let shift_share = match parts.first() {
+            Some(part) if shift > 0.0 && gram[(0, 0)] > 0.0 => {
+                (shift * self.shift_square(part) / gram[(0, 0)]).clamp(0.0, 1.0)
+            }
+            _ => 0.0,
+        };
+        Gram {
+            whole: parts.iter().map(|p| p.square).sum(),
+            shift_share,
+            matrix: DMatrix::from_fn(parts.len(), parts.len(), |i, j| gram[(i.min(j), i.max(j))]),
+        }
+    }
+
+    fn part(&self, column: &Column) -> Part {
+        let mut whitened = DVector::zeros(self.readings);
+        let mut seen = vec![false; self.traces.len()];
+        for (&row, &value) in column.rows.iter().zip(&column.values) {
+            whitened[row] += value;
+            seen[self.trace_of[row] as usize] = true;
+        }
+        let touched: Vec<usize> = (0..seen.len()).filter(|t| seen[*t]).collect();
+        // Many signatures are one profile times a sign in each trace: such a profile is whitened
+        // once.
+        let mut model: Option<(usize, Vec<f64>)> = None;
+        for &t in &touched {
+            let trace = self.traces[t].clone();
+            let values = &whitened.as_slice()[trace.clone()];
+            let same = |sign: f64, raw: &[f64]| {
+                raw.len() == values.len() && raw.iter().zip(values).all(|(a, b)| *a == sign * b)
+            };
+            let known = model.as_ref().and_then(|(from, raw)| {
+                if !Arc::ptr_eq(&self.whitening[*from], &self.whitening[t]) {
+                    None
+                } else if same(1.0, raw) {
+                    Some((*from, 1.0))
+                } else {
+                    same(-1.0, raw).then_some((*from, -1.0))
+                }
+            });
+            if let Some((from, sign)) = known {
+                let from = self.traces[from].start;
+                for k in 0..trace.len() {
+                    whitened[trace.start + k] = sign * whitened[from + k];
+                }
+            } else {
+                model = Some((t, values.to_vec()));
+                self.whitening[t].whiten(&mut whitened.as_mut_slice()[trace]);
+            }
+        }
+        let sums = self.patterns.as_ref().map_or_else(
+            || DMatrix::zeros(0, 0),
+            |patterns| {
+                let length = self.traces.first().map_or(0, Range::len);
+                let mut sums = DMatrix::zeros(length, patterns.ncols());
+                for &t in &touched {
+                    let values = whitened.rows(self.traces[t].start, length);
+                    for k in 0..patterns.ncols() {
+                        if patterns[(t, k)] != 0.0 {
+                            sums.column_mut(k).axpy(patterns[(t, k)], &values, 1.0);
+                        }
+                    }
+                }
+                sums
+            },
+        );
+        let along = |basis: &DMatrix<f64>| {
+            DVector::from_iterator(
+                basis.ncols(),
+                basis.column_iter().map(|direction| {
+                    touched
+                        .iter()
+                        .map(|&t| {
+                            let trace = &self.traces[t];
+                            direction
+                                .rows(trace.start, trace.len())
+                                .dot(&whitened.rows(trace.start, trace.len()))
+                        })
+                        .sum()
+                }),
+            )
+        };
+        Part {
+            returned: along(&self.returned),
+            absorbed: along(&self.absorbed),
+            square: whitened.norm_squared(),
+            sums,
+            touched,
+            whitened,
+        }
+    }
+
+    /// Σ (1ᵀL⁻ᵀ · P L⁻¹E)² over the traces: what their shifts see of a signature.
+    fn shift_square(&self, part: &Part) -> f64 {
+        let mut seen = vec![0.0; self.traces.len()];
+        for &t in &part.touched {
+            let trace = &self.traces[t];
+            seen[t] += self.ones[t].dot(&part.whitened.rows(trace.start, trace.len()));
+        }
+        for (t, (trace, ones)) in self.traces.iter().zip(&self.ones).enumerate() {
+            if let Some(patterns) = &self.patterns {
+                for (k, sum) in part.sums.column_iter().enumerate() {
+                    if patterns[(t, k)] != 0.0 {
+                        seen[t] -= patterns[(t, k)] * ones.dot(&sum);
+                    }
+                }
+            }
+            let rows = |basis: &DMatrix<f64>, k: usize| {
+                ones.dot(&basis.column(k).rows(trace.start, trace.len()))
+            };
+            for (k, value) in part.returned.iter().enumerate() {
+                seen[t] += value * rows(&self.returned, k);
+            }
+            for (k, value) in part.absorbed.iter().enumerate() {
+                seen[t] -= value * rows(&self.absorbed, k);
+            }
+        }
+        seen.iter().map(|s| s * s).sum()
     }
 }
 
-/// L⁻¹ of V = L Lᵀ, with a breath of white noise where V is singular to rounding.
-fn inverse_factor(covariance: &DMatrix<f64>) -> DMatrix<f64> {
-    let n = covariance.nrows();
-    let mut lift = 0.0;
-    loop {
-        let lifted = covariance + DMatrix::identity(n, n) * lift;
-        if let Some(inverse) = lifted
-            .cholesky()
-            .and_then(|c| c.l().solve_lower_triangular(&DMatrix::identity(n, n)))
-        {
-            return inverse;
-        }
-        let scale = covariance.diagonal().amax().max(f64::MIN_POSITIVE);
-        lift = if lift == 0.0 {
-            1e-14 * scale
+/// EᵀPE of a signature and what goes with it.
+pub(super) struct Gram {
+    /// EᵀPE.
+    pub matrix: DMatrix<f64>,
+    /// Σ |L⁻¹E|².
+    pub whole: f64,
+    /// The part of the score's variance that the shifts of traces make up.
+    pub shift_share: f64,
+}
+
+/// A whitened column and what the fit absorbs of it.
+struct Part {
+    whitened: DVector<f64>,
+    touched: Vec<usize>,
+    sums: DMatrix<f64>,
+    returned: DVector<f64>,
+    absorbed: DVector<f64>,
+    square: f64,
+}
+
+impl Part {
+    /// Eᵢᵀ L⁻ᵀ P L⁻¹ Eⱼ.
+    fn product(&self, other: &Self, space: &Space) -> f64 {
+        let whole: f64 = if std::ptr::eq(self, other) {
+            self.square
         } else {
-            lift * 10.0
+            self.touched
+                .iter()
+                .map(|&t| {
+                    let (from, length) = (space.traces[t].start, space.traces[t].len());
+                    self.whitened
+                        .rows(from, length)
+                        .dot(&other.whitened.rows(from, length))
+                })
+                .sum()
         };
-        if lift > scale {
-            return DMatrix::identity(n, n);
-        }
+        whole - self.sums.dot(&other.sums) + self.returned.dot(&other.returned)
+            - self.absorbed.dot(&other.absorbed)
     }
 }
 

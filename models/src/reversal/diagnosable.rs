@@ -284,6 +284,11 @@ impl FirstOrder {
         self.span
     }
 
+    /// A profile over the positions, smoothed, with its slopes.
+    pub(super) fn smoothed(&self, profile: &DVector<f64>) -> SmoothProfile {
+        self.smoother.smooth(profile)
+    }
+
     /// Greatest smooth reading off the indicator's zero, µm.
     pub fn reading_reach(&self) -> f64 {
         self.reach

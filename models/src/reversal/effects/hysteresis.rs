@@ -1,11 +1,20 @@
 //! The indicator lags behind its stylus: a play between stylus and pointer.
 
+use std::ops::Range;
+
+use nalgebra::DVector;
+
 use super::FirstOrder;
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
 
 /// See the head of the file. The lag saturates at half the width once the stylus has moved by the
-/// width, so the signature depends on the size where the reading turns round within a trace.
+/// width, so the signature depends on the size where the reading turns round within a trace. Where
+/// the pointer stands when a trace begins depends on what came before: a place within the play,
+/// −1 to 1, for the forward and the backward traces of every channel.
 pub(super) struct Hysteresis;
+
+/// A pointer moves where its slope is at least this part of the other direction's.
+const MOVING: f64 = 0.5;
 
 impl Effect<FirstOrder> for Hysteresis {
     fn name(&self) -> &str {
@@ -30,54 +39,136 @@ impl Effect<FirstOrder> for Hysteresis {
     }
 
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
+        // The play is taken up in the direction in which a trace begins, as the slide comes from
+        // before its first position; where the form is level there, the search finds the side.
+        let mut beginnings = vec![0.0; 2 * model.present().len()];
+        for trace in model.traces() {
+            let first = first_of(model, trace);
+            let place = &model.places()[first];
+            beginnings[beginning_of(model, trace)] =
+                -(place.direction * model.reading_slope(place)).signum();
+        }
         [1e-3, 1e-2, 3e-2, 1e-1]
             .iter()
             .enumerate()
-            .map(|(variant, part)| Shape {
-                variant,
-                values: vec![part * model.reading_span()],
-                steps: vec![0.0],
+            .map(|(variant, part)| {
+                let mut values = vec![part * model.reading_span()];
+                values.extend(&beginnings);
+                let mut steps = vec![1.0; values.len()];
+                steps[0] = 0.0;
+                Shape {
+                    variant,
+                    values,
+                    steps,
+                }
             })
             .collect()
+    }
+
+    fn allowed(&self, _model: &FirstOrder, shape: &Shape) -> bool {
+        shape
+            .values
+            .iter()
+            .skip(1)
+            .all(|v| (-1.0..=1.0).contains(v))
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let Some(&width) = shape.values.first() else {
             return Vec::new();
         };
-        let width = width.max(1e-6 * model.reading_span());
+        let half = 0.5 * width.max(1e-6 * model.reading_span());
         let places = model.places();
         let mut column = Column::default();
         for trace in model.traces() {
+            let begins = shape
+                .values
+                .get(1 + beginning_of(model, trace))
+                .copied()
+                .unwrap_or(0.0);
             let forward = places[trace.start].direction > 0.0;
-            let order: Box<dyn Iterator<Item = usize>> = if forward {
-                Box::new(trace.clone())
-            } else {
-                Box::new(trace.clone().rev())
-            };
-            let mut pointer: Option<f64> = None;
-            for k in order {
+            let mut pointer = model.smooth_reading(&places[first_of(model, trace)]) + begins * half;
+            for step in 0..trace.len() {
+                let k = if forward {
+                    trace.start + step
+                } else {
+                    trace.end - 1 - step
+                };
                 let stylus = model.smooth_reading(&places[k]);
-                // The play is taken up in the direction in which the trace begins.
-                let start = stylus
-                    - 0.5
-                        * width
-                        * (places[k].direction * model.reading_slope(&places[k])).signum();
-                let next = pointer
-                    .unwrap_or(start)
-                    .clamp(stylus - 0.5 * width, stylus + 0.5 * width);
-                pointer = Some(next);
+                pointer = pointer.clamp(stylus - half, stylus + half);
                 column.rows.push(k);
-                column.values.push((next - stylus) / width);
+                column.values.push((pointer - stylus) / (2.0 * half));
             }
         }
         vec![column]
     }
 
+    /// Where the stylus turns round within the play the pointer stands still and tells nothing of
+    /// it; the traces of the other direction, in which it moves, do.
+    fn restored(
+        &self,
+        model: &FirstOrder,
+        readings: &DVector<f64>,
+        clean: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let n = model.positions().len();
+        let mut restored = clean.clone();
+        for channel in 0..model.present().len() {
+            let traces = |direction: f64| {
+                model.traces().iter().filter(move |trace| {
+                    let place = &model.places()[trace.start];
+                    place.channel == channel && place.direction == direction
+                })
+            };
+            let mean = |direction: f64, values: &DVector<f64>| {
+                let count = traces(direction).count();
+                let mut sum = DVector::zeros(n);
+                traces(direction).for_each(|t| sum += values.rows(t.start, n));
+                (count > 0).then(|| sum / count as f64)
+            };
+            let forward = mean(1.0, readings)?;
+            let backward = mean(-1.0, readings)?;
+            let slopes = [
+                model.smoothed(&forward).slopes,
+                model.smoothed(&backward).slopes,
+            ];
+            let clean = [mean(1.0, clean)?, mean(-1.0, clean)?];
+            for k in 0..n {
+                let steepest = slopes[0][k].abs().max(slopes[1][k].abs());
+                let moves = |d: usize| f64::from(u8::from(slopes[d][k].abs() >= MOVING * steepest));
+                let weights = [moves(0), moves(1)];
+                let stylus = (weights[0] * clean[0][k] + weights[1] * clean[1][k])
+                    / (weights[0] + weights[1]);
+                for direction in [1.0, -1.0] {
+                    traces(direction).for_each(|t| restored[t.start + k] = stylus);
+                }
+            }
+        }
+        Some(restored)
+    }
+
     fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
-        amplitudes.first().map(|&width| Shape {
-            values: vec![width.max(0.0)],
-            ..shape.clone()
+        amplitudes.first().map(|&width| {
+            let mut settled = shape.clone();
+            if let Some(value) = settled.values.first_mut() {
+                *value = width.max(0.0);
+            }
+            settled
         })
     }
+}
+
+/// The reading with which a trace begins.
+fn first_of(model: &FirstOrder, trace: &Range<usize>) -> usize {
+    if model.places()[trace.start].direction > 0.0 {
+        trace.start
+    } else {
+        trace.end - 1
+    }
+}
+
+/// The place of a trace's beginning among the shape's: one for every channel and direction.
+fn beginning_of(model: &FirstOrder, trace: &Range<usize>) -> usize {
+    let place = &model.places()[trace.start];
+    2 * place.channel + usize::from(place.direction < 0.0)
 }

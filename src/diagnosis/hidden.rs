@@ -1,0 +1,79 @@
+//! What could hide in these readings.
+
+use errsep_models::model::FittedModel;
+
+use super::Options;
+use super::bench::Bench;
+use super::quantify::weighted_std;
+use super::verdict::{Harm, Hidden};
+
+/// Effects of which less than this part is visible are called undetectable; so are those that would
+/// show only at a size that is not plausible.
+const UNDETECTABLE: f64 = 1e-3;
+/// Normal quantile of 80 % power.
+const POWER: f64 = 0.8416;
+
+/// What these readings would not have shown, for every effect that is not named.
+pub(super) fn hidden<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    named: &[String],
+    options: &Options,
+) -> Vec<Hidden> {
+    let quantities: Vec<_> = bench
+        .model
+        .quantities()
+        .into_iter()
+        .map(|q| {
+            let std = weighted_std(bench.model, &bench.law, &q.weights);
+            (q, std)
+        })
+        .collect();
+    let level = bench.null.level(options.false_alarm);
+    let mut list = Vec::new();
+    for (effect, description) in bench.catalogue.iter().enumerate() {
+        if named.iter().any(|n| n == description.name()) {
+            continue;
+        }
+        let Some(family) = bench.family_of(effect) else {
+            continue;
+        };
+        let visible = bench.dictionary.families[family].visible;
+        let entries = &bench.dictionary.entries[bench.dictionary.families[family].entries.clone()];
+        let gram = entries.iter().map(|e| e.gram[(0, 0)]).fold(0.0, f64::max);
+        let threshold = bench.null.threshold(family, level);
+        let most = description
+            .amplitudes()
+            .first()
+            .map_or(f64::INFINITY, |p| p.low.abs().max(p.high.abs()));
+        let detectable = (visible >= UNDETECTABLE && gram > 0.0)
+            .then(|| (threshold.sqrt() + POWER) / gram.sqrt())
+            .filter(|size| *size <= most);
+        let shape = description.grid(bench.model).into_iter().next();
+        let column = shape
+            .and_then(|s| description.columns(bench.model, &s).into_iter().next())
+            .map(|c| c.dense(bench.space.readings()));
+        let harm = column.and_then(|column| {
+            quantities
+                .iter()
+                .map(|(q, std)| (q, q.weights.dot(&column), *std))
+                .max_by(|a, b| (a.1.abs() / a.2).total_cmp(&(b.1.abs() / b.2)))
+                .map(|(q, per_unit, _)| Harm {
+                    quantity: q.name.clone(),
+                    per_unit,
+                    unit: q.unit.to_owned(),
+                })
+        });
+        list.push(Hidden {
+            effect: description.name().to_owned(),
+            visible,
+            detectable,
+            unit: description
+                .amplitudes()
+                .first()
+                .map_or(String::new(), |p| p.unit.to_owned()),
+            harm,
+        });
+    }
+    list.sort_by(|a, b| a.visible.total_cmp(&b.visible));
+    list
+}

@@ -90,7 +90,11 @@ fn readings(seed: u64) -> Lines {
     let scene = Scene::random(40, 4, 3e-5, 0.0, noise, &mut random);
     let reversal = FirstOrder::new(&scene.measured(seed), Assumptions::default()).unwrap();
     let mut lines = Lines::new(&reversal);
-    let change = Effect::<Lines>::columns(&effect("early", 60.0), &lines, &errsep_models::model::Shape::only());
+    let change = Effect::<Lines>::columns(
+        &effect("early", 60.0),
+        &lines,
+        &errsep_models::model::Shape::only(),
+    );
     lines.observed += change[0].dense(lines.observed.len()) * 0.12;
     lines
 }
@@ -127,7 +131,12 @@ fn the_basis_and_the_gauge_of_the_freedom_do_not_matter() {
     for seed in 1..4 {
         let lines = readings(seed);
         let plain = diagnosed(&lines, &TWO);
-        assert_eq!(plain.verdict.kind, Kind::Effect, "{}", plain.verdict.statement);
+        assert_eq!(
+            plain.verdict.kind,
+            Kind::Effect,
+            "{}",
+            plain.verdict.statement
+        );
         assert_eq!(plain.verdict.effects, ["early"]);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         // A random basis of the same columns and five columns more that lie in their span.
@@ -180,9 +189,23 @@ fn single_spikes_neither_make_an_effect_nor_hide_one() {
         lines.observed[k] += 2.0;
     }
     let diagnosis = diagnosed(&lines, &TWO);
-    assert_eq!(diagnosis.verdict.effects, ["early"], "{}", diagnosis.verdict.statement);
-    assert!(diagnosis.notes.iter().any(|n| n.contains("single readings stand out")));
+    assert_eq!(
+        diagnosis.verdict.effects,
+        ["early"],
+        "{}",
+        diagnosis.verdict.statement
+    );
+    assert!(
+        diagnosis
+            .notes
+            .iter()
+            .any(|n| n.contains("single readings stand out"))
+    );
     // k·u with k = 4, u = 0.05/√(2·1280) of the noise's own estimate, and what the pulled-in
     // readings keep: twelve of 1280 at four standard deviations.
-    assert!((diagnosis.gap.noise - 0.05).abs() < 0.008, "{}", diagnosis.gap.noise);
+    assert!(
+        (diagnosis.gap.noise - 0.05).abs() < 0.008,
+        "{}",
+        diagnosis.gap.noise
+    );
 }

@@ -121,7 +121,11 @@ fn jobs(set: &str, cases: u64, seed: u64, only: &str) -> Vec<Job> {
     };
     let mut jobs = Vec::new();
     for k in 0..cases {
-        for (c, names) in combinations.iter().enumerate().filter(|(_, names)| wanted(names)) {
+        for (c, names) in combinations
+            .iter()
+            .enumerate()
+            .filter(|(_, names)| wanted(names))
+        {
             for (l, law) in laws.iter().enumerate() {
                 let turned = set != "null" && k % 2 == 1;
                 jobs.push(Job {

@@ -224,7 +224,9 @@ fn size(value: Option<f64>, unit: &str) -> String {
 /// The greatest bias per visible µm; of what is never seen, that it biases at all.
 fn harm(row: &Diagnosability) -> String {
     let greatest = |list: &[(String, f64, String)]| {
-        list.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).cloned()
+        list.iter()
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+            .cloned()
     };
     match (greatest(&row.harm_per_visible), greatest(&row.harm)) {
         (Some((name, bias, _)), _) => format!("{:.3} µrad in {name}", 1e6 * bias),

@@ -68,8 +68,16 @@ fn parameters<M: FittedModel>(
         &covariance,
     );
     // Shape parameters follow the amplitudes. A step between two readings has no derivative.
-    for (estimate, own) in estimates.iter_mut().skip(count).zip(effect.resolution(bench.model, shape)) {
-        estimate.std = if estimate.std.is_nan() { own } else { estimate.std.hypot(own) };
+    for (estimate, own) in estimates
+        .iter_mut()
+        .skip(count)
+        .zip(effect.resolution(bench.model, shape))
+    {
+        estimate.std = if estimate.std.is_nan() {
+            own
+        } else {
+            estimate.std.hypot(own)
+        };
     }
     estimates
 }

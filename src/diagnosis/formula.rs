@@ -154,7 +154,10 @@ struct Parser {
 impl Parser {
     fn fault(&self, what: &str) -> String {
         let text: String = self.text.iter().collect();
-        format!("{what} at character {} of the formula `{text}`", self.at + 1)
+        format!(
+            "{what} at character {} of the formula `{text}`",
+            self.at + 1
+        )
     }
 
     fn blanks(&mut self) {
@@ -179,7 +182,11 @@ impl Parser {
         let mut left = self.term()?;
         while let Some(sign) = self.take(&['+', '-']) {
             let right = self.term()?;
-            let function = if sign == '+' { |a, b| a + b } else { |a: f64, b: f64| a - b };
+            let function = if sign == '+' {
+                |a, b| a + b
+            } else {
+                |a: f64, b: f64| a - b
+            };
             left = Node::two(function, left, right);
         }
         self.depth -= 1;
@@ -190,7 +197,11 @@ impl Parser {
         let mut left = self.power()?;
         while let Some(sign) = self.take(&['*', '/']) {
             let right = self.power()?;
-            let function = if sign == '*' { |a, b| a * b } else { |a: f64, b: f64| a / b };
+            let function = if sign == '*' {
+                |a, b| a * b
+            } else {
+                |a: f64, b: f64| a / b
+            };
             left = Node::two(function, left, right);
         }
         Ok(left)
@@ -238,7 +249,9 @@ impl Parser {
     }
 
     fn closed(&mut self) -> Result<(), String> {
-        self.take(&[')']).map(|_| ()).ok_or_else(|| self.fault("a `)` is missing"))
+        self.take(&[')'])
+            .map(|_| ())
+            .ok_or_else(|| self.fault("a `)` is missing"))
     }
 
     fn number(&mut self) -> Result<Node, String> {
@@ -264,7 +277,11 @@ impl Parser {
 
     fn name(&mut self) -> Result<Node, String> {
         let start = self.at;
-        while self.text.get(self.at).is_some_and(|c| c.is_ascii_alphanumeric()) {
+        while self
+            .text
+            .get(self.at)
+            .is_some_and(|c| c.is_ascii_alphanumeric())
+        {
             self.at += 1;
         }
         let name: String = self.text[start..self.at].iter().collect();
@@ -282,7 +299,10 @@ impl Parser {
                 .chain(["pi"])
                 .chain(FUNCTIONS.iter().map(|(n, _)| *n))
                 .collect();
-            return Err(self.fault(&format!("`{name}` is not known (known: {})", known.join(", "))));
+            return Err(self.fault(&format!(
+                "`{name}` is not known (known: {})",
+                known.join(", ")
+            )));
         };
         if self.take(&['(']).is_none() {
             return Err(self.fault(&format!("a `(` is missing after `{name}`")));
@@ -325,7 +345,10 @@ mod tests {
         assert_eq!(value("2^-1"), 0.5);
         assert_eq!(value("(1 - 2) * direction"), 1.0);
         assert_eq!(value("1.5e1 - 10 - 2"), 3.0);
-        assert_eq!(value("same(channel, 4) * step(time - 10) * max(repeat, 1)"), 2.0);
+        assert_eq!(
+            value("same(channel, 4) * step(time - 10) * max(repeat, 1)"),
+            2.0
+        );
         assert_eq!(value("cos(0 * pi)"), 1.0);
     }
 
@@ -345,8 +368,16 @@ mod tests {
             assert!(fault.contains(what), "{text}: {fault}");
         }
         let deep = "(".repeat(100_000);
-        assert!(Formula::try_from(deep).unwrap_err().contains("nested too deeply"));
-        assert!(Formula::try_from("2^".repeat(100_000)).unwrap_err().contains("nested too deeply"));
+        assert!(
+            Formula::try_from(deep)
+                .unwrap_err()
+                .contains("nested too deeply")
+        );
+        assert!(
+            Formula::try_from("2^".repeat(100_000))
+                .unwrap_err()
+                .contains("nested too deeply")
+        );
     }
 
     proptest! {

@@ -7,7 +7,7 @@ use nalgebra::DVector;
 
 use super::bench::{Bench, Remainder};
 use super::places::{channel_shares, place_of};
-use super::verdict::{Nearest, Fingerprint, Where};
+use super::verdict::{Fingerprint, Nearest, Where};
 
 /// A channel holds the gap when it stands out at this level, and is free of it beyond the other.
 const PRESENT: f64 = 0.01;
@@ -22,7 +22,11 @@ pub(super) fn fingerprint<M: FittedModel>(
 ) -> Fingerprint {
     let shares = channel_shares(bench, first, excess);
     let named = |keep: &dyn Fn(&Where) -> bool| -> Vec<String> {
-        shares.iter().filter(|w| keep(w)).map(|w| w.value.clone()).collect()
+        shares
+            .iter()
+            .filter(|w| keep(w))
+            .map(|w| w.value.clone())
+            .collect()
     };
     let energies = Energies::of(bench, &first.residual);
     Fingerprint {
@@ -103,7 +107,8 @@ impl Energies {
                 let n = side.len() as f64;
                 let level = mean(side);
                 steady += n * level * level - kept;
-                changing += side.iter().map(|e| (e - level).powi(2)).sum::<f64>() - kept * (n - 1.0);
+                changing +=
+                    side.iter().map(|e| (e - level).powi(2)).sum::<f64>() - kept * (n - 1.0);
             }
         }
         let part = |a: f64, b: f64, known: bool| {

@@ -87,16 +87,15 @@ pub(super) fn statement(
 
 fn describe(candidate: &Candidate) -> String {
     let mut parts: Vec<String> = candidate.variant.iter().cloned().collect();
-    parts.extend(
-        candidate
-            .parameters
-            .iter()
-            .map(|p| {
-                let (scale, unit) = if p.unit == "rad" { (1e6, "µrad") } else { (1.0, for_people(&p.unit)) };
-                let value = measured(scale * p.value, Some(scale * p.std));
-                format!("{} {value} {unit}", p.name)
-            }),
-    );
+    parts.extend(candidate.parameters.iter().map(|p| {
+        let (scale, unit) = if p.unit == "rad" {
+            (1e6, "µrad")
+        } else {
+            (1.0, for_people(&p.unit))
+        };
+        let value = measured(scale * p.value, Some(scale * p.std));
+        format!("{} {value} {unit}", p.name)
+    }));
     format!(" ({})", parts.join(", "))
 }
 
@@ -108,7 +107,10 @@ pub(super) fn separating(groups: &[Vec<String>], candidates: &[Candidate]) -> Ve
         .filter_map(|group| {
             let first = group.first()?;
             let candidate = candidates.iter().find(|c| c.effect == *first)?;
-            Some(format!("{} (only {first} would show there)", candidate.confirm))
+            Some(format!(
+                "{} (only {first} would show there)",
+                candidate.confirm
+            ))
         })
         .collect()
 }
@@ -139,7 +141,10 @@ fn described(shape: &Fingerprint) -> String {
                 (Some(from), Some(to)) => format!(" from {} to {}", plain(from, 4), plain(to, 4)),
                 _ => String::new(),
             };
-            format!(", but beside it there remains something in {} {}{range}", w.axis, w.value)
+            format!(
+                ", but beside it there remains something in {} {}{range}",
+                w.axis, w.value
+            )
         });
         parts.push(format!(
             "it is most like {} (cosine {}){against}",

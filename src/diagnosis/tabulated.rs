@@ -69,7 +69,10 @@ impl Tabulated {
     /// What is wrong with the effect for some readings, if anything.
     pub fn fault(&self, channels: &[String], places: &[Place]) -> Option<String> {
         if self.formula.is_some() != self.signature.is_empty() {
-            return Some(format!("`{}` needs either a signature or a formula", self.name));
+            return Some(format!(
+                "`{}` needs either a signature or a formula",
+                self.name
+            ));
         }
         let undefined = |f: &Formula| places.iter().find(|p| !f.at(&circumstances(p)).is_finite());
         if let Some(place) = self.formula.as_ref().and_then(undefined) {

@@ -110,7 +110,9 @@ impl Smoother {
         }
         let count = repeats.len() as f64;
         let own: Vec<DVector<f64>> = repeats.iter().map(|r| self.basis.tr_mul(r)).collect();
-        let whole = own.iter().fold(DVector::zeros(mean.len()), |sum, c| sum + c);
+        let whole = own
+            .iter()
+            .fold(DVector::zeros(mean.len()), |sum, c| sum + c);
         let missed = |weight: f64| -> f64 {
             own.iter()
                 .flat_map(|c| c.iter().zip(whole.iter()).zip(self.roughness.iter()))
@@ -120,7 +122,9 @@ impl Smoother {
         let top = self.roughness.max();
         let (_, weight) = weights(top)
             .map(|weight| (missed(weight), weight))
-            .fold((f64::INFINITY, 0.0), |best, next| if next.0 < best.0 { next } else { best });
+            .fold((f64::INFINITY, 0.0), |best, next| {
+                if next.0 < best.0 { next } else { best }
+            });
         let coefficients = self.basis.tr_mul(mean);
         let kept = coefficients.zip_map(&self.roughness, |c, d| c / (1.0 + weight * d));
         self.through(&*self.basis * kept)
@@ -177,18 +181,29 @@ mod tests {
     fn repeats_tell_form_from_correlated_noise() {
         let x: Vec<f64> = (0..150).map(f64::from).collect();
         let form = |t: f64| (t / 20.0).sin();
-        let noise = |k: usize, r: usize| 0.1 * (1.3 * (k / 10) as f64 * (r + 1) as f64 + r as f64).sin();
+        let noise =
+            |k: usize, r: usize| 0.1 * (1.3 * (k / 10) as f64 * (r + 1) as f64 + r as f64).sin();
         let repeats: Vec<DVector<f64>> = (0..4)
             .map(|r| DVector::from_fn(150, |k, _| form(x[k]) + noise(k, r)))
             .collect();
         let mean = repeats.iter().fold(DVector::zeros(150), |sum, r| sum + r) / 4.0;
         let smoother = Smoother::new(&x).unwrap();
         let error = |p: &SmoothProfile| -> f64 {
-            (5..145).map(|k| (p.slopes[k] - (x[k] / 20.0).cos() / 20.0).powi(2)).sum()
+            (5..145)
+                .map(|k| (p.slopes[k] - (x[k] / 20.0).cos() / 20.0).powi(2))
+                .sum()
         };
         let own: Vec<&DVector<f64>> = repeats.iter().collect();
-        let (single, repeated) = (smoother.smooth(&mean), smoother.smooth_repeated(&mean, &own));
-        assert!(error(&repeated) < 0.5 * error(&single), "{} {}", error(&repeated), error(&single));
+        let (single, repeated) = (
+            smoother.smooth(&mean),
+            smoother.smooth_repeated(&mean, &own),
+        );
+        assert!(
+            error(&repeated) < 0.5 * error(&single),
+            "{} {}",
+            error(&repeated),
+            error(&single)
+        );
     }
 
     #[test]

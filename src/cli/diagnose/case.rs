@@ -119,9 +119,9 @@ fn catalogue<M: FittedModel>(args: &Args, model: &M) -> Result<Vec<Box<dyn Effec
             effect.fault(&channels, model.places())
         };
         if let Some(what) = fault {
-            return Err(Message::bad_input(what)
-                .in_file(path)
-                .remedy("give every effect a new name, growing positions or a formula, and known channels"));
+            return Err(Message::bad_input(what).in_file(path).remedy(
+                "give every effect a new name, growing positions or a formula, and known channels",
+            ));
         }
         catalogue.push(Box::new(effect));
     }

@@ -35,22 +35,22 @@ echo "processors: $(nproc), load when begun:$(cut -d' ' -f1-3 /proc/loadavg | se
     echo "Ceres $(dpkg-query -W -f '${Version}' libceres-dev 2> /dev/null || echo 'of this machine')"
 "$place/bin/python" -c "import scipy; print('scipy', scipy.__version__)" 2> /dev/null || true
 data=$(mktemp)
-trap 'rm -f "$data" "$data.ours"' EXIT
+trap 'rm -f "$data" "$data.ours" "$data.ours.equal"' EXIT
 echo
-echo "| readings a channel | solver | seconds | MB | cost against ours | passes | largest tilt difference, rad |"
-echo "|---|---|---|---|---|---|---|"
-row() { # readings, words; line: name seconds memory cost passes tilts
+echo "| readings a channel | solver | seconds | of all processors | MB | cost against ours | passes | largest tilt difference, rad |"
+echo "|---|---|---|---|---|---|---|---|"
+row() { # readings, words; line: name seconds processor memory cost passes tilts
     awk -v n="$1" -v what="$2" '
-        FNR == NR { cost = $4; for (k = 6; k <= 8; k++) tilt[k] = $k; next }
-        NF < 5 { printf "| %s | %s | %s %s | | | | |\n", n, what, $2, $3 " " $4 " s"; next }
+        FNR == NR { cost = $5; for (k = 7; k <= 9; k++) tilt[k] = $k; next }
+        NF < 5 { printf "| %s | %s | %s %s %s s | | | | | |\n", n, what, $2, $3, $4; next }
         {
             worst = 0
-            for (k = 6; k <= 8; k++) {
+            for (k = 7; k <= 9; k++) {
                 d = $k - tilt[k]
                 if (d < 0) d = -d
                 if (d > worst) worst = d
             }
-            printf "| %s | %s | %s | %s | %+.1e | %s | %.0e |\n", n, what, $2, $3, $4 / cost - 1, $5, worst
+            printf "| %s | %s | %s | %s | %s | %+.1e | %s | %.0e |\n", n, what, $2, $3, $4, $5 / cost - 1, $6, worst
         }' "$data.ours.equal" -
 }
 for n in "$@"; do
@@ -62,13 +62,12 @@ for n in "$@"; do
         "$place/reversal_ceres" "$data" 2 1e-6 1e3 | row "$n" "Ceres, default tolerance, light gauge"
         "$place/reversal_ceres" "$data" 2 1e-12 3e5 | row "$n" "Ceres, to the minimum"
     else
-        echo "| $n | Ceres is not there | | | | | |"
+        echo "| $n | Ceres is not there | | | | | | |"
     fi
     if "$place/bin/python" -c "import scipy" 2> /dev/null; then
         "$place/bin/python" benches/peers/reversal.py "$data" "$limit" |
             row "$n" "scipy least_squares (trf, sparse)"
     else
-        echo "| $n | scipy is not there | | | | | |"
+        echo "| $n | scipy is not there | | | | | | |"
     fi
 done
-rm -f "$data.ours.equal"

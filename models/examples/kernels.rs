@@ -49,13 +49,17 @@ fn value(i: usize) -> f64 {
 
 /// A full batch of ten columns, on an empty triangle.
 fn compressing(times: usize) {
-    let mut batch = Tall::new(10);
+    let mut from = Tall::new(10);
+    from.reset(Tall::CAPACITY, 10);
+    for j in 0..10 {
+        for (i, out) in from.column_mut(j).iter_mut().enumerate() {
+            *out = value(10 * i + j);
+        }
+    }
+    let mut batch = from.clone();
     for _ in 0..times {
-        batch.reset(Tall::CAPACITY, 10);
         for j in 0..10 {
-            for (i, out) in batch.column_mut(j).iter_mut().enumerate() {
-                *out = value(10 * i + j);
-            }
+            batch.column_mut(j).copy_from_slice(from.column(j));
         }
         let mut triangle = vec![0.0; 100];
         compress(&mut batch, &mut triangle);

@@ -250,6 +250,12 @@ pub trait Effect<M>: Send + Sync {
         None
     }
 
+    /// The standard uncertainty that the spacing of the readings leaves in each shape parameter,
+    /// where the signature changes by steps.
+    fn resolution(&self, _model: &M, _shape: &Shape) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// The variant in words, where the effect has several.
     fn variant_name(&self, _model: &M, _shape: &Shape) -> Option<String> {
         None
@@ -273,7 +279,7 @@ pub trait Effect<M>: Send + Sync {
                 value,
                 std: covariance
                     .get((k, k))
-                    .map_or(f64::NAN, |v| v.max(0.0).sqrt()),
+                    .map_or(f64::NAN, |v| v.clamp(0.0, f64::INFINITY).sqrt()),
                 unit: parameter.unit.to_owned(),
             })
             .collect()

@@ -211,3 +211,32 @@ fn what_cannot_be_analysed_is_named() {
         Err(AnovaError::NothingToCompare)
     );
 }
+
+#[test]
+fn the_component_between_is_what_the_repeats_leave() {
+    // By hand: means 2, 6, 4 of two readings each; MS_b = 8, MS_w = 2, n0 = 2, so that the component
+    // between is (8 − 2)/2 = 3, with Satterthwaite's 36/(64/2 + 4/3) degrees of freedom. The mean has
+    // MS_b/6. Tolerance: epsilons.
+    let groups = [[1.0, 3.0], [5.0, 7.0], [3.0, 5.0]];
+    let groups = groups.iter().enumerate().map(|(i, readings)| Group {
+        name: i.to_string(),
+        readings: readings.to_vec(),
+    });
+    let found = analyse(&Groups::new(groups.collect()).unwrap(), "um", 0.95).unwrap();
+    let between = found.components.between.unwrap();
+    near("between", between.variance, 3.0, 1e-14);
+    near(
+        "within",
+        found.components.within.unwrap().variance,
+        2.0,
+        1e-14,
+    );
+    near("F", found.f.unwrap(), 4.0, 1e-14);
+    let degrees = 36.0 / (64.0 / 2.0 + 4.0 / 3.0);
+    near("degrees", between.degrees.as_f64(), degrees, 1e-14);
+    let u = found.mean.standard_uncertainty;
+    near("mean", u * u, 8.0 / 6.0, 1e-14);
+    // A future reading: the mean, a new group, its own reading.
+    let future = found.future_reading.unwrap().result.standard_uncertainty;
+    near("future", future * future, 8.0 / 6.0 + 3.0 + 2.0, 1e-13);
+}

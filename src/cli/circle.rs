@@ -9,7 +9,7 @@ use errsep_models::circle::{
 };
 use serde_json::{Value, json};
 
-use super::quantity::{quantity_json, unexpandable};
+use super::quantity::{measured_words, quantity_json, unexpandable};
 use super::{Answer, CommonArgs};
 use crate::io::circle::read_points;
 use crate::io::{CsvTable, Message, Status};
@@ -81,7 +81,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         );
     }
     Ok(Answer {
-        text: in_words(args, &points, &fit, &zones_found, &others),
+        text: in_words(args, &points, &fit, &zones_found, &others)?,
         json,
         page: page(&CircleView {
             data: &args.points.display().to_string(),
@@ -138,24 +138,16 @@ fn in_words(
     fit: &CircleFit,
     circularity: &Circularity,
     others: &[(String, Circle)],
-) -> String {
+) -> Result<String, Message> {
     let mut text = format!(
         "Circle through {} ({} points)\n",
         args.points.display(),
         points.len()
     );
-    let std = fit.standard_uncertainties();
     let c = fit.circle;
-    for (name, value, std) in [
-        ("radius", c.radius, std[2]),
-        ("centre x", c.centre.x, std[0]),
-        ("centre y", c.centre.y, std[1]),
-    ] {
-        let _ = writeln!(
-            text,
-            "  {name:10} {} mm (standard uncertainty)",
-            number::measured(value, Some(std))
-        );
+    let quantities = fit.quantities().map_err(unexpandable)?;
+    for (name, quantity) in ["radius", "centre x", "centre y"].iter().zip(&quantities) {
+        let _ = writeln!(text, "  {name:10} {}", measured_words(quantity)?);
     }
     let _ = writeln!(
         text,
@@ -188,7 +180,7 @@ fn in_words(
             number::plain(1e3 * (other.radius - c.radius), 3)
         );
     }
-    text
+    Ok(text)
 }
 
 fn as_json(

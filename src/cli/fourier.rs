@@ -186,7 +186,7 @@ fn in_words(
     methods: &[(String, f64)],
     straight: &[f64],
 ) -> Result<String, Message> {
-    let mut text = format!("Fourier separation of {name} ({} scans)\n", scans.len());
+    let mut text = format!("Fourier separation of {name} ({})\n", counted(scans.len()));
     let _ = writeln!(
         text,
         "  straightness of the workpiece  {} µm (peak to valley about the least-squares line)",
@@ -258,6 +258,10 @@ fn list(orders: &[usize]) -> String {
         .map(ToString::to_string)
         .collect::<Vec<_>>()
         .join(", ")
+}
+
+fn counted(scans: usize) -> String {
+    format!("{scans} scan{}", if scans == 1 { "" } else { "s" })
 }
 
 fn noise_words(s: &Separation) -> &'static str {

@@ -1,6 +1,7 @@
 //! The page of a Fourier separation.
 
 use errsep_models::fourier::{LOST_BELOW, Scan, Separation, determinant};
+use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
 
 use super::plot::{Axis, Chart, Mark, Series};
 use super::{Cell, Figure, KeyFigure, Page, Section, Standing, Table, number};
@@ -32,6 +33,13 @@ pub fn peak_to_valley(values: &[f64]) -> f64 {
     if low <= high { high - low } else { 0.0 }
 }
 
+/// Coverage factor of the 95 % bands; the normal one where nothing tells the degrees of freedom.
+fn band(s: &Separation) -> f64 {
+    let degrees = s.degrees_of_freedom.unwrap_or(DegreesOfFreedom::Infinite);
+    // Degrees of freedom are positive, so that they have a coverage factor.
+    coverage_factor(0.95, degrees).unwrap_or(f64::NAN)
+}
+
 /// The page of a separation.
 #[must_use]
 pub fn page(view: &FourierView) -> Page {
@@ -60,7 +68,7 @@ pub fn page(view: &FourierView) -> Page {
 
 fn profiles(view: &FourierView) -> Section {
     let s = view.separation;
-    let half: Vec<f64> = s.workpiece_std.iter().map(|u| 1.96 * u).collect();
+    let half: Vec<f64> = s.workpiece_std.iter().map(|u| band(s) * u).collect();
     let mut figures = vec![
         KeyFigure::new("Straightness", peak_to_valley(view.straightness), "µm")
             .meaning("workpiece, about its least-squares line"),
@@ -118,7 +126,7 @@ fn orders(view: &FourierView) -> Section {
         .iter()
         .map(|o| 2.0 * o.coefficient.norm())
         .collect();
-    let half = s.orders.iter().map(|o| 1.96 * 2.0 * o.std).collect();
+    let half = s.orders.iter().map(|o| band(s) * 2.0 * o.std).collect();
     let spectrum = Chart::new(
         Axis::new("order", "undulations per section").whole(),
         Axis::new("amplitude", "µm"),

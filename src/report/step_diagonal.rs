@@ -61,7 +61,7 @@ fn determined(view: &StepDiagonalView) -> Section {
             c.component.name().into(),
             c.component.words().into(),
             c.determined.words().into(),
-            Cell::Empty,
+            size(c).map_or(Cell::Empty, Cell::from),
         ]);
     }
     for l in &view.fit.squareness {
@@ -116,6 +116,35 @@ fn profiles(view: &StepDiagonalView) -> Section {
         })
 }
 
+/// Peak to valley of what is determined, with its greatest expanded uncertainty.
+fn size(c: &ComponentEstimate) -> Option<String> {
+    let (factor, unit) = unit(c.component);
+    let high = c.values.iter().copied().reduce(f64::max)?;
+    let low = c.values.iter().copied().reduce(f64::min)?;
+    let span = number::plain(factor * (high - low), 3);
+    let expanded = expanded(c).into_iter().reduce(f64::max);
+    Some(match expanded {
+        Some(u) => format!(
+            "{span} {unit} peak to valley, U up to {} {unit}",
+            number::plain(u, 2)
+        ),
+        None => format!("{span} {unit} peak to valley"),
+    })
+}
+
+/// Expanded uncertainties (95 %) in the unit that is shown; empty where the noise is not known.
+fn expanded(c: &ComponentEstimate) -> Vec<f64> {
+    let (factor, _) = unit(c.component);
+    c.std
+        .iter()
+        .zip(&c.degrees_of_freedom)
+        .map(|(u, degrees)| {
+            // Degrees of freedom of an estimate are positive, so that they have a coverage factor.
+            coverage_factor(0.95, *degrees).map_or(f64::NAN, |k| k * factor * u)
+        })
+        .collect()
+}
+
 /// How far the way back determines the reversal of each error.
 fn reversals(view: &StepDiagonalView) -> Section {
     let mut section = Section::new("Reversal");
@@ -166,11 +195,7 @@ fn profile(c: &ComponentEstimate, what: &str) -> Figure {
     let values = c.values.iter().map(|v| factor * v).collect();
     let mut series = Series::line(c.component.name(), c.positions.clone(), values).mark(Mark::Dot);
     if !c.std.is_empty() {
-        let expanded = c.std.iter().zip(&c.degrees_of_freedom).map(|(u, degrees)| {
-            // Degrees of freedom of an estimate are positive, so that they have a coverage factor.
-            coverage_factor(0.95, *degrees).map_or(f64::NAN, |k| k * factor * u)
-        });
-        series = series.half_band(expanded.collect());
+        series = series.half_band(expanded(c));
     }
     let caption = match c.determined {
         Determined::ChangesOnly => "From its first value: the constant is not determined.",

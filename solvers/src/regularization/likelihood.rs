@@ -23,7 +23,8 @@ pub struct Likelihood {
 /// With γ the generalized singular values, n₀ the parameters that L leaves free, e = Σ γ²/(γ² + λ²) and
 /// q = ‖Ax − b‖² + λ²‖Lx‖² the criterion is Σ ln(1 + γ²/λ²) + (m − n₀) ln q. Its slope in ln λ,
 /// 2 [(m − n₀) λ²‖Lx‖²/q − e], needs only what every family tells; the criterion itself is the integral
-/// of it. Compared with generalized cross-validation its λ scatters less.
+/// of it. Compared with generalized cross-validation its λ scatters less; an x that is smoother than L
+/// says (smooth where L is the identity) is under-smoothed.
 ///
 /// # Errors
 /// No range of λ, or the family failed at some λ.

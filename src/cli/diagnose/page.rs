@@ -147,15 +147,10 @@ fn groups(diagnosis: &Diagnosis) -> Vec<sheet::Group> {
         .verdict
         .indistinguishable
         .iter()
-        .map(|names| sheet::Group {
+        .zip(&diagnosis.verdict.separate)
+        .map(|(names, separate)| sheet::Group {
             effects: names.clone(),
-            separate: diagnosis
-                .candidates
-                .iter()
-                .filter(|c| names.contains(&c.effect))
-                .map(|c| c.confirm.clone())
-                .collect::<Vec<_>>()
-                .join("; or "),
+            separate: separate.clone(),
         })
         .collect()
 }

@@ -3,12 +3,14 @@
 use std::path::Path;
 
 use errsep_models::four_sensor::Profile;
+use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
 use errsep_solvers::regularization::Point;
 use nalgebra::DVector;
 
 use super::Found;
 use super::json::residual_rms;
 use super::words::{noise_source, not_determined, span, status};
+use crate::cli::quantity::COVERAGE;
 use crate::io::units::URAD_PER_RAD;
 use crate::report::plot::{Axis, Chart, Mark, Series};
 use crate::report::{Cell, Figure, KeyFigure, Page, Section, Standing, Table};
@@ -45,12 +47,14 @@ fn result(found: &Found) -> Section {
         &s.straightness,
         &slide,
         1.0,
+        found,
     ));
     let mut tilt = Chart::new(axis_x(), Axis::new("tilt γ less its mean", "µrad")).series(curve(
         "direct fit",
         &centred(&s.tilt),
         &slide,
         URAD_PER_RAD,
+        found,
     ));
     if let Some(published) = &found.published {
         let name = "as published";
@@ -77,7 +81,7 @@ fn result(found: &Found) -> Section {
         ])
         .figure(Figure::new(
             "Straightness of the slide",
-            "With the 95 % band of the readings' noise. The direct fit and the published way may \
+            "With the expanded uncertainty (95 %) of the readings' noise as a band. The direct fit and the published way may \
              differ by a line and a parabola.",
             straightness,
         ))
@@ -91,7 +95,7 @@ fn result(found: &Found) -> Section {
             "Surface",
             "The reference surface as the sensors found it.",
             Chart::new(axis_x(), Axis::new("surface f", "µm"))
-                .series(curve("f", &s.surface, &surface, 1.0)),
+                .series(curve("f", &s.surface, &surface, 1.0, found)),
         ))
 }
 
@@ -191,10 +195,15 @@ fn axis_x() -> Axis {
     Axis::new("position x", "mm")
 }
 
-fn curve(name: &str, profile: &Profile, x: &[f64], scale: f64) -> Series {
+fn curve(name: &str, profile: &Profile, x: &[f64], scale: f64, found: &Found) -> Series {
+    let degrees = found
+        .degrees_of_freedom()
+        .unwrap_or(DegreesOfFreedom::Infinite);
+    // Degrees of freedom are positive, so that they have a coverage factor.
+    let k = coverage_factor(COVERAGE, degrees).unwrap_or(f64::NAN);
     let scaled = |values: &DVector<f64>, by: f64| values.iter().map(|v| by * v).collect::<Vec<_>>();
     Series::line(name, x.to_vec(), scaled(&profile.values, scale))
-        .half_band(scaled(&profile.std, 1.96 * scale))
+        .half_band(scaled(&profile.std, k * scale))
 }
 
 fn centred(profile: &Profile) -> Profile {

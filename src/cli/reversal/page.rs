@@ -107,6 +107,5 @@ pub fn page(file: &Path, data: &ReversalData, setup: &ReversalSetup, o: &Outcome
             .map(|(name, why)| format!("{name}: {why}"))
             .collect(),
         warnings: o.warnings.clone(),
-        ..View::default()
     })
 }

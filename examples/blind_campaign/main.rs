@@ -105,7 +105,7 @@ fn main() -> std::io::Result<()> {
 }
 
 fn jobs(set: &str, cases: u64, seed: u64, only: &str) -> Vec<Job> {
-    let mut combinations: Vec<Vec<&'static str>> = match set {
+    let combinations: Vec<Vec<&'static str>> = match set {
         "null" => vec![Vec::new()],
         "pairs" => SHOWN
             .iter()
@@ -114,14 +114,18 @@ fn jobs(set: &str, cases: u64, seed: u64, only: &str) -> Vec<Job> {
             .collect(),
         _ => SHOWN.iter().map(|n| vec![*n]).collect(),
     };
-    combinations.retain(|c| only.is_empty() || c.iter().any(|n| only.split(',').any(|o| o == *n)));
+    let wanted = |c: &[&str]| only.is_empty() || c.iter().any(|n| only.split(',').any(|o| o == *n));
     let laws: &[Noise] = match set {
         "null" => &[Noise::White, Noise::Correlated, Noise::Tails],
         _ => &[Noise::White],
     };
     let mut jobs = Vec::new();
     for k in 0..cases {
-        for (c, names) in combinations.iter().enumerate() {
+        for (c, names) in combinations
+            .iter()
+            .enumerate()
+            .filter(|(_, names)| wanted(names))
+        {
             for (l, law) in laws.iter().enumerate() {
                 let turned = set != "null" && k % 2 == 1;
                 jobs.push(Job {

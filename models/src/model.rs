@@ -250,6 +250,12 @@ pub trait Effect<M>: Send + Sync {
         None
     }
 
+    /// The standard uncertainty that the spacing of the readings leaves in each shape parameter,
+    /// where the signature changes by steps.
+    fn resolution(&self, _model: &M, _shape: &Shape) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// The variant in words, where the effect has several.
     fn variant_name(&self, _model: &M, _shape: &Shape) -> Option<String> {
         None
@@ -273,7 +279,7 @@ pub trait Effect<M>: Send + Sync {
                 value,
                 std: covariance
                     .get((k, k))
-                    .map_or(f64::NAN, |v| v.max(0.0).sqrt()),
+                    .map_or(f64::NAN, |v| v.clamp(0.0, f64::INFINITY).sqrt()),
                 unit: parameter.unit.to_owned(),
             })
             .collect()
@@ -314,6 +320,12 @@ pub trait FittedModel: Sized + Send + Sync {
     /// Names of the channels.
     fn channel_names(&self) -> Vec<String>;
 
+    /// What tells the trace of a place from the others of its channel, where that is not its repeat
+    /// and its direction.
+    fn trace_name(&self, _place: &Place) -> Option<String> {
+        None
+    }
+
     /// Combinations of the channels to look at beside the channels themselves.
     fn patterns(&self) -> Vec<Pattern> {
         Vec::new()
@@ -327,6 +339,17 @@ pub trait FittedModel: Sized + Send + Sync {
     /// The profiles people act on.
     fn profiles(&self) -> Vec<Profile> {
         Vec::new()
+    }
+
+    /// Whether noise may be correlated along a trace and shift whole traces. Where it may not, what
+    /// shifts a trace is gap.
+    fn correlated_noise(&self) -> bool {
+        true
+    }
+
+    /// Whether a single wrong reading is an effect of the catalogue, and not to be calmed as noise.
+    fn names_single_readings(&self) -> bool {
+        false
     }
 
     /// Standard deviation of one reading where the user states it.

@@ -221,6 +221,20 @@ fn size(value: Option<f64>, unit: &str) -> String {
     )
 }
 
+/// The greatest bias per visible µm; of what is never seen, that it biases at all.
+fn harm(row: &Diagnosability) -> String {
+    let greatest = |list: &[(String, f64, String)]| {
+        list.iter()
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+            .cloned()
+    };
+    match (greatest(&row.harm_per_visible), greatest(&row.harm)) {
+        (Some((name, bias, _)), _) => format!("{:.3} µrad in {name}", 1e6 * bias),
+        (None, Some((name, bias, _))) if bias.abs() > 1e-15 => format!("unseen, in {name}"),
+        _ => String::new(),
+    }
+}
+
 fn answer(
     args: &Args,
     rows: &[Diagnosability],
@@ -232,7 +246,7 @@ fn answer(
             .unwrap_or(std::cmp::Ordering::Equal)
     });
     let mut text = String::from(
-        "effect                   visible     seen from        told apart from   most like\n",
+        "effect                   visible     seen from        told apart from   bias per visible µm      most like\n",
     );
     let mut table = Table::new(
         "What the plan shows",
@@ -241,6 +255,7 @@ fn answer(
             "visible",
             "seen from",
             "told apart from",
+            "bias per visible µm",
             "most like",
         ],
     );
@@ -253,9 +268,10 @@ fn answer(
             .confused_with
             .as_ref()
             .map_or(String::new(), |n| format!("{n} (cosine {:.2})", row.cosine));
+        let harm = harm(row);
         let _ = writeln!(
             text,
-            "{:<24} {:>6.1} %  {seen:>15}  {told:>15}   {like}",
+            "{:<24} {:>6.1} %  {seen:>15}  {told:>15}   {harm:<22}   {like}",
             row.effect,
             100.0 * row.visible
         );
@@ -264,6 +280,7 @@ fn answer(
             Cell::Share(row.visible),
             Cell::Text(seen),
             Cell::Text(told),
+            Cell::Text(harm),
             Cell::Text(like),
         ]);
     }

@@ -61,11 +61,25 @@ fn parameters<M: FittedModel>(
             })
         },
     );
-    bench.catalogue[causes[which].effect].estimates(
-        &causes[which].shape,
+    let (effect, shape) = (&bench.catalogue[causes[which].effect], &causes[which].shape);
+    let mut estimates = effect.estimates(
+        shape,
         &amplitudes.as_slice()[own.1..own.1 + count],
         &covariance,
-    )
+    );
+    // Shape parameters follow the amplitudes. A step between two readings has no derivative.
+    for (estimate, own) in estimates
+        .iter_mut()
+        .skip(count)
+        .zip(effect.resolution(bench.model, shape))
+    {
+        estimate.std = if estimate.std.is_nan() {
+            own
+        } else {
+            estimate.std.hypot(own)
+        };
+    }
+    estimates
 }
 
 /// What each effect explains, by that.

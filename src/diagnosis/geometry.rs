@@ -44,6 +44,9 @@ pub struct Diagnosability {
     pub visible_rms: Option<f64>,
     /// Bias of each quantity per unit of amplitude, with its unit.
     pub harm: Vec<(String, f64, String)>,
+    /// Bias of each quantity per unit of the root mean square that the effect leaves visible in the
+    /// readings, where it leaves any.
+    pub harm_per_visible: Vec<(String, f64, String)>,
 }
 
 /// The certificate of a plan.
@@ -96,6 +99,7 @@ pub fn certificate<M: FittedModel>(
             cosine: 0.0,
             visible_rms: None,
             harm,
+            harm_per_visible: Vec::new(),
         };
         let entries = &dictionary.entries[dictionary.families[family].entries.clone()];
         if visible >= 0.01 && !entries.is_empty() {
@@ -128,6 +132,14 @@ pub fn certificate<M: FittedModel>(
             let threshold = null.threshold(family, level);
             let smallest = (threshold.sqrt() + POWER) / length;
             row.detectable = Some(smallest);
+            let per_unit = length * law.sigma() / (n as f64).sqrt();
+            // The harm is that of the first shape of the grid, so its own visible part counts.
+            let first = space.gram(&first, 0.0).matrix[(0, 0)].sqrt() / length;
+            row.harm_per_visible = row
+                .harm
+                .iter()
+                .map(|(name, bias, unit)| (name.clone(), bias / (first * per_unit), unit.clone()))
+                .collect();
             row.visible_rms = Some(smallest * length * law.sigma() / (n as f64).sqrt());
             let half_angle = 0.5 * row.cosine.acos();
             row.identifiable = (half_angle.sin() > 1e-3)

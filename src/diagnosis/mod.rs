@@ -9,6 +9,7 @@ mod bench;
 mod candidates;
 mod dictionary;
 mod folding;
+mod formula;
 mod geometry;
 mod hidden;
 mod localise;
@@ -19,6 +20,7 @@ mod prove;
 mod quantify;
 mod report;
 mod search;
+mod shape;
 mod space;
 mod spikes;
 mod statement;
@@ -31,13 +33,15 @@ use nalgebra::DVector;
 
 use attribute::{Answer, attribute};
 use bench::{Bench, Remainder};
+pub use formula::{Circumstances, Formula};
 pub use geometry::{Diagnosability, certificate};
 pub use noise::{NoiseLaw, NoiseSource};
 pub use prove::{Trials, prove};
+pub use statement::for_people;
 pub use tabulated::{Tabulated, TabulatedEffects};
 pub use verdict::{
-    Bias, Candidate, Detail, Diagnosis, Gap, Harm, HeldOut, Hidden, Kind, NoiseOut, ParameterOut,
-    Size, Verdict, Where,
+    Bias, Candidate, Detail, Diagnosis, Fingerprint, Gap, Harm, HeldOut, Hidden, Kind, Nearest,
+    NoiseOut, ParameterOut, Size, Verdict, Where,
 };
 
 /// How a diagnosis is made.
@@ -80,7 +84,11 @@ pub fn diagnose_with<M: FittedModel>(
         .filter(|effect| !options.without.iter().any(|name| name == effect.name()))
         .collect();
     let readings = model.linearised();
-    let (calm, spikes) = spikes::pulled_in(model, &readings);
+    let (calm, spikes) = if model.names_single_readings() {
+        (readings.clone(), 0)
+    } else {
+        spikes::pulled_in(model, &readings)
+    };
     let calmed;
     let (model, readings) = if spikes == 0 {
         (model, readings)

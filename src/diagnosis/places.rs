@@ -8,7 +8,7 @@ use super::dictionary::{Meaning, statistic};
 use super::verdict::Where;
 
 /// Places that are not reported beyond this probability.
-pub(super) const PLACE_LEVEL: f64 = 0.05;
+const PLACE_LEVEL: f64 = 0.05;
 
 /// The strongest place on every axis, and the channels' shares.
 pub(super) fn places<M: FittedModel>(
@@ -16,45 +16,54 @@ pub(super) fn places<M: FittedModel>(
     first: &Remainder,
     excess: f64,
 ) -> Vec<Where> {
-    let interval = |t: f64| {
-        let reach = 1.96 * 2.0 * t.sqrt() / excess;
-        let share = (t / excess).clamp(0.0, 1.0);
-        (share, [(share - reach).max(0.0), (share + reach).min(1.0)])
-    };
-    let mut places = Vec::new();
-    for (k, family) in bench.dictionary.families.iter().enumerate() {
-        let (surprise, Some(entry)) = first.best[k] else {
-            continue;
-        };
-        let p = bench.null.family(k, surprise);
-        if family.is_effect || p > PLACE_LEVEL {
-            continue;
-        }
-        let entry = &bench.dictionary.entries[entry];
-        if let Meaning::Place(item) = &entry.meaning {
-            let adjoint = bench
-                .space
-                .adjoint(DMatrix::from_column_slice(
-                    first.residual.len(),
-                    1,
-                    first.residual.as_slice(),
-                ))
-                .column(0)
-                .clone_owned();
-            let score = entry.products(&bench.dictionary.places.sums(&adjoint));
-            let t = statistic(&entry.gram, &score, false);
-            let (share, ci) = interval(t);
-            places.push(Where::new(item, share, ci, p));
-        }
-    }
-    places.extend(channels(bench, first, excess));
+    let mut places: Vec<Where> = bench
+        .dictionary
+        .families
+        .iter()
+        .enumerate()
+        .filter(|(_, family)| !family.is_effect)
+        .filter_map(|(k, _)| {
+            let (surprise, entry) = first.best[k];
+            let p = bench.null.family(k, surprise);
+            (p <= PLACE_LEVEL).then(|| place_of(bench, first, entry?, excess, p))?
+        })
+        .collect();
+    let channels = channel_shares(bench, first, excess);
+    places.extend(channels.into_iter().filter(|w| w.p_value < PLACE_LEVEL));
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     places.truncate(6);
     places
 }
 
+/// An entry of the dictionary as a place, with the part of the gap that it explains.
+pub(super) fn place_of<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    remainder: &Remainder,
+    entry: usize,
+    excess: f64,
+    p_value: f64,
+) -> Option<Where> {
+    let entry = &bench.dictionary.entries[entry];
+    let Meaning::Place(item) = &entry.meaning else {
+        return None;
+    };
+    let residual = &remainder.residual;
+    let whole = DMatrix::from_column_slice(residual.len(), 1, residual.as_slice());
+    let adjoint = bench.space.adjoint(whole).column(0).clone_owned();
+    let score = entry.products(&bench.dictionary.places.sums(&adjoint));
+    let t = statistic(&entry.gram, &score, false);
+    let reach = 1.96 * 2.0 * t.sqrt() / excess;
+    let share = (t / excess).clamp(0.0, 1.0);
+    let interval = [(share - reach).max(0.0), (share + reach).min(1.0)];
+    Some(Where::new(item, share, interval, p_value))
+}
+
 /// The part of the gap in each channel.
-fn channels<M: FittedModel>(bench: &Bench<'_, M>, first: &Remainder, excess: f64) -> Vec<Where> {
+pub(super) fn channel_shares<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    first: &Remainder,
+    excess: f64,
+) -> Vec<Where> {
     let names = bench.model.channel_names();
     let count = names.len();
     if count < 2 {
@@ -74,7 +83,7 @@ fn channels<M: FittedModel>(bench: &Bench<'_, M>, first: &Remainder, excess: f64
             let p = (tail * count as f64).min(1.0);
             let share = ((sum - freedom) / excess).clamp(0.0, 1.0);
             let reach = 1.96 * (2.0 * freedom + 4.0 * (sum - freedom).max(0.0)).sqrt() / excess;
-            (p < PLACE_LEVEL).then(|| Where {
+            Some(Where {
                 axis: "channel",
                 value: name,
                 from: None,

@@ -9,7 +9,8 @@ use super::hidden::hidden;
 use super::noise::{NoiseSource, neighbour_scatter};
 use super::places::places;
 use super::quantify::{GapMeter, biases, shrink};
-use super::statement::statement;
+use super::shape::fingerprint;
+use super::statement::{separating, statement};
 use super::verdict::{Detail, Diagnosis, Gap, Kind, NoiseOut, Verdict};
 use super::{Examined, Options};
 use crate::report::number::plain;
@@ -98,10 +99,13 @@ pub(super) fn compose<M: FittedModel>(
         } else {
             Vec::new()
         },
+        separate: Vec::new(),
+        shape: (kind == Kind::Unknown).then(|| fingerprint(bench, readings, first, excess)),
         statement: String::new(),
         p_value: detected,
         adequacy: found.as_ref().map_or(first.global, |a| a.adequacy),
     };
+    verdict.separate = separating(&verdict.indistinguishable, &candidates);
     let hidden = hidden(bench, &verdict.effects, options);
     verdict.statement = statement(&verdict, &gap, &places, &candidates, &hidden);
     let (bias, profiles) = biases(bench.model, &bench.law, readings, &change);

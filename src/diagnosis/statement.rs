@@ -1,6 +1,6 @@
 //! The verdict in a sentence that a person can act on.
 
-use super::verdict::{Candidate, Gap, Hidden, Kind, Verdict, Where};
+use super::verdict::{Candidate, Fingerprint, Gap, Hidden, Kind, Verdict, Where};
 use crate::report::number::{measured, plain};
 
 /// The sentence.
@@ -11,7 +11,7 @@ pub(super) fn statement(
     candidates: &[Candidate],
     hidden: &[Hidden],
 ) -> String {
-    let unit = gap.unit;
+    let unit = for_people(gap.unit);
     let undetectable: Vec<&str> = hidden
         .iter()
         .filter(|h| h.detectable.is_none())
@@ -39,10 +39,21 @@ pub(super) fn statement(
                 plain(gap.noise, 3)
             )
         }
-        Kind::Unknown => format!(
-            "The model misses {} {unit} RMS{place}, and no effect of the catalogue explains it.",
-            plain(gap.before.rms, 3)
-        ),
+        Kind::Unknown => {
+            let partial = match verdict.partial[..] {
+                [] => String::new(),
+                ref some => format!(
+                    "; {} would leave {} {unit} of it",
+                    some.join(" and "),
+                    plain(gap.after.rms, 3)
+                ),
+            };
+            format!(
+                "The model misses {} {unit} RMS{place}, and no effect of the catalogue explains it{partial}.{}",
+                plain(gap.before.rms, 3),
+                verdict.shape.as_ref().map_or(String::new(), described)
+            )
+        }
         Kind::Effect => {
             let named: Vec<String> = verdict
                 .effects
@@ -69,8 +80,9 @@ pub(super) fn statement(
                     .map(|g| g.join(" or "))
                     .collect();
                 format!(
-                    "These readings cannot tell apart {}.",
-                    groups.join(", nor ")
+                    "These readings cannot tell apart {}. To tell them apart: {}.",
+                    groups.join(", nor "),
+                    verdict.separate.join("; ")
                 )
             };
             format!(
@@ -85,11 +97,83 @@ pub(super) fn statement(
 
 fn describe(candidate: &Candidate) -> String {
     let mut parts: Vec<String> = candidate.variant.iter().cloned().collect();
-    parts.extend(
-        candidate
-            .parameters
-            .iter()
-            .map(|p| format!("{} {} {}", p.name, measured(p.value, Some(p.std)), p.unit)),
-    );
+    parts.extend(candidate.parameters.iter().map(|p| {
+        let (scale, unit) = if p.unit == "rad" {
+            (1e6, "µrad")
+        } else {
+            (1.0, for_people(&p.unit))
+        };
+        let value = measured(scale * p.value, Some(scale * p.std));
+        format!("{} {value} {unit}", p.name)
+    }));
     format!(" ({})", parts.join(", "))
+}
+
+/// For each group the observation that would split it: that which confirms or refutes the effect
+/// named first.
+pub(super) fn separating(groups: &[Vec<String>], candidates: &[Candidate]) -> Vec<String> {
+    groups
+        .iter()
+        .filter_map(|group| {
+            let first = group.first()?;
+            let candidate = candidates.iter().find(|c| c.effect == *first)?;
+            Some(format!(
+                "{} (only {first} would show there)",
+                candidate.confirm
+            ))
+        })
+        .collect()
+}
+
+/// The fingerprint of an unknown gap in words.
+fn described(shape: &Fingerprint) -> String {
+    let mut parts = Vec::new();
+    if !shape.present.is_empty() && !shape.absent.is_empty() {
+        parts.push(format!(
+            "it is in {} and not in {}",
+            shape.present.join(", "),
+            shape.absent.join(", ")
+        ));
+    }
+    match shape.odd {
+        Some(odd) if odd > 0.8 => parts.push("it turns its sign with the direction".to_owned()),
+        Some(odd) if odd < 0.2 => parts.push("it is the same in both directions".to_owned()),
+        _ => {}
+    }
+    match shape.repeated {
+        Some(part) if part > 0.8 => parts.push("it comes back in every repeat".to_owned()),
+        Some(part) if part < 0.2 => parts.push("it changes from repeat to repeat".to_owned()),
+        _ => {}
+    }
+    if let Some(nearest) = &shape.nearest {
+        let against = nearest.against.as_ref().map_or(String::new(), |w| {
+            let range = match (w.from, w.to) {
+                (Some(from), Some(to)) => format!(" from {} to {}", plain(from, 4), plain(to, 4)),
+                _ => String::new(),
+            };
+            format!(
+                ", but beside it there remains something in {} {}{range}",
+                w.axis, w.value
+            )
+        });
+        parts.push(format!(
+            "it is most like {} (cosine {}){against}",
+            nearest.effect,
+            plain(nearest.cosine, 2)
+        ));
+    }
+    let text = parts.join("; ");
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| {
+        format!(" {}{}.", first.to_uppercase(), letters.as_str())
+    })
+}
+
+/// A unit as people write it.
+pub fn for_people(unit: &str) -> &str {
+    match unit {
+        "um" => "µm",
+        "1" => "",
+        unit => unit,
+    }
 }

@@ -1,19 +1,25 @@
-//! Effects of the user's own: a signature in a table.
+//! Effects of the user's own: a signature in a table or a formula.
 
 use std::collections::BTreeMap;
 
-use errsep_models::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use errsep_models::model::{About, Column, Effect, FittedModel, Parameter, Place, Shape};
 use serde::Deserialize;
 
-/// An effect given by its change of the readings over the positions, straight between them and
-/// zero outside, times a weight for each channel.
+use super::formula::{Circumstances, Formula};
+
+/// An effect given by its change of the readings, times a weight for each channel: over the
+/// positions, straight between them and zero outside, or by a formula.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tabulated {
     /// Name in the verdict.
     pub name: String,
     /// Pairs of position and change of the reading.
+    #[serde(default)]
     pub signature: Vec<[f64; 2]>,
+    /// The change of the reading in x, time, direction, repeat and channel.
+    #[serde(default)]
+    pub formula: Option<Formula>,
     /// Weight of each channel by its name; absent: 1 for all.
     #[serde(default)]
     pub channels: BTreeMap<String, f64>,
@@ -33,8 +39,22 @@ pub struct TabulatedEffects {
     pub effect: Vec<Tabulated>,
 }
 
+fn circumstances(place: &Place) -> Circumstances {
+    Circumstances {
+        x: place.x,
+        time: place.time,
+        direction: place.direction,
+        repeat: f64::from(place.repeat),
+        channel: place.channel as f64 + 1.0,
+    }
+}
+
 impl Tabulated {
-    fn at(&self, x: f64) -> f64 {
+    fn at(&self, place: &Place) -> f64 {
+        if let Some(formula) = &self.formula {
+            return formula.at(&circumstances(place));
+        }
+        let x = place.x;
         let right = self.signature.partition_point(|p| p[0] < x);
         match (
             right.checked_sub(1).and_then(|k| self.signature.get(k)),
@@ -46,9 +66,24 @@ impl Tabulated {
         }
     }
 
-    /// What is wrong with the table, if anything.
-    pub fn fault(&self, channels: &[String]) -> Option<String> {
-        if self.signature.len() < 2 || self.signature.windows(2).any(|w| w[1][0] <= w[0][0]) {
+    /// What is wrong with the effect for some readings, if anything.
+    pub fn fault(&self, channels: &[String], places: &[Place]) -> Option<String> {
+        if self.formula.is_some() != self.signature.is_empty() {
+            return Some(format!(
+                "`{}` needs either a signature or a formula",
+                self.name
+            ));
+        }
+        let undefined = |f: &Formula| places.iter().find(|p| !f.at(&circumstances(p)).is_finite());
+        if let Some(place) = self.formula.as_ref().and_then(undefined) {
+            return Some(format!(
+                "the formula of `{}` gives no finite number at position {}, time {}",
+                self.name, place.x, place.time
+            ));
+        }
+        if self.formula.is_none() && self.signature.len() < 2
+            || self.signature.windows(2).any(|w| w[1][0] <= w[0][0])
+        {
             return Some(format!(
                 "`{}` needs two or more growing positions",
                 self.name
@@ -74,7 +109,7 @@ impl<M: FittedModel> Effect<M> for Tabulated {
         About {
             physics: "an effect of the user's own",
             confirm: "repeat the measurement without its cause",
-            source: "a table of its signature",
+            source: "a table of its signature, or a formula",
         }
     }
 
@@ -103,7 +138,7 @@ impl<M: FittedModel> Effect<M> for Tabulated {
             } else {
                 1.0
             };
-            f64::from(u8::from(here)) * sign * weights[place.channel] * self.at(place.x)
+            f64::from(u8::from(here)) * sign * weights[place.channel] * self.at(place)
         })]
     }
 }

@@ -29,12 +29,46 @@ pub struct Verdict {
     pub indistinguishable: Vec<Vec<String>>,
     /// Effects that explain a part of an unknown gap.
     pub partial: Vec<String>,
+    /// For each group the observation that would split it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub separate: Vec<String>,
+    /// The shape of an unknown gap.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Fingerprint>,
     /// One sentence for a person.
     pub statement: String,
     /// Probability of as much standing out with nothing there.
     pub p_value: f64,
     /// Probability of what remains.
     pub adequacy: f64,
+}
+
+/// What an unknown gap looks like, beside its places.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fingerprint {
+    /// Channels in which it is.
+    pub present: Vec<String>,
+    /// Channels in which it is not.
+    pub absent: Vec<String>,
+    /// Part that turns its sign with the direction of travel, where both were run.
+    pub odd: Option<f64>,
+    /// Part that comes back in every repeat, where there are repeats.
+    pub repeated: Option<f64>,
+    /// The effect that is most like it.
+    pub nearest: Option<Nearest>,
+}
+
+/// The effect most like an unknown gap, and why it is not it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Nearest {
+    /// The effect.
+    pub effect: String,
+    /// Cosine of the angle between the gap and the effect's best signature.
+    pub cosine: f64,
+    /// Probability of what remains beside it.
+    pub p_value: f64,
+    /// Where most remains beside it.
+    pub against: Option<Where>,
 }
 
 /// A root mean square with its 95 % interval.

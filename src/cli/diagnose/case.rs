@@ -116,12 +116,12 @@ fn catalogue<M: FittedModel>(args: &Args, model: &M) -> Result<Vec<Box<dyn Effec
         let fault = if known {
             Some(format!("`{}` is in the catalogue already", effect.name))
         } else {
-            effect.fault(&channels)
+            effect.fault(&channels, model.places())
         };
         if let Some(what) = fault {
-            return Err(Message::bad_input(what)
-                .in_file(path)
-                .remedy("give every effect a new name, growing positions and known channels"));
+            return Err(Message::bad_input(what).in_file(path).remedy(
+                "give every effect a new name, growing positions or a formula, and known channels",
+            ));
         }
         catalogue.push(Box::new(effect));
     }
@@ -136,9 +136,16 @@ fn residuals<M: FittedModel>(model: &M, diagnosis: &Diagnosis) -> CsvTable {
         "" | "1" => String::new(),
         unit => format!("_{}", unit.replace('/', "_per_").replace(' ', "_")),
     };
+    let channels = model.channel_names();
     let (x, reading) = (suffix(model.position_unit()), suffix(model.reading_unit()));
     CsvTable::new("residuals.csv")
-        .numbers("channel", numbers(|p| p.channel as f64 + 1.0))
+        .texts(
+            "channel",
+            places
+                .iter()
+                .map(|p| channels.get(p.channel).cloned().unwrap_or_default())
+                .collect::<Vec<_>>(),
+        )
         .numbers("repeat", numbers(|p| f64::from(p.repeat)))
         .numbers("direction", numbers(|p| p.direction))
         .numbers(format!("x{x}"), numbers(|p| p.x))

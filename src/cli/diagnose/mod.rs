@@ -35,7 +35,11 @@ A file for --effects has one table an effect:
     signature = [[0.0, 0.0], [100.0, 1.0], [300.0, 1.0]]   # mm, change of the reading
     channels = { 1A = 1.0, 1B = -1.0 }                     # absent: 1 for all
     turns_with_direction = false
-    repeats = [2]                                          # absent: all")]
+    repeats = [2]                                          # absent: all
+
+    [[effect]]
+    name = \"warm-up\"
+    formula = \"1 - exp(-time / 600)\"   # of x, time, direction, repeat, channel")]
 pub struct Args {
     /// The readings.
     #[arg(value_name = "DATA.csv")]
@@ -55,7 +59,7 @@ pub struct Args {
     /// Leave an effect out of the catalogue; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
-    /// Add the effects of this file (tables of signatures) to the catalogue.
+    /// Add the effects of this file (tables of signatures, formulas) to the catalogue.
     #[arg(long, value_name = "EFFECTS.toml")]
     effects: Option<PathBuf>,
     /// Probability of naming anything where nothing is there.

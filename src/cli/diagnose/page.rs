@@ -46,7 +46,7 @@ pub(super) fn view<M: FittedModel>(
             .zip(diagnosis.detail.before.iter().zip(&diagnosis.detail.after))
             .map(|(p, (before, after))| sheet::Residual {
                 panel: channels.get(p.channel).cloned().unwrap_or_default(),
-                row: rows.name(p),
+                row: model.trace_name(p).unwrap_or_else(|| rows.name(p)),
                 x: p.x,
                 before: *before,
                 after: *after,
@@ -147,15 +147,10 @@ fn groups(diagnosis: &Diagnosis) -> Vec<sheet::Group> {
         .verdict
         .indistinguishable
         .iter()
-        .map(|names| sheet::Group {
+        .zip(&diagnosis.verdict.separate)
+        .map(|(names, separate)| sheet::Group {
             effects: names.clone(),
-            separate: diagnosis
-                .candidates
-                .iter()
-                .filter(|c| names.contains(&c.effect))
-                .map(|c| c.confirm.clone())
-                .collect::<Vec<_>>()
-                .join("; or "),
+            separate: separate.clone(),
         })
         .collect()
 }

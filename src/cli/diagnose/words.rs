@@ -2,15 +2,15 @@
 
 use std::fmt::Write;
 
-use crate::diagnosis::{Diagnosis, Kind, Trials};
+use crate::diagnosis::{Diagnosis, Kind, Trials, for_people};
 use crate::report::number::{measured, plain, probability};
 
 /// µrad for people; other units as they are.
 pub(super) fn shown(value: f64, unit: &str) -> (f64, &str) {
     if unit == "rad" {
-        (value * 1e6, "urad")
+        (value * 1e6, "µrad")
     } else {
-        (value, unit)
+        (value, for_people(unit))
     }
 }
 
@@ -19,8 +19,8 @@ pub(super) fn in_words(diagnosis: &Diagnosis) -> String {
     let mut text = format!("{}\n\n", diagnosis.verdict.statement);
     let _ = writeln!(
         text,
-        "Gap, {} RMS          {} [{}, {}] -> {} [{}, {}]   noise of one reading {}",
-        gap.unit,
+        "Gap, {} RMS           {} [{}, {}] -> {} [{}, {}]   noise of one reading {}",
+        for_people(gap.unit),
         number(gap.before.rms),
         number(gap.before.ci95[0]),
         number(gap.before.ci95[1]),
@@ -97,7 +97,7 @@ pub(super) fn in_words(diagnosis: &Diagnosis) -> String {
             let (moved, _) = shown(bias.moved, &bias.unit);
             let _ = writeln!(
                 text,
-                "  {:<12} {:>14} {:>14} {unit}   moved {} +/- {}",
+                "  {:<12} {:>14} {:>14} {unit}   moved {} ± {}",
                 bias.quantity,
                 number(before),
                 number(after),

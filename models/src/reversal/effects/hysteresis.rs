@@ -139,8 +139,10 @@ impl Effect<FirstOrder> for Hysteresis {
                 let weights = [moves(0), moves(1)];
                 let stylus = (weights[0] * clean[0][k] + weights[1] * clean[1][k])
                     / (weights[0] + weights[1]);
-                for direction in [1.0, -1.0] {
-                    traces(direction).for_each(|t| restored[t.start + k] = stylus);
+                // What tells the repeats apart stays: the smoothing learns the noise from it.
+                let moved = [stylus - clean[0][k], stylus - clean[1][k]];
+                for (direction, moved) in [1.0, -1.0].into_iter().zip(moved) {
+                    traces(direction).for_each(|t| restored[t.start + k] += moved);
                 }
             }
         }

@@ -5,16 +5,19 @@
 //! closure profile (pattern + + − − over 1A 1B 2A 2B, less its line), the fourth slope contrast,
 //! and everything that differs between repeats or directions of one channel.
 
+mod fitted;
+mod sorting;
+
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use thiserror::Error;
 
-use super::effects;
 use super::smooth_profile::{SmoothProfile, Smoother};
-use super::{Channel, Convention, Direction, Observations};
-use crate::model::{Effect, FittedModel, Freedom, Pattern, Place, Profile, Profiles, Quantity};
+use super::{Channel, Convention, Observations};
+use crate::model::{FittedModel, Place};
+use sorting::Sorted;
 
 /// What the set-up says of the measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -83,9 +86,6 @@ pub struct FirstOrder {
     pub left_out: usize,
 }
 
-/// Seconds between readings where the file has no times.
-const ASSUMED_INTERVAL: f64 = 1.0;
-
 impl FirstOrder {
     /// Sorts readings into traces and fits the model.
     ///
@@ -144,8 +144,12 @@ impl FirstOrder {
         .refit(DVector::from_vec(sorted.values)))
     }
 
-    /// Mean profile of every channel over its traces, where it has any.
-    fn channel_means(&self, values: &DVector<f64>) -> [Option<DVector<f64>>; 4] {
+    /// Mean profile of every channel over its traces, or those of one repeat, where it has any.
+    fn channel_means(
+        &self,
+        values: &DVector<f64>,
+        repeat: Option<u32>,
+    ) -> [Option<DVector<f64>>; 4] {
         let n = self.positions.len();
         let mut sums = [const { None }; 4];
         for channel in &self.present {
@@ -156,17 +160,18 @@ impl FirstOrder {
                 .iter()
                 .zip(&self.trace_channels)
                 .filter(|(_, c)| *c == channel)
+                .filter(|(t, _)| repeat.is_none_or(|r| self.places[t.start].repeat == r))
             {
                 sum += values.rows(trace.start, n);
                 count += 1.0;
             }
-            sums[channel.index()] = Some(sum / count);
+            sums[channel.index()] = (count > 0.0).then(|| sum / count);
         }
         sums
     }
 
     fn fit(&mut self) {
-        let means = self.channel_means(&self.observed);
+        let means = self.channel_means(&self.observed, None);
         let n = self.positions.len();
         let mean_x = self.positions.iter().sum::<f64>() / n as f64;
         let sxx: f64 = self.positions.iter().map(|x| (x - mean_x).powi(2)).sum();
@@ -191,9 +196,16 @@ impl FirstOrder {
             ));
         }
         let raw = forms(&residual, n);
-        self.m = self.smoother.smooth(&raw[0]);
-        self.s_a = self.smoother.smooth(&raw[1]);
-        self.s_b = self.smoother.smooth(&raw[2]);
+        let singles: Vec<[DVector<f64>; 3]> = self
+            .repeats
+            .iter()
+            .map(|repeat| forms(&self.channel_means(&self.observed, Some(*repeat)), n))
+            .collect();
+        let smooth = |k: usize| {
+            let own: Vec<&DVector<f64>> = singles.iter().map(|forms| &forms[k]).collect();
+            self.smoother.smooth_repeated(&raw[k], &own)
+        };
+        (self.m, self.s_a, self.s_b) = (smooth(0), smooth(1), smooth(2));
         self.span = self.find_span();
         self.reach = self
             .places
@@ -338,276 +350,4 @@ fn forms(residual: &[Option<DVector<f64>>; 4], n: usize) -> [DVector<f64>; 3] {
         _ => DVector::zeros(n),
     };
     [m, s_a, s_b]
-}
-
-/// Channel, repeat, and whether it runs backward.
-type TraceKey = (Channel, u32, bool);
-
-/// Readings in traces.
-struct Sorted {
-    values: Vec<f64>,
-    places: Vec<Place>,
-    traces: Vec<Range<usize>>,
-    trace_channels: Vec<Channel>,
-    positions: Vec<f64>,
-    timed: bool,
-    left_out: usize,
-}
-
-/// Position (mm), value (µm) and time (s) of a reading.
-type Sample = (f64, f64, Option<f64>);
-
-impl Sorted {
-    fn new(observations: &Observations) -> Result<Self, NotDiagnosable> {
-        use std::collections::BTreeMap;
-        let mut traces: BTreeMap<TraceKey, BTreeMap<i64, Sample>> = BTreeMap::new();
-        let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
-        for reading in &observations.readings {
-            let key = (
-                reading.channel,
-                reading.repeat,
-                reading.direction == Direction::Backward,
-            );
-            let place = position_key(reading.x);
-            let trace = traces.entry(key).or_default();
-            if trace
-                .insert(place, (reading.x, reading.value, reading.time))
-                .is_none()
-            {
-                *counts.entry(place).or_default() += 1;
-            }
-        }
-        let shared: Vec<i64> = counts
-            .iter()
-            .filter(|(_, count)| **count == traces.len())
-            .map(|(place, _)| *place)
-            .collect();
-        if shared.len() < 5 {
-            return Err(NotDiagnosable::PositionsDiffer {
-                shared: shared.len(),
-                all: counts.len(),
-            });
-        }
-        let n = shared.len();
-        let timed = observations.readings.iter().all(|r| r.time.is_some());
-        let order = assumed_order(traces.keys());
-        let present: Vec<Channel> = observations.channels();
-        let mut sorted = Self {
-            values: Vec::new(),
-            places: Vec::new(),
-            traces: Vec::new(),
-            trace_channels: Vec::new(),
-            positions: Vec::new(),
-            timed,
-            left_out: 0,
-        };
-        for (key, trace) in &traces {
-            let (channel, repeat, backward) = *key;
-            let channel_index = present.iter().position(|c| *c == channel).unwrap_or(0);
-            let start = sorted.values.len();
-            for (k, place) in shared.iter().enumerate() {
-                let Some(&(x, value, time)) = trace.get(place) else {
-                    continue;
-                };
-                let step = if backward { n - 1 - k } else { k };
-                let assumed = (order[key] * n + step) as f64 * ASSUMED_INTERVAL;
-                sorted.values.push(value);
-                sorted.places.push(Place {
-                    channel: channel_index,
-                    x,
-                    time: if timed {
-                        time.unwrap_or(assumed)
-                    } else {
-                        assumed
-                    },
-                    repeat,
-                    direction: if backward { -1.0 } else { 1.0 },
-                    cell: channel_index * n + k,
-                });
-                if sorted.traces.is_empty() {
-                    sorted.positions.push(x);
-                }
-            }
-            sorted.traces.push(start..sorted.values.len());
-            sorted.trace_channels.push(channel);
-        }
-        sorted.left_out = observations.readings.len() - sorted.values.len();
-        Ok(sorted)
-    }
-}
-
-/// Positions closer than 0.1 µm are the same.
-fn position_key(x: f64) -> i64 {
-    (x * 1e4).round() as i64
-}
-
-/// The order in which traces are taken where no times are given: first all repeats in the first
-/// spindle position, then in the second, each forward and then backward, both indicators at once.
-fn assumed_order<'a>(
-    keys: impl Iterator<Item = &'a TraceKey> + Clone,
-) -> std::collections::BTreeMap<TraceKey, usize> {
-    let pass = |key: &TraceKey| (key.0.spindle_sign() < 0.0, key.1, key.2);
-    let mut passes: Vec<_> = keys.clone().map(pass).collect();
-    passes.sort_unstable();
-    passes.dedup();
-    keys.map(|key| (*key, passes.partition_point(|p| *p < pass(key))))
-        .collect()
-}
-
-impl FittedModel for FirstOrder {
-    fn name(&self) -> &'static str {
-        "reversal"
-    }
-
-    fn reading_unit(&self) -> &'static str {
-        "um"
-    }
-
-    fn places(&self) -> &[Place] {
-        &self.places
-    }
-
-    fn traces(&self) -> &[Range<usize>] {
-        &self.traces
-    }
-
-    fn observed(&self) -> &DVector<f64> {
-        &self.observed
-    }
-
-    fn freedom(&self) -> Freedom {
-        let traces = self.traces.len();
-        let n = self.positions.len();
-        let mean_x = self.positions.iter().sum::<f64>() / n as f64;
-        let mut patterns = DMatrix::zeros(traces, 3);
-        for (t, channel) in self.trace_channels.iter().enumerate() {
-            patterns[(t, 0)] = channel.indicator_sign();
-            patterns[(t, 1)] = channel.side_sign();
-            patterns[(t, 2)] = 1.0;
-        }
-        let line = DVector::from_iterator(n, self.positions.iter().map(|x| x - mean_x));
-        let offsets = self.present.len();
-        let mut columns = DMatrix::zeros(self.places.len(), offsets + usize::from(!self.rigid()));
-        for (k, place) in self.places.iter().enumerate() {
-            columns[(k, place.channel)] = 1.0;
-            if !self.rigid() {
-                columns[(k, offsets)] = self.channel(place).spindle_sign() * (place.x - mean_x);
-            }
-        }
-        // M's line is α and the line of S_A − S_B is γ, so those two functions may hold one; that
-        // of S_A + S_B is the cone, which only the rigid convention has.
-        let withheld = if self.rigid() {
-            Vec::new()
-        } else {
-            vec![(2, line)]
-        };
-        Freedom {
-            columns,
-            profiles: Some(Profiles { patterns, withheld }),
-        }
-    }
-
-    fn linearised(&self) -> DVector<f64> {
-        let half = self.assumptions.thickness.map_or(0.0, |d| d / 2.0);
-        DVector::from_iterator(
-            self.places.len(),
-            self.places
-                .iter()
-                .zip(self.observed.iter())
-                .map(|(place, value)| {
-                    let slope = self.tilt(self.channel(place));
-                    // A channel tilted by ψ climbs tan ψ per length, and its probe point lies h·ψ
-                    // further along the artefact.
-                    let climb = (slope - slope.atan()) * 1e3 * place.x;
-                    value - climb - self.side_slope(place) * half * slope
-                }),
-        )
-    }
-
-    fn channel_names(&self) -> Vec<String> {
-        self.present.iter().map(|c| c.name().to_owned()).collect()
-    }
-
-    fn patterns(&self) -> Vec<Pattern> {
-        let pattern = |name: &str, weight: fn(Channel) -> f64| Pattern {
-            name: name.to_owned(),
-            weights: self.present.iter().map(|c| weight(*c)).collect(),
-        };
-        vec![
-            pattern("closure", Channel::spindle_sign),
-            pattern("M", Channel::indicator_sign),
-            pattern("S_A - S_B", Channel::side_sign),
-            pattern("S_A + S_B", |_| 1.0),
-        ]
-    }
-
-    fn quantities(&self) -> Vec<Quantity> {
-        if self.present.len() < 4 {
-            return Vec::new();
-        }
-        let n = self.positions.len();
-        let mean_x = self.positions.iter().sum::<f64>() / n as f64;
-        let sxx: f64 = self.positions.iter().map(|x| (x - mean_x).powi(2)).sum();
-        let contrast = |name: &str, sign: fn(Channel) -> f64| Quantity {
-            name: name.to_owned(),
-            unit: "rad",
-            weights: DVector::from_iterator(
-                self.places.len(),
-                self.places.iter().map(|place| {
-                    let channel = self.channel(place);
-                    let traces = self
-                        .trace_channels
-                        .iter()
-                        .filter(|c| **c == channel)
-                        .count() as f64;
-                    // µm per mm is 10⁻³ rad.
-                    1e-3 * sign(channel) * (place.x - mean_x) / (4.0 * sxx * traces)
-                }),
-            ),
-        };
-        if self.rigid() {
-            vec![
-                contrast("alpha", Channel::indicator_sign),
-                contrast("setup", Channel::side_sign),
-                contrast("cone", |_| 1.0),
-            ]
-        } else {
-            vec![
-                contrast("alpha", Channel::indicator_sign),
-                contrast("beta", Channel::spindle_sign),
-                contrast("gamma", Channel::side_sign),
-            ]
-        }
-    }
-
-    fn profiles(&self) -> Vec<Profile> {
-        let per_channel = self.traces.len() as f64 / self.present.len() as f64;
-        let profile = |name: &str, form: &SmoothProfile, gain: f64| Profile {
-            name: name.to_owned(),
-            unit: "um",
-            positions: self.positions.clone(),
-            values: form.values.clone(),
-            noise_gain: gain / per_channel.sqrt(),
-        };
-        vec![
-            profile("M", &self.m, 0.5),
-            profile("S_A", &self.s_a, 0.5f64.sqrt()),
-            profile("S_B", &self.s_b, 0.5f64.sqrt()),
-        ]
-    }
-
-    fn stated_noise(&self) -> Option<f64> {
-        self.assumptions.noise
-    }
-
-    fn refit(&self, observed: DVector<f64>) -> Self {
-        let mut fitted = self.clone();
-        fitted.observed = observed;
-        fitted.fit();
-        fitted
-    }
-
-    fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
-        effects::all()
-    }
 }

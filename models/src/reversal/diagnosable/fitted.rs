@@ -1,0 +1,168 @@
+//! What the diagnosis asks of the fitted model.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::FirstOrder;
+use crate::model::{Effect, FittedModel, Freedom, Pattern, Place, Profile, Profiles, Quantity};
+use crate::reversal::smooth_profile::SmoothProfile;
+use crate::reversal::{Channel, effects};
+
+impl FittedModel for FirstOrder {
+    fn name(&self) -> &'static str {
+        "reversal"
+    }
+
+    fn reading_unit(&self) -> &'static str {
+        "um"
+    }
+
+    fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    fn traces(&self) -> &[Range<usize>] {
+        &self.traces
+    }
+
+    fn observed(&self) -> &DVector<f64> {
+        &self.observed
+    }
+
+    fn freedom(&self) -> Freedom {
+        let traces = self.traces.len();
+        let n = self.positions.len();
+        let mean_x = self.positions.iter().sum::<f64>() / n as f64;
+        let mut patterns = DMatrix::zeros(traces, 3);
+        for (t, channel) in self.trace_channels.iter().enumerate() {
+            patterns[(t, 0)] = channel.indicator_sign();
+            patterns[(t, 1)] = channel.side_sign();
+            patterns[(t, 2)] = 1.0;
+        }
+        let line = DVector::from_iterator(n, self.positions.iter().map(|x| x - mean_x));
+        let offsets = self.present.len();
+        let mut columns = DMatrix::zeros(self.places.len(), offsets + usize::from(!self.rigid()));
+        for (k, place) in self.places.iter().enumerate() {
+            columns[(k, place.channel)] = 1.0;
+            if !self.rigid() {
+                columns[(k, offsets)] = self.channel(place).spindle_sign() * (place.x - mean_x);
+            }
+        }
+        // M's line is α and the line of S_A − S_B is γ, so those two functions may hold one; that
+        // of S_A + S_B is the cone, which only the rigid convention has.
+        let withheld = if self.rigid() {
+            Vec::new()
+        } else {
+            vec![(2, line)]
+        };
+        Freedom {
+            columns,
+            profiles: Some(Profiles { patterns, withheld }),
+        }
+    }
+
+    fn linearised(&self) -> DVector<f64> {
+        let half = self.assumptions.thickness.map_or(0.0, |d| d / 2.0);
+        DVector::from_iterator(
+            self.places.len(),
+            self.places
+                .iter()
+                .zip(self.observed.iter())
+                .map(|(place, value)| {
+                    let slope = self.tilt(self.channel(place));
+                    // A channel tilted by ψ climbs tan ψ per length, and its probe point lies h·ψ
+                    // further along the artefact.
+                    let climb = (slope - slope.atan()) * 1e3 * place.x;
+                    value - climb - self.side_slope(place) * half * slope
+                }),
+        )
+    }
+
+    fn channel_names(&self) -> Vec<String> {
+        self.present.iter().map(|c| c.name().to_owned()).collect()
+    }
+
+    fn patterns(&self) -> Vec<Pattern> {
+        let pattern = |name: &str, weight: fn(Channel) -> f64| Pattern {
+            name: name.to_owned(),
+            weights: self.present.iter().map(|c| weight(*c)).collect(),
+        };
+        vec![
+            pattern("closure", Channel::spindle_sign),
+            pattern("M", Channel::indicator_sign),
+            pattern("S_A - S_B", Channel::side_sign),
+            pattern("S_A + S_B", |_| 1.0),
+        ]
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        if self.present.len() < 4 {
+            return Vec::new();
+        }
+        let n = self.positions.len();
+        let mean_x = self.positions.iter().sum::<f64>() / n as f64;
+        let sxx: f64 = self.positions.iter().map(|x| (x - mean_x).powi(2)).sum();
+        let contrast = |name: &str, sign: fn(Channel) -> f64| Quantity {
+            name: name.to_owned(),
+            unit: "rad",
+            weights: DVector::from_iterator(
+                self.places.len(),
+                self.places.iter().map(|place| {
+                    let channel = self.channel(place);
+                    let traces = self
+                        .trace_channels
+                        .iter()
+                        .filter(|c| **c == channel)
+                        .count() as f64;
+                    // µm per mm is 10⁻³ rad.
+                    1e-3 * sign(channel) * (place.x - mean_x) / (4.0 * sxx * traces)
+                }),
+            ),
+        };
+        if self.rigid() {
+            vec![
+                contrast("alpha", Channel::indicator_sign),
+                contrast("setup", Channel::side_sign),
+                contrast("cone", |_| 1.0),
+            ]
+        } else {
+            vec![
+                contrast("alpha", Channel::indicator_sign),
+                contrast("beta", Channel::spindle_sign),
+                contrast("gamma", Channel::side_sign),
+            ]
+        }
+    }
+
+    fn profiles(&self) -> Vec<Profile> {
+        let per_channel = self.traces.len() as f64 / self.present.len() as f64;
+        let profile = |name: &str, form: &SmoothProfile, gain: f64| Profile {
+            name: name.to_owned(),
+            unit: "um",
+            positions: self.positions.clone(),
+            values: form.values.clone(),
+            noise_gain: gain / per_channel.sqrt(),
+        };
+        vec![
+            profile("M", &self.m, 0.5),
+            profile("S_A", &self.s_a, 0.5f64.sqrt()),
+            profile("S_B", &self.s_b, 0.5f64.sqrt()),
+        ]
+    }
+
+    fn stated_noise(&self) -> Option<f64> {
+        self.assumptions.noise
+    }
+
+    fn refit(&self, observed: DVector<f64>) -> Self {
+        let mut fitted = self.clone();
+        fitted.observed = observed;
+        fitted.fit();
+        fitted
+    }
+
+    fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
+        effects::all()
+    }
+}

@@ -320,6 +320,12 @@ pub trait FittedModel: Sized + Send + Sync {
     /// Names of the channels.
     fn channel_names(&self) -> Vec<String>;
 
+    /// What tells the trace of a place from the others of its channel, where that is not its repeat
+    /// and its direction.
+    fn trace_name(&self, _place: &Place) -> Option<String> {
+        None
+    }
+
     /// Combinations of the channels to look at beside the channels themselves.
     fn patterns(&self) -> Vec<Pattern> {
         Vec::new()
@@ -333,6 +339,17 @@ pub trait FittedModel: Sized + Send + Sync {
     /// The profiles people act on.
     fn profiles(&self) -> Vec<Profile> {
         Vec::new()
+    }
+
+    /// Whether noise may be correlated along a trace and shift whole traces. Where it may not, what
+    /// shifts a trace is gap.
+    fn correlated_noise(&self) -> bool {
+        true
+    }
+
+    /// Whether a single wrong reading is an effect of the catalogue, and not to be calmed as noise.
+    fn names_single_readings(&self) -> bool {
+        false
     }
 
     /// Standard deviation of one reading where the user states it.

@@ -9,7 +9,7 @@ use super::verdict::{Harm, Hidden};
 
 /// Effects of which less than this part is visible are called undetectable; so are those that would
 /// show only at a size that is not plausible.
-const UNDETECTABLE: f64 = 1e-3;
+const UNDETECTABLE: f64 = 1e-4;
 /// Normal quantile of 80 % power.
 const POWER: f64 = 0.8416;
 

@@ -225,6 +225,10 @@ impl<'a, M: FittedModel> Scan<'a, M> {
 
     fn trace_name(&self, place: &Place) -> String {
         let channels = self.model.channel_names();
+        if let Some(name) = self.model.trace_name(place) {
+            let channel = channels.get(place.channel).map_or("", String::as_str);
+            return format!("{channel}, {name}");
+        }
         let direction = match (self.both_directions, place.direction < 0.0) {
             (false, _) => "",
             (true, true) => " backward",

@@ -84,7 +84,11 @@ pub fn diagnose_with<M: FittedModel>(
         .filter(|effect| !options.without.iter().any(|name| name == effect.name()))
         .collect();
     let readings = model.linearised();
-    let (calm, spikes) = spikes::pulled_in(model, &readings);
+    let (calm, spikes) = if model.names_single_readings() {
+        (readings.clone(), 0)
+    } else {
+        spikes::pulled_in(model, &readings)
+    };
     let calmed;
     let (model, readings) = if spikes == 0 {
         (model, readings)

@@ -81,7 +81,11 @@ impl NoiseLaw {
         let contrasts = Contrasts::new(model.places(), model.traces(), readings);
         let count: usize = contrasts.traces.iter().map(DVector::len).sum();
         if count >= 8 {
-            return contrasts.likeliest();
+            return if model.correlated_noise() {
+                contrasts.likeliest()
+            } else {
+                contrasts.white()
+            };
         }
         match model.stated_noise() {
             Some(sigma) => Self::white(sigma, f64::INFINITY, NoiseSource::Stated),
@@ -196,6 +200,22 @@ impl Contrasts {
             }
         }
         contrasts
+    }
+
+    /// White noise from the scatter of each contrast about its own mean, free of shifts.
+    fn white(&self) -> NoiseLaw {
+        let scatter: f64 = self
+            .traces
+            .iter()
+            .map(|t| t.add_scalar(-t.mean()).norm_squared())
+            .sum();
+        let freedom: f64 = self.traces.iter().map(|t| t.len() as f64 - 1.0).sum();
+        let sigma = (scatter / freedom.max(1.0)).sqrt();
+        NoiseLaw::white(
+            sigma.max(f64::MIN_POSITIVE.sqrt()),
+            freedom.max(1.0),
+            NoiseSource::Repeats,
+        )
     }
 
     fn likeliest(&self) -> NoiseLaw {

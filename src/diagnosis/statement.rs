@@ -39,11 +39,21 @@ pub(super) fn statement(
                 plain(gap.noise, 3)
             )
         }
-        Kind::Unknown => format!(
-            "The model misses {} {unit} RMS{place}, and no effect of the catalogue explains it.{}",
-            plain(gap.before.rms, 3),
-            verdict.shape.as_ref().map_or(String::new(), described)
-        ),
+        Kind::Unknown => {
+            let partial = match verdict.partial[..] {
+                [] => String::new(),
+                ref some => format!(
+                    "; {} would leave {} {unit} of it",
+                    some.join(" and "),
+                    plain(gap.after.rms, 3)
+                ),
+            };
+            format!(
+                "The model misses {} {unit} RMS{place}, and no effect of the catalogue explains it{partial}.{}",
+                plain(gap.before.rms, 3),
+                verdict.shape.as_ref().map_or(String::new(), described)
+            )
+        }
         Kind::Effect => {
             let named: Vec<String> = verdict
                 .effects

@@ -210,6 +210,11 @@ impl FittedModel for CalibrationLine {
         ]
     }
 
+    fn correlated_noise(&self) -> bool {
+        // Every load is set anew, and an offset of a set is an effect of the catalogue.
+        false
+    }
+
     fn stated_noise(&self) -> Option<f64> {
         self.noise
     }

@@ -40,12 +40,18 @@ impl CirclePoints {
         let all: Vec<Point> = points.iter().map(|p| p.0).collect();
         let first = orthogonal_fit(&all, noise)?;
         let fixed = first.circle;
-        let degrees = |p: Point| {
-            let angle = (p.y - fixed.centre.y)
+        let raw = |p: Point| {
+            (p.y - fixed.centre.y)
                 .atan2(p.x - fixed.centre.x)
-                .to_degrees();
-            if angle < 0.0 { angle + 360.0 } else { angle }
+                .to_degrees()
         };
+        let seam = seam(
+            points
+                .iter()
+                .filter(|p| p.1 == points[0].1)
+                .map(|p| raw(p.0)),
+        );
+        let degrees = |p: Point| seam + (raw(p) - seam).rem_euclid(360.0);
         let mut sorted: Vec<(u32, f64, Point)> = points
             .iter()
             .map(|&(p, repeat)| (repeat, degrees(p), p))
@@ -129,6 +135,25 @@ impl CirclePoints {
     }
 }
 
+/// Where a pass is cut open, degrees: the middle of the widest gap between its points, so that noise
+/// moves none of them to the other end.
+fn seam(angles: impl Iterator<Item = f64>) -> f64 {
+    let mut angles: Vec<f64> = angles.map(|a| a.rem_euclid(360.0)).collect();
+    angles.sort_by(f64::total_cmp);
+    let (Some(first), Some(last)) = (angles.first(), angles.last()) else {
+        return 0.0;
+    };
+    let (mut widest, mut middle) = (first + 360.0 - last, 0.5 * (first + last) - 180.0);
+    for pair in angles.windows(2) {
+        // A hair wider: even gaps stay cut at their first point.
+        if pair[1] - pair[0] > widest + 1e-3 * widest.abs() {
+            widest = pair[1] - pair[0];
+            middle = 0.5 * (pair[0] + pair[1]);
+        }
+    }
+    middle
+}
+
 impl FittedModel for CirclePoints {
     fn name(&self) -> &'static str {
         "circle"
@@ -189,6 +214,10 @@ impl FittedModel for CirclePoints {
                 weights: &self.jacobian * inverse.row(k).transpose(),
             })
             .collect()
+    }
+
+    fn names_single_readings(&self) -> bool {
+        true
     }
 
     fn stated_noise(&self) -> Option<f64> {

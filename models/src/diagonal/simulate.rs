@@ -102,7 +102,7 @@ impl Disturbance {
         ["angular-error", "dead-path", "drift", "mirror-misalignment"];
 
     /// A disturbance by the name of its effect and its size, µm or rad; what these leave open is
-    /// usual: the rotation of Y about X, a time constant of a tenth of the duration, the last of
+    /// usual: the rotation of Z about itself, a time constant of a tenth of the duration, the last of
     /// the diagonals and sequences.
     pub fn named(name: &str, size: f64, what: &DiagonalSimulation) -> Option<Self> {
         Some(match name {
@@ -112,7 +112,7 @@ impl Disturbance {
                 angle: size,
             },
             "angular-error" => Self::AngularError {
-                component: Component::from_name("EAY")?,
+                component: Component::from_name("ECZ")?,
                 angle: size,
             },
             "dead-path" => Self::DeadPath(size),

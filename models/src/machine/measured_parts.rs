@@ -140,6 +140,12 @@ impl FittedModel for MeasuredParts {
             .collect()
     }
 
+    fn trace_name(&self, place: &Place) -> Option<String> {
+        // Parts follow one another in time; padded, so that names sort as numbers do.
+        let part = self.parts.get(place.time as usize)?;
+        Some(format!("part {part:>3}"))
+    }
+
     fn quantities(&self) -> Vec<Quantity> {
         [Axis::X, Axis::Y]
             .into_iter()

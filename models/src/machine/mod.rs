@@ -32,7 +32,10 @@ pub use monte_carlo::{Sampler, sample_features};
 pub use parts::{PartReading, PartResidual, part_residuals};
 pub use propagation::{Functional, Independence, Prediction, Weight, propagate};
 pub use regression::{LineSummary, Observation, RegressionError, fit_component};
-pub use simulate::{Characterization, simulate_characterization, simulate_parts};
+pub use simulate::{
+    Characterization, PartDisturbance, simulate_characterization, simulate_parts,
+    simulate_parts_disturbed,
+};
 
 use crate::uncertainty::UncertaintyError;
 

@@ -120,11 +120,12 @@ impl Smoother {
                 .sum()
         };
         let top = self.roughness.max();
-        let (_, weight) = weights(top)
-            .map(|weight| (missed(weight), weight))
-            .fold((f64::INFINITY, 0.0), |best, next| {
+        let (_, weight) = weights(top).map(|weight| (missed(weight), weight)).fold(
+            (f64::INFINITY, 0.0),
+            |best, next| {
                 if next.0 < best.0 { next } else { best }
-            });
+            },
+        );
         let coefficients = self.basis.tr_mul(mean);
         let kept = coefficients.zip_map(&self.roughness, |c, d| c / (1.0 + weight * d));
         self.through(&*self.basis * kept)

@@ -46,7 +46,7 @@ pub(super) fn view<M: FittedModel>(
             .zip(diagnosis.detail.before.iter().zip(&diagnosis.detail.after))
             .map(|(p, (before, after))| sheet::Residual {
                 panel: channels.get(p.channel).cloned().unwrap_or_default(),
-                row: rows.name(p),
+                row: model.trace_name(p).unwrap_or_else(|| rows.name(p)),
                 x: p.x,
                 before: *before,
                 after: *after,

@@ -1,6 +1,6 @@
 //! `errsep simulate circle`.
 
-use errsep_models::circle::{CircleSimulation, Point, simulate};
+use errsep_models::circle::{CircleSimulation, Disturbance, Point, simulate_disturbed};
 use serde_json::json;
 
 use crate::cli::{Answer, CommonArgs};
@@ -42,6 +42,10 @@ pub struct Args {
     /// A lobe of the form as undulations:amplitude in um, such as 3:2.5; may be given several times.
     #[arg(long, value_name = "N:UM", value_parser = parse_lobe)]
     lobe: Vec<(u32, f64)>,
+    /// Switch on an effect of the diagnosis's catalogue at a size, in its exact form; may be given
+    /// several times. Sizes are in um, those of scales are shares.
+    #[arg(long = "effect", value_name = "NAME=VALUE")]
+    effects: Vec<String>,
     #[command(flatten)]
     pub(in crate::cli) common: CommonArgs,
 }
@@ -67,7 +71,10 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         lobes: args.lobe.iter().map(|&(n, a)| (n, a, 0.0)).collect(),
     };
     let seed = args.common.seed;
-    let points = simulate(&what, seed).map_err(|e| {
+    let disturbances = super::effects(&args.effects, &Disturbance::NAMES, |name, size| {
+        Disturbance::named(name, size, args.points)
+    })?;
+    let points = simulate_disturbed(&what, &disturbances, seed).map_err(|e| {
         Message::bad_input(e.to_string()).remedy("change --radius, --points or --noise")
     })?;
     let table = CsvTable::new("points.csv")
@@ -80,6 +87,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             "centre": [args.centre_x, args.centre_y],
             "radius": args.radius,
             "noise": {"value": args.noise, "unit": "um"},
+            "effects": args.effects,
         }),
         seed,
     )

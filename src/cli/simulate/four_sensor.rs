@@ -60,6 +60,10 @@ pub struct Args {
         allow_hyphen_values = true
     )]
     gain: Vec<f64>,
+    /// Switch on an effect of the diagnosis's catalogue at a size, in its exact form; may be given
+    /// several times. Sizes are in um, mm (positions) or shares (gains).
+    #[arg(long = "effect", value_name = "NAME=VALUE")]
+    effects: Vec<String>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
@@ -86,6 +90,9 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     }
     disturbances.slide_position = args.slide_position;
     disturbances.drift = args.drift;
+    super::effects(&args.effects, &Disturbances::NAMES, |name, size| {
+        disturbances.add(name, size).then_some(())
+    })?;
     let outputs = simulate(&geometry, &truth, &disturbances, args.common.seed).map_err(refuse)?;
 
     let x = outputs.slide_positions();
@@ -112,6 +119,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             "straightness": {"x": x, "S": straightness, "unit": "um"},
             "tilt": {"x": x, "gamma": tilt, "unit": "rad"},
             "zero_adjustment": {"value": truth.zero_adjustment(), "unit": "um"},
+            "effects": args.effects,
         }),
         args.common.seed,
     )?;

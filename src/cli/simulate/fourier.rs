@@ -1,6 +1,8 @@
 //! `errsep simulate fourier`.
 
-use errsep_models::fourier::{FourierSimulation, Scan, ScanReading, simulate};
+use errsep_models::fourier::{
+    Disturbance, FourierSimulation, Scan, ScanReading, simulate_disturbed,
+};
 use serde_json::json;
 
 use crate::cli::{Answer, CommonArgs};
@@ -45,6 +47,10 @@ pub struct Args {
     /// Leave the third probe out.
     #[arg(long)]
     two_probes: bool,
+    /// Switch on an effect of the diagnosis's catalogue at a size, in its exact form; may be given
+    /// several times. Sizes are in um, mm (probe-spacing) or rad (yaw).
+    #[arg(long = "effect", value_name = "NAME=VALUE")]
+    effects: Vec<String>,
     #[command(flatten)]
     pub(in crate::cli) common: CommonArgs,
 }
@@ -71,7 +77,10 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         ..defaults
     };
     let seed = args.common.seed;
-    let (scans, truth) = simulate(&what, seed).map_err(|e| {
+    let disturbances = super::effects(&args.effects, &Disturbance::NAMES, |name, size| {
+        Disturbance::named(name, size, what.spacings.len())
+    })?;
+    let (scans, truth) = simulate_disturbed(&what, &disturbances, seed).map_err(|e| {
         Message::bad_input(e.to_string()).remedy("change --spacing, --length, --samples or --noise")
     })?;
     let column = |of: &dyn Fn(&Scan, &ScanReading) -> f64| -> Vec<f64> {
@@ -93,7 +102,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     super::answer(
         "fourier",
         table,
-        json!({"simulation": what, "profiles": truth}),
+        json!({"simulation": what, "profiles": truth, "effects": args.effects}),
         seed,
     )
 }

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use errsep_models::machine::{
-    Characterization, MachineError, simulate_characterization, simulate_parts,
+    Characterization, MachineError, PartDisturbance, simulate_characterization,
+    simulate_parts_disturbed,
 };
 use serde_json::json;
 
@@ -57,6 +58,10 @@ pub struct Args {
     /// Standard deviation of a measurement of a part, um.
     #[arg(long, value_name = "UM", default_value_t = 0.5)]
     noise: f64,
+    /// Switch on an effect of the diagnosis's catalogue at a size, in its exact form; may be given
+    /// several times. They act on the parts. Sizes are in um, rad or shares; those of part-zero and part-rotation are standard deviations over the parts.
+    #[arg(long = "effect", value_name = "NAME=VALUE")]
+    effects: Vec<String>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
@@ -114,15 +119,27 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
             "value",
             readings.iter().map(|(_, o)| o.value).collect::<Vec<_>>(),
         );
+    let disturbances = super::effects(
+        &args.effects,
+        &PartDisturbance::NAMES,
+        PartDisturbance::named,
+    )?;
+    if points.is_empty() && !disturbances.is_empty() {
+        return Err(
+            Message::bad_input("effects act on parts, and there are none")
+                .remedy("give the points of the parts with --points"),
+        );
+    }
     let mut more = Vec::new();
     if !points.is_empty() {
         let (parts, noise) = (args.parts, args.noise);
-        let made = simulate_parts(
+        let made = simulate_parts_disturbed(
             &machine,
             &points,
             parts,
             args.replicates,
             noise,
+            &disturbances,
             args.common.seed,
         )
         .map_err(wrong)?;
@@ -148,6 +165,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         "machine": args.model.display().to_string(),
         "chain": machine.chain().to_string(),
         "noise_of_parts": {"std": args.noise, "unit": "um"},
+        "effects": args.effects,
     });
     let mut answer = super::answer("machine", components, known, args.common.seed)?;
     answer.tables.extend(more);

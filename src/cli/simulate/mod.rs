@@ -1,6 +1,7 @@
 //! `errsep simulate`: data with known truth, one file a kind.
 
 pub mod anova;
+pub mod calibration_line;
 pub mod circle;
 pub mod four_sensor;
 pub mod fourier;
@@ -14,6 +15,7 @@ use clap::Subcommand;
 use serde_json::{Value, json};
 
 use super::{Answer, CommonArgs};
+use crate::io::message::nearest;
 use crate::io::output::Values;
 use crate::io::{CsvTable, Message, Status};
 use crate::report::{Page, Section};
@@ -28,6 +30,7 @@ pub struct Args {
 #[derive(Debug, Subcommand)]
 enum Kind {
     Anova(anova::Args),
+    CalibrationLine(calibration_line::Args),
     Circle(circle::Args),
     FourSensor(four_sensor::Args),
     Fourier(fourier::Args),
@@ -40,6 +43,7 @@ impl Args {
     pub(super) fn common(&self) -> &CommonArgs {
         match &self.kind {
             Kind::Anova(args) => &args.common,
+            Kind::CalibrationLine(args) => &args.common,
             Kind::Circle(args) => &args.common,
             Kind::FourSensor(args) => &args.common,
             Kind::Fourier(args) => &args.common,
@@ -57,6 +61,7 @@ impl Args {
 pub fn run(args: &Args) -> Result<Answer, Message> {
     let mut answer = match &args.kind {
         Kind::Anova(args) => anova::run(args),
+        Kind::CalibrationLine(args) => calibration_line::run(args),
         Kind::Circle(args) => circle::run(args),
         Kind::FourSensor(args) => four_sensor::run(args),
         Kind::Fourier(args) => fourier::run(args),
@@ -106,6 +111,44 @@ fn known_in_a_line(truth: &Value) -> String {
         })
         .collect();
     parts.join(", ")
+}
+
+/// The effects that are switched on, by what `make` knows of a name and a size.
+pub(super) fn effects<E>(
+    texts: &[String],
+    known: &[&str],
+    mut make: impl FnMut(&str, f64) -> Option<E>,
+) -> Result<Vec<E>, Message> {
+    let example = known.first().copied().unwrap_or("NAME");
+    texts
+        .iter()
+        .map(|text| {
+            let bad = |what: String| {
+                Message::bad_input(what).remedy(format!(
+                    "give --effect as NAME=VALUE, such as --effect {example}=1e-3"
+                ))
+            };
+            let (name, value) = text
+                .split_once('=')
+                .ok_or_else(|| bad(format!("`{text}` is not NAME=VALUE")))?;
+            let (name, value) = (name.trim(), value.trim());
+            let size = value
+                .parse()
+                .ok()
+                .filter(|v: &f64| v.is_finite())
+                .ok_or_else(|| bad(format!("`{value}` is not a number")))?;
+            make(name, size).ok_or_else(|| {
+                Message::bad_input(format!("there is no effect `{name}`")).remedy(
+                    match nearest(name, known.iter().copied()) {
+                        Some(near) => {
+                            format!("did you mean `{near}`? There are {}", known.join(", "))
+                        }
+                        None => format!("there are {}", known.join(", ")),
+                    },
+                )
+            })
+        })
+        .collect()
 }
 
 /// A simulation as every kind answers: the data as text in the form that the commands read, with its

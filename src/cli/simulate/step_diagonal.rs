@@ -2,7 +2,8 @@
 
 use clap::ValueEnum;
 use errsep_models::diagonal::{
-    Component, Diagonal, DiagonalSimulation, Location, Sequence, Target, WorkZone, simulate,
+    Component, Diagonal, DiagonalSimulation, Disturbance, Location, Sequence, Target, WorkZone,
+    simulate_disturbed,
 };
 use serde_json::{Value, json};
 
@@ -61,6 +62,10 @@ pub struct Args {
     /// Standard deviation of a reading, um.
     #[arg(long, default_value_t = 0.2, value_name = "UM")]
     noise: f64,
+    /// Switch on an effect of the diagnosis's catalogue at a size, in its exact form; may be given
+    /// several times. Sizes are in um or rad.
+    #[arg(long = "effect", value_name = "NAME=VALUE")]
+    effects: Vec<String>,
     /// Each run goes back to its start, without zeroing the laser.
     #[arg(long)]
     backward: bool,
@@ -140,7 +145,10 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         reversal_rotation: back(args.reversal_rotation),
     };
     let seed = args.common.seed;
-    let (readings, errors, mirrors) = simulate(&what, seed);
+    let disturbances = super::effects(&args.effects, &Disturbance::NAMES, |name, size| {
+        Disturbance::named(name, size, &what)
+    })?;
+    let (readings, errors, mirrors) = simulate_disturbed(&what, &disturbances, seed);
     let position = |a: usize| -> Vec<f64> {
         readings
             .iter()
@@ -199,6 +207,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             "reversals": reversals,
             "squareness": squareness,
             "mirrors": misaligned,
+            "effects": args.effects,
         }),
         seed,
     )

@@ -148,7 +148,7 @@ fn causes(view: &View) -> Section {
     }
     for candidate in view.candidates.iter().filter(|c| c.named) {
         section = section.paragraph(format!(
-            "{}: {} To confirm: {}",
+            "{}: {}. To confirm: {}.",
             candidate.effect, candidate.physics, candidate.confirm
         ));
         if !candidate.parameters.is_empty() {

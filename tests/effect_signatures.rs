@@ -1,0 +1,252 @@
+//! Signatures of effects against their exact forms: noise-free readings with a small effect less the
+//! same without it, as far as the fit cannot absorb either.
+
+use errsep_models::calibration_line::CalibrationLine;
+use errsep_models::calibration_line::simulate as line;
+use errsep_models::circle::{self, CirclePoints, CircleSimulation};
+use errsep_models::diagonal::{self, Component, DiagonalRuns, DiagonalSimulation};
+use errsep_models::four_sensor::simulate::{Disturbances, Example, simulate};
+use errsep_models::four_sensor::{FourSensors, Geometry};
+use errsep_models::fourier::{self, FourierScans, FourierSimulation, Section};
+use errsep_models::machine::{
+    Chain, Machine, MeasuredParts, PartDisturbance, Position, Sense, simulate_parts_disturbed,
+};
+use errsep_models::model::{FittedModel, Shape};
+use nalgebra::{DMatrix, DVector};
+
+/// The part of vectors that the fit of a model cannot absorb.
+fn visible<M: FittedModel>(model: &M, vectors: &DMatrix<f64>) -> DMatrix<f64> {
+    let columns = model.freedom().columns;
+    if columns.ncols() == 0 {
+        return vectors.clone();
+    }
+    let factor = columns.svd(true, false);
+    let u = factor.u.unwrap();
+    let greatest = factor.singular_values.amax();
+    let kept: Vec<DVector<f64>> = u
+        .column_iter()
+        .zip(factor.singular_values.iter())
+        .filter(|(_, s)| **s > 1e-10 * greatest)
+        .map(|(c, _)| c.clone_owned())
+        .collect();
+    let basis = DMatrix::from_columns(&kept);
+    vectors - &basis * basis.tr_mul(vectors)
+}
+
+/// How much of the exact change the signature at a shape leaves unexplained, as a part of it.
+fn left<M: FittedModel>(bare: &M, with: &M, effect: &str, shape: &Shape) -> f64 {
+    let effects = bare.effects();
+    let effect = effects.iter().find(|e| e.name() == effect).unwrap();
+    let n = bare.observed().len();
+    let columns: Vec<DVector<f64>> = effect
+        .columns(bare, shape)
+        .iter()
+        .map(|c| c.dense(n))
+        .collect();
+    let change = with.linearised() - bare.linearised();
+    let change = visible(bare, &DMatrix::from_columns(&[change]));
+    let columns = visible(bare, &DMatrix::from_columns(&columns));
+    let svd = columns.clone().svd(true, true);
+    let amplitudes = svd
+        .solve(&change, 1e-9 * svd.singular_values.amax())
+        .unwrap();
+    assert!(change.norm() > 0.0);
+    (&change - columns * amplitudes).norm() / change.norm()
+}
+
+fn at(variant: usize, values: &[f64]) -> Shape {
+    Shape {
+        variant,
+        values: values.to_vec(),
+        steps: vec![0.0; values.len()],
+    }
+}
+
+#[test]
+fn calibration_line() {
+    let made = |disturbances: Vec<line::Disturbance>| {
+        let what = line::CalibrationSimulation {
+            line: [0.3, 2.0],
+            full_scale: 50.0,
+            loads: 12,
+            sets: 3,
+            noise: 0.0,
+            disturbances,
+        };
+        CalibrationLine::new(&line::simulate(&what, 1).unwrap(), None).unwrap()
+    };
+    let bare = made(Vec::new());
+    for (name, shape) in [
+        ("quadratic", at(0, &[])),
+        ("cubic", at(0, &[])),
+        ("square-root", at(0, &[])),
+        ("logarithmic", at(0, &[])),
+        ("saturation", at(0, &[0.2])),
+        ("drift", at(0, &[(1.0f64 / 3.0).ln()])),
+        ("set-offset", at(2, &[])),
+    ] {
+        let with = made(vec![line::Disturbance::named(name, 0.1, 3).unwrap()]);
+        // Epsilons: these effects are linear; readings of 100 carry 10⁻¹⁴, the change is 10⁻³.
+        let rest = left(&bare, &with, name, &shape);
+        assert!(rest < 1e-9, "{name}: {rest:e}");
+    }
+}
+
+#[test]
+fn circle() {
+    let what = CircleSimulation {
+        // Clear of the direction where angles begin again.
+        start: 0.01,
+        count: 48,
+        noise_um: 0.0,
+        ..CircleSimulation::default()
+    };
+    let made = |disturbances: &[circle::Disturbance]| {
+        let points = circle::simulate_disturbed(&what, disturbances, 1).unwrap();
+        let numbered: Vec<_> = points.into_iter().map(|p| (p, 1)).collect();
+        CirclePoints::new(&numbered, None).unwrap()
+    };
+    let bare = made(&[]);
+    for (name, size, shape) in [
+        ("ovality", 1.0, at(0, &[])),
+        ("lobes", 1.0, at(0, &[3.0])),
+        ("outlier", 1.0, at(16, &[])),
+        ("scale-mismatch", 1e-5, at(0, &[])),
+    ] {
+        let with = made(&[circle::Disturbance::named(name, size, what.count).unwrap()]);
+        // Truncation: angles move by the effect over the radius, 1 µm on 50 mm.
+        let rest = left(&bare, &with, name, &shape);
+        assert!(rest < 1e-4, "{name}: {rest:e}");
+    }
+}
+
+#[test]
+fn four_sensor() {
+    let geometry = Geometry::new(2.0, [1, 1, 5], 120).unwrap();
+    let truth = Example::of(&geometry);
+    let made = |put: Option<(&str, f64)>| {
+        let mut disturbances = Disturbances::noise(0.0);
+        if let Some((name, size)) = put {
+            assert!(disturbances.add(name, size));
+        }
+        let outputs = simulate(&geometry, &truth, &disturbances, 1).unwrap();
+        FourSensors::new(&[outputs], Some(0.01)).unwrap()
+    };
+    let bare = made(None);
+    for (name, size, variant, most) in [
+        // Epsilons.
+        ("drift", 1.0, 2, 1e-9),
+        // Truncation: the state comes from the penalised separation, the slope of the surface from
+        // differences of its points 2 mm apart under waves of 25 mm.
+        ("gain", 1e-3, 2, 0.1),
+        ("sensor-position", 1e-3, 2, 0.2),
+    ] {
+        let with = made(Some((name, size)));
+        let rest = left(&bare, &with, name, &at(variant, &[]));
+        assert!(rest < most, "{name}: {rest:e}");
+    }
+}
+
+#[test]
+fn fourier() {
+    let what = FourierSimulation {
+        samples: 200,
+        orders: 20,
+        noise: 0.0,
+        ..FourierSimulation::default()
+    };
+    let section = Section {
+        length: what.length,
+        orders: what.orders,
+    };
+    let made = |disturbances: &[fourier::Disturbance]| {
+        let (scans, _) = fourier::simulate_disturbed(&what, disturbances, 3).unwrap();
+        FourierScans::new(&scans, section, None).unwrap()
+    };
+    let bare = made(&[]);
+    for (name, size, variant, most) in [
+        // Epsilons.
+        ("height-difference", 1.0, 2, 1e-9),
+        // Truncation: second order in the error over the shortest wave, 10⁻³ · 2π/5 mm.
+        ("probe-spacing", 1e-3, 2, 5e-3),
+        // Truncation: tan of 10⁻⁵ rad.
+        ("yaw", 1e-5, 0, 1e-6),
+    ] {
+        let with = made(&[fourier::Disturbance::named(name, size, 3).unwrap()]);
+        let rest = left(&bare, &with, name, &at(variant, &[]));
+        assert!(rest < most, "{name}: {rest:e}");
+    }
+}
+
+#[test]
+fn step_diagonal() {
+    let what = DiagonalSimulation {
+        rotation: 0.0,
+        noise: 0.0,
+        mirror: 0.0,
+        translation: 1.0,
+        ..DiagonalSimulation::default()
+    };
+    let rotations: Vec<Component> = Component::all().filter(|c| c.rotation).collect();
+    let made = |disturbances: &[diagonal::Disturbance]| {
+        let (readings, _, _) = diagonal::simulate_disturbed(&what, disturbances, 2);
+        DiagonalRuns::new(&what.zone, &readings, &rotations, None).unwrap()
+    };
+    let bare = made(&[]);
+    let of_mirror = bare.channels().len() - 1;
+    let of_rotation = rotations.iter().position(|c| c.name() == "ECZ").unwrap();
+    for (name, size, shape) in [
+        ("mirror-misalignment", 1e-6, at(of_mirror, &[])),
+        ("angular-error", 1e-6, at(of_rotation, &[])),
+        ("drift", 1.0, at(0, &[0.1f64.ln()])),
+    ] {
+        let disturbance = diagonal::Disturbance::named(name, size, &what).unwrap();
+        let shape = if name == "mirror-misalignment" {
+            let diagonal::Disturbance::MirrorMisalignment {
+                diagonal, sequence, ..
+            } = disturbance
+            else {
+                panic!("{disturbance:?}");
+            };
+            let of = |c: &(diagonal::Diagonal, diagonal::Target, diagonal::Sequence)| {
+                c.0 == diagonal && c.2 == sequence
+            };
+            at(bare.channels().iter().position(of).unwrap(), &[])
+        } else {
+            shape
+        };
+        let with = made(&[disturbance]);
+        // Truncation: products of the angle with errors of 1 µm and angles of 10⁻⁶.
+        let rest = left(&bare, &with, name, &shape);
+        assert!(rest < 1e-3, "{name}: {rest:e}");
+    }
+}
+
+#[test]
+fn machine() {
+    let machine = Machine::new(Chain::parse("FXYZ").unwrap(), Sense::Tool, Vec::new()).unwrap();
+    let points: Vec<(String, Position)> =
+        [(10.0, 20.0, 0.0), (140.0, 10.0, 50.0), (90.0, 120.0, 20.0)]
+            .into_iter()
+            .enumerate()
+            .map(|(k, (x, y, z))| (k.to_string(), Position::new(x, y, z)))
+            .collect();
+    let made = |disturbances: &[PartDisturbance]| {
+        let readings =
+            simulate_parts_disturbed(&machine, &points, 4, 2, 0.0, disturbances, 1).unwrap();
+        MeasuredParts::new(&machine, readings).unwrap()
+    };
+    let bare = made(&[]);
+    for name in PartDisturbance::NAMES {
+        let size = match name {
+            "part-zero" | "datum-offset" | "bad-part" => 10.0,
+            "angular-error-times-height" => 1e-8,
+            _ => 1e-6,
+        };
+        let variant = if name == "bad-part" { 2 } else { 0 };
+        let with = made(&[PartDisturbance::named(name, size).unwrap()]);
+        // Truncation: finite rotations and shears of 10⁻⁶, and rounding of coordinates of 150 mm.
+        let rest = left(&bare, &with, name, &at(variant, &[]));
+        assert!(rest < 1e-5, "{name}: {rest:e}");
+    }
+}

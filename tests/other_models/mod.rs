@@ -1,0 +1,230 @@
+//! Makers of data for every model but the reversal: known effects in exact form, noise, repeats.
+#![allow(dead_code, reason = "the campaign and the tests each use their part")]
+
+use errsep::diagnosis::{Diagnosis, Kind, Options, diagnose};
+use errsep_models::calibration_line::CalibrationLine;
+use errsep_models::calibration_line::simulate as line;
+use errsep_models::circle::{self, CirclePoints, CircleSimulation};
+use errsep_models::diagonal::{self, Component, DiagonalRuns, DiagonalSimulation, Sequence};
+use errsep_models::four_sensor::simulate::{Disturbances, Example, simulate};
+use errsep_models::four_sensor::{FourSensors, Geometry};
+use errsep_models::fourier::{self, FourierScans, FourierSimulation, Section};
+use errsep_models::machine::{
+    Chain, ComponentError, ErrorFunction, Machine, MeasuredParts, PartDisturbance, Position, Sense,
+    Spread, simulate_parts_disturbed,
+};
+
+/// An effect by its name and size.
+pub type Put<'a> = Option<(&'a str, f64)>;
+
+/// A model with its effects and a way to diagnose one measurement of it.
+pub struct Maker {
+    /// Name of the model.
+    pub model: &'static str,
+    /// Effects that such data show.
+    pub effects: &'static [&'static str],
+    /// Makes the data of a seed, with an effect or none, and diagnoses them.
+    pub diagnosed: fn(Put<'_>, u64, &Options) -> Diagnosis,
+}
+
+/// All models but the reversal.
+pub const MAKERS: [Maker; 6] = [
+    Maker {
+        model: "calibration-line",
+        effects: &[
+            "cubic",
+            "drift",
+            "logarithmic",
+            "quadratic",
+            "saturation",
+            "set-offset",
+            "square-root",
+        ],
+        diagnosed: calibration_line,
+    },
+    Maker {
+        model: "circle",
+        effects: &["lobes", "outlier", "ovality", "scale-mismatch"],
+        diagnosed: circle,
+    },
+    Maker {
+        model: "four-sensor",
+        effects: &["drift", "gain", "sensor-position"],
+        diagnosed: four_sensor,
+    },
+    Maker {
+        model: "fourier",
+        effects: &["height-difference", "probe-spacing", "yaw"],
+        diagnosed: fourier,
+    },
+    Maker {
+        model: "step-diagonal",
+        effects: &["angular-error", "drift", "mirror-misalignment"],
+        diagnosed: step_diagonal,
+    },
+    Maker {
+        model: "machine",
+        effects: &[
+            "angular-error-times-height",
+            "axis-scale",
+            "bad-part",
+            "datum-offset",
+            "datum-rotation",
+            "part-rotation",
+            "part-zero",
+            "squareness-change",
+            "thermal-expansion",
+        ],
+        diagnosed: machine,
+    },
+];
+
+const REPEATS: u32 = 4;
+
+fn calibration_line(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    let what = line::CalibrationSimulation {
+        line: [0.5, 2e-3],
+        full_scale: 1000.0,
+        loads: 20,
+        sets: REPEATS,
+        noise: 1e-3,
+        disturbances: put
+            .and_then(|(name, size)| line::Disturbance::named(name, size, REPEATS))
+            .into_iter()
+            .collect(),
+    };
+    let readings = line::simulate(&what, seed).unwrap();
+    diagnose(&CalibrationLine::new(&readings, None).unwrap(), options)
+}
+
+fn circle(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    let what = CircleSimulation {
+        count: 72,
+        noise_um: 1.0,
+        ..CircleSimulation::default()
+    };
+    let mut points = Vec::new();
+    for repeat in 1..=REPEATS {
+        // Dirt lies in one pass only.
+        let disturbances: Vec<circle::Disturbance> = put
+            .filter(|(name, _)| repeat == 1 || *name != "outlier")
+            .and_then(|(name, size)| circle::Disturbance::named(name, size, what.count))
+            .into_iter()
+            .collect();
+        let pass_seed = seed * 100 + u64::from(repeat);
+        let pass = circle::simulate_disturbed(&what, &disturbances, pass_seed).unwrap();
+        points.extend(pass.into_iter().map(|p| (p, repeat)));
+    }
+    diagnose(&CirclePoints::new(&points, None).unwrap(), options)
+}
+
+fn four_sensor(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    let geometry = Geometry::new(5.0, [1, 1, 5], 62).unwrap();
+    let truth = Example::of(&geometry);
+    let mut disturbances = Disturbances::noise(0.1);
+    if let Some((name, size)) = put {
+        assert!(disturbances.add(name, size), "{name}");
+    }
+    let repeats: Vec<_> = (0..u64::from(REPEATS))
+        .map(|repeat| simulate(&geometry, &truth, &disturbances, seed * 100 + repeat).unwrap())
+        .collect();
+    diagnose(&FourSensors::new(&repeats, None).unwrap(), options)
+}
+
+fn fourier(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    let what = FourierSimulation {
+        samples: 100,
+        orders: 20,
+        repeats: REPEATS,
+        noise: 1.0,
+        ..FourierSimulation::default()
+    };
+    let disturbances: Vec<_> = put
+        .and_then(|(name, size)| fourier::Disturbance::named(name, size, what.spacings.len()))
+        .into_iter()
+        .collect();
+    let (scans, _) = fourier::simulate_disturbed(&what, &disturbances, seed).unwrap();
+    let section = Section {
+        length: what.length,
+        orders: what.orders,
+    };
+    diagnose(&FourierScans::new(&scans, section, None).unwrap(), options)
+}
+
+fn step_diagonal(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    let what = DiagonalSimulation {
+        sequences: vec![Sequence::XYZ, Sequence::YZX, Sequence::ZXY],
+        repeats: REPEATS,
+        rotation: 0.0,
+        ..DiagonalSimulation::default()
+    };
+    let disturbances: Vec<_> = put
+        .and_then(|(name, size)| diagonal::Disturbance::named(name, size, &what))
+        .into_iter()
+        .collect();
+    let (readings, _, _) = diagonal::simulate_disturbed(&what, &disturbances, seed);
+    let rotations: Vec<Component> = Component::all().filter(|c| c.rotation).collect();
+    let model = DiagonalRuns::new(&what.zone, &readings, &rotations, None).unwrap();
+    diagnose(&model, options)
+}
+
+/// A machine without scatter: what differs between parts is what was put in.
+fn machine(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    let error = |name: &str, coefficients: Vec<f64>| ComponentError {
+        component: name.parse().unwrap(),
+        function: ErrorFunction::polynomial(coefficients),
+        spread: Spread::none(),
+    };
+    let errors = vec![
+        error("EXX", vec![0.5, -0.02]),
+        error("EYY", vec![0.0, 0.01]),
+    ];
+    let machine = Machine::new(Chain::parse("FXYZ").unwrap(), Sense::Tool, errors).unwrap();
+    let points: Vec<(String, Position)> = [0.0, 60.0]
+        .into_iter()
+        .flat_map(|z| {
+            [(10.0, 10.0), (140.0, 10.0), (150.0, 120.0), (20.0, 130.0)]
+                .map(|(x, y)| Position::new(x, y, z))
+        })
+        .enumerate()
+        .map(|(k, p)| (format!("{}", k + 1), p))
+        .collect();
+    let disturbances: Vec<_> = put
+        .and_then(|(name, size)| PartDisturbance::named(name, size))
+        .into_iter()
+        .collect();
+    let readings =
+        simulate_parts_disturbed(&machine, &points, 6, REPEATS, 0.5, &disturbances, seed).unwrap();
+    diagnose(&MeasuredParts::new(&machine, readings).unwrap(), options)
+}
+
+/// The smallest size of an effect that data without it would have shown with 80 % probability.
+pub fn seen_from(maker: &Maker, effect: &str, options: &Options) -> f64 {
+    let bare = (maker.diagnosed)(None, 1, options);
+    let hidden = bare.hidden.iter().find(|h| h.effect == effect);
+    hidden
+        .and_then(|h| h.detectable)
+        .unwrap_or_else(|| panic!("{} does not show {effect}", maker.model))
+}
+
+/// A verdict in one word against what was put in.
+pub fn judged(diagnosis: &Diagnosis, truth: Option<&str>) -> &'static str {
+    let verdict = &diagnosis.verdict;
+    let group = || verdict.indistinguishable.iter().flatten();
+    match (verdict.kind, truth) {
+        (Kind::None, None) => "none, right",
+        (Kind::None, Some(_)) => "none",
+        (Kind::Unknown, _) => "unknown",
+        (Kind::Effect, Some(truth)) => {
+            let named = verdict.effects.iter().any(|e| e == truth);
+            let grouped = group().any(|e| e == truth);
+            match (named, grouped, verdict.effects.len()) {
+                (true, false, 1) => "named alone",
+                (true, true, 1) | (false, true, 1) => "in its group",
+                (true, _, _) | (_, true, _) => "with another",
+                (false, false, _) => "another named",
+            }
+        }
+        (Kind::Effect, None) => "another named",
+    }
+}

@@ -79,11 +79,14 @@ impl Entry {
     }
 }
 
+/// An axis to look along and its items, each with its columns.
+type Axis = (&'static str, Vec<(Item, Vec<Folded>)>);
+
 /// The places to look at: the same for every state and every law of noise.
 #[derive(Debug)]
 pub struct Places {
     folding: Folding,
-    axes: Vec<(&'static str, Vec<(Item, Vec<Folded>)>)>,
+    axes: Vec<Axis>,
 }
 
 impl Places {

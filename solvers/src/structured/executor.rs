@@ -5,8 +5,9 @@ use argmin::core::{
     Error, IterState, KV, Problem as Counted, Solver, TerminationReason, TerminationStatus,
 };
 
-use super::minimise::{Fit, Minimiser, Options, Progress};
+use super::minimise::{Fit, Minimiser};
 use super::problem::{Parameters, StructuredProblem};
+use super::progress::{Options, Progress};
 use crate::outcome::Ending;
 
 /// The state argmin's observers see: parameters and cost.

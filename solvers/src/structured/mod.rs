@@ -12,10 +12,12 @@ mod executor;
 mod gathered;
 mod minimise;
 mod problem;
+mod progress;
 mod sink;
 
 pub use evaluate::{Evaluation, evaluate, hat_traces};
 pub use executor::{StructuredSolver, StructuredState};
-pub use minimise::{Fit, Iteration, Minimiser, Options, Parts, Progress, minimise};
+pub use minimise::{Fit, Minimiser, minimise};
 pub use problem::{Parameters, StructuredProblem};
+pub use progress::{Iteration, Options, Parts, Progress};
 pub use sink::Sink;

@@ -15,9 +15,11 @@ mod noise;
 mod options;
 mod problem;
 mod readings;
+mod robust;
 mod rows;
 mod seed;
 mod solution;
+mod starts;
 mod unknowns;
 
 pub use dense::DenseReversal;

@@ -14,7 +14,9 @@ use rayon::prelude::*;
 
 use super::gauge::{self, Axis};
 use super::readings::ChannelReadings;
+use super::robust::Robust;
 use super::rows::{CellForm, Points, Run};
+use super::starts::{slide_starts, starts};
 use super::unknowns::{Form, Unknowns};
 use crate::basis::bspline::{Cubic, CubicBSpline, horner};
 use crate::reversal::forward::{Attitude, no_contact};
@@ -360,64 +362,6 @@ impl Reversal<'_> {
             }
         }
         Ok(())
-    }
-}
-
-/// First reading at or beyond each break of the slide's form, by channel, where that is fitted.
-fn slide_starts(
-    unknowns: &Unknowns,
-    bases: &[CubicBSpline],
-    channels: &[ChannelReadings],
-) -> Vec<Vec<usize>> {
-    unknowns.place(Form::Slide).map_or_else(Vec::new, |form| {
-        channels
-            .iter()
-            .map(|c| starts(&c.x, bases[form].breaks()))
-            .collect()
-    })
-}
-
-/// For each break the first of the sorted positions at or beyond it; the first and last breaks
-/// take in everything outside.
-fn starts(x: &[f64], breaks: &[f64]) -> Vec<usize> {
-    let mut starts: Vec<usize> = breaks
-        .iter()
-        .map(|b| x.partition_point(|x| x < b))
-        .collect();
-    if let Some(first) = starts.first_mut() {
-        *first = 0;
-    }
-    if let Some(last) = starts.last_mut() {
-        *last = x.len();
-    }
-    starts
-}
-
-/// What a robust loss makes of a batch: the factors of its rows, its residuals, and the cost ½ Σ ρ.
-struct Robust {
-    rows: [f64; Tall::CAPACITY],
-    residuals: [f64; Tall::CAPACITY],
-    cost: f64,
-}
-
-impl Robust {
-    fn of(loss: Loss, far: bool, residuals: &[f64]) -> Self {
-        let mut robust = Self {
-            rows: [0.0; Tall::CAPACITY],
-            residuals: [0.0; Tall::CAPACITY],
-            cost: loss.cost(residuals),
-        };
-        for (i, r) in residuals.iter().enumerate() {
-            let (row, residual) = if far {
-                let root = loss.at(r * r).first.max(0.0).sqrt();
-                (root, root)
-            } else {
-                loss.row_factors(*r)
-            };
-            robust.rows[i] = row;
-            robust.residuals[i] = residual * r;
-        }
-        robust
     }
 }
 

@@ -1,7 +1,7 @@
 //! `errsep diagnose`: where the gap between model and readings lies, which effect causes it and how
 //! far it shrinks. One file wires a model: it reads the data, fits the model and names its axes.
 //!
-//! To add a model, write its file and add its line to [`recognise::MODELS`].
+//! To add a model, write its file and add its line to `recognise::MODELS`.
 
 mod calibration_line;
 mod case;

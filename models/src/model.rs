@@ -227,6 +227,12 @@ pub trait Effect<M>: Send + Sync {
     /// The change of the readings per unit of each amplitude, at the fitted state of the model.
     fn columns(&self, model: &M, shape: &Shape) -> Vec<Column>;
 
+    /// Whether the model absorbs this effect whatever its size: it is listed as undetectable and
+    /// never named, whatever small part of it bent states or missing traces leave visible.
+    fn absorbed(&self) -> bool {
+        false
+    }
+
     /// Whether a shape is one that the search may go to.
     fn allowed(&self, _model: &M, _shape: &Shape) -> bool {
         true

@@ -8,19 +8,15 @@
 use errsep_models::model::FittedModel;
 use nalgebra::DVector;
 
-use super::bench::{Bench, Cause, Remainder, finer, raw_signatures};
+use super::bench::{ADEQUATE, Bench, Cause, Remainder, finer, raw_signatures};
 use super::quantify::held_out_square;
 
-/// A set of causes whose remainder is less probable than this is not adequate.
-const ADEQUATE: f64 = 0.002;
 /// A further cause must stand out beside the others at this level.
 const EARNED: f64 = 0.002;
 /// A cause whose statistic is this much below the best cannot be adequate.
 const HOPELESS: f64 = 80.0;
 /// Causes whose misfits differ by less fit equally well: the one of more usual size goes first.
 const TIED: f64 = 9.2;
-/// Most rounds of fitting the state without the causes.
-const ROUNDS: usize = 8;
 /// Number of pairs that are fitted with everything else free.
 const PAIRS: usize = 3;
 /// Greatest number of effects in one verdict.
@@ -32,8 +28,8 @@ pub(super) struct Answer {
     pub causes: Vec<Cause>,
     /// For each cause the effects that these data cannot tell from it, itself first.
     pub groups: Vec<Vec<usize>>,
-    /// Probability of the remainder.
-    pub adequacy: f64,
+    /// What remains beside them.
+    pub remainder: Remainder,
     /// Whether the remainder is adequate.
     pub complete: bool,
 }
@@ -45,14 +41,9 @@ pub(super) fn attribute<M: FittedModel>(
     first: &Remainder,
 ) -> Option<Answer> {
     let mut causes: Vec<Cause> = Vec::new();
-    let mut best_partial: Option<Answer> = None;
+    let mut partial: Option<Answer> = None;
     for size in 1..=MOST {
-        let remainder = if causes.is_empty() {
-            None
-        } else {
-            Some(bench.remainder(readings, &causes))
-        };
-        let here = remainder.as_ref().unwrap_or(first);
+        let here = partial.as_ref().map_or(first, |answer| &answer.remainder);
         let Some(next) = strongest(bench, readings, here, &causes) else {
             break;
         };
@@ -65,13 +56,45 @@ pub(super) fn attribute<M: FittedModel>(
             return Some(answer);
         }
         causes.clone_from(&answer.causes);
-        best_partial = Some(answer);
+        partial = Some(answer);
     }
+    let least = partial.as_ref().map_or(f64::INFINITY, |answer| {
+        answer.remainder.residual.norm_squared() + HOPELESS
+    });
     pairs(bench, readings, first)
         .into_iter()
+        .filter(|causes| bench.misfit(readings, &bench.relinearised(readings, causes, least)) < least)
         .map(|causes| confidence_set(bench, readings, &causes))
         .find(|answer| answer.complete)
-        .or(best_partial)
+        .or(partial)
+}
+
+/// The causes without which noise and state cannot be had: by strength, each refitted, no others
+/// tried in their place.
+pub(super) fn roughly<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    first: &Remainder,
+) -> Vec<Cause> {
+    let mut causes: Vec<Cause> = Vec::new();
+    let mut left: Option<Remainder> = None;
+    for _ in 0..MOST {
+        let here = left.as_ref().unwrap_or(first);
+        let Some(next) = strongest(bench, readings, here, &causes) else {
+            break;
+        };
+        causes.push(next);
+        if causes.len() > 1 {
+            polish(bench, readings, &mut causes);
+        }
+        causes = bench.relinearised(readings, &causes, f64::INFINITY);
+        let remainder = bench.judged(readings, &causes);
+        if remainder.global > ADEQUATE {
+            break;
+        }
+        left = Some(remainder);
+    }
+    causes
 }
 
 /// Pairs of effects of which each stands out beside the other though neither need do so alone, the
@@ -201,7 +224,7 @@ struct Member {
     effect: usize,
     causes: Vec<Cause>,
     misfit: f64,
-    adequacy: f64,
+    left: Remainder,
     /// Size as a part of what is physically plausible.
     size: f64,
 }
@@ -212,8 +235,8 @@ fn confidence_set<M: FittedModel>(
     readings: &DVector<f64>,
     causes: &[Cause],
 ) -> Answer {
-    let mut best = bench.relinearised(readings, causes, ROUNDS);
-    let mut adequacy = bench.remainder(readings, &best).global;
+    let mut best = bench.relinearised(readings, causes, f64::INFINITY);
+    let mut remainder = bench.judged(readings, &best);
     let mut groups = Vec::new();
     for k in 0..causes.len() {
         let members = alternatives(bench, readings, &best, k);
@@ -225,19 +248,19 @@ fn confidence_set<M: FittedModel>(
         groups.push(group);
         if let Some(first) = members.into_iter().next() {
             best = first.causes;
-            adequacy = first.adequacy;
+            remainder = first.left;
         }
     }
     let needed = best.len() == 1
         || (0..best.len()).all(|k| {
-            let remainder = bench.remainder(readings, &without(&best, k));
-            bench.p_value(&remainder, best[k].effect) < EARNED
+            let beside = bench.judged(readings, &without(&best, k));
+            bench.p_value(&beside, best[k].effect) < EARNED
         }) && predicts(bench, readings, &best);
     Answer {
+        complete: needed && remainder.global > ADEQUATE,
         causes: best,
         groups,
-        adequacy,
-        complete: needed && adequacy > ADEQUATE,
+        remainder,
     }
 }
 
@@ -274,6 +297,7 @@ fn alternatives<M: FittedModel>(
         remainder.residual.norm_squared() - bench.misfit(readings, &all)
     };
     let own = strength(&best[k]);
+    let least = bench.misfit(readings, best) + HOPELESS + 0.1 * own;
     let mut members = Vec::new();
     for effect in 0..bench.catalogue.len() {
         if others.iter().any(|c| c.effect == effect) {
@@ -299,15 +323,19 @@ fn alternatives<M: FittedModel>(
         }
         let mut trial = others.clone();
         trial.insert(k, cause);
-        let trial = bench.relinearised(readings, &trial, ROUNDS);
-        let left = bench.remainder(readings, &trial);
+        let trial = if effect == best[k].effect {
+            trial
+        } else {
+            bench.relinearised(readings, &trial, least)
+        };
+        let left = bench.judged(readings, &trial);
         if left.global > ADEQUATE {
             members.push(Member {
                 effect,
                 size: part_of_plausible(bench, readings, &trial, k),
                 causes: trial,
                 misfit: left.residual.norm_squared(),
-                adequacy: left.global,
+                left,
             });
         }
     }

@@ -9,6 +9,8 @@ use rayon::prelude::*;
 
 use super::dictionary::{Dictionary, Entry, Meaning, Places, products, statistic, surprise};
 use super::folding::Sums;
+use super::doubt::Doubt;
+use super::mixing::Mixing;
 use super::noise::NoiseLaw;
 use super::null::NullLaw;
 use super::search::compass;
@@ -19,6 +21,15 @@ const SEPARABLE: f64 = 0.02;
 
 /// Relative change of the amplitudes at which refining stops.
 const AT_REST: f64 = 1e-4;
+
+/// A set of causes whose remainder is less probable than this is not adequate.
+pub(super) const ADEQUATE: f64 = 0.002;
+
+/// Standard deviations of chi-squared beyond which no doubt about the state excuses a remainder.
+const FAR: f64 = 25.0;
+
+/// Most rounds of fitting the state without the causes.
+const ROUNDS: usize = 12;
 
 /// Everything that is fixed while causes are sought.
 pub(super) struct Bench<'a, M: FittedModel> {
@@ -59,8 +70,8 @@ impl<'a, M: FittedModel> Bench<'a, M> {
     ) -> Self {
         let places = Arc::new(Places::new(model));
         let space = Space::new(model, &law);
-        let dictionary = Dictionary::new(model, catalogue, places, &space, &law);
-        let null = Arc::new(NullLaw::simulate(&dictionary, &space, &law, draws, seed));
+        let dictionary = Dictionary::new(model, catalogue, places, &space);
+        let null = Arc::new(NullLaw::simulate(model, &dictionary, &space, &law, draws, seed));
         Self {
             model,
             catalogue,
@@ -80,7 +91,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
     {
         let space = Space::new(model, &law);
         let places = Arc::clone(&self.dictionary.places);
-        let dictionary = Dictionary::new(model, self.catalogue, places, &space, &law);
+        let dictionary = Dictionary::new(model, self.catalogue, places, &space);
         Bench {
             model,
             catalogue: self.catalogue,
@@ -108,72 +119,137 @@ impl<'a, M: FittedModel> Bench<'a, M> {
     }
 
     /// Causes bend the state at which their signatures are taken: takes their change out of the
-    /// readings, fits the model again and refines each there, until the amplitudes rest.
+    /// readings, fits the model again and refines each there, until the change rests. The rounds
+    /// are those of a fixed point, sped up by Anderson's mixing; the best fit seen is kept. They
+    /// end early where the misfit will not come below `hopeless`.
     pub fn relinearised(
         &self,
         readings: &DVector<f64>,
         causes: &[Cause],
-        rounds: usize,
+        hopeless: f64,
     ) -> Vec<Cause> {
+        let mut best = (f64::INFINITY, causes.to_vec());
         let mut causes = causes.to_vec();
-        let mut last: Option<DVector<f64>> = None;
-        for _ in 0..rounds {
-            let Some((amplitudes, _)) = self.amplitudes(readings, &causes) else {
-                break;
-            };
-            let rests = last
-                .as_ref()
-                .is_some_and(|l| (l - &amplitudes).norm() < AT_REST * amplitudes.norm());
-            if rests {
-                break;
-            }
-            last = Some(amplitudes.clone());
-            let state = self.without(readings, &causes, &amplitudes);
+        let Some(mut changes) = self.changes(readings, &causes) else {
+            return causes;
+        };
+        let mut mixing = Mixing::default();
+        for round in 0..ROUNDS {
+            let state = self.model.refit(self.without(readings, &causes, &changes));
             for k in 0..causes.len() {
                 let mut others = causes.clone();
                 let own = others.remove(k);
                 let start = finer(&own.shape);
                 causes[k] = self.refine(&state, readings, own.effect, &start, &others).0;
             }
+            let misfit = self.misfit(readings, &causes);
+            let gained = best.0 - misfit;
+            if round > 0 && gained < 0.2 * (misfit - hopeless) {
+                break;
+            }
+            if misfit < best.0 {
+                best = (misfit, causes.clone());
+            }
+            let Some(next) = self.changes(readings, &causes) else {
+                break;
+            };
+            if (&next - &changes).norm() < AT_REST * next.norm() {
+                break;
+            }
+            changes = mixing.mixed(&changes, next);
         }
-        causes
+        best.1
     }
 
-    /// The state fitted to readings without causes at given amplitudes.
+    /// What each cause changes in the readings at its fitted amplitudes, readings × causes.
+    pub fn changes(&self, readings: &DVector<f64>, causes: &[Cause]) -> Option<DMatrix<f64>> {
+        let (amplitudes, _) = self.amplitudes(readings, causes)?;
+        let mut changes = DMatrix::zeros(self.space.readings(), causes.len());
+        let mut at = 0;
+        for (k, cause) in causes.iter().enumerate() {
+            let own = amplitudes
+                .rows(at, cause.columns.len())
+                .clone_owned();
+            at += cause.columns.len();
+            changes.set_column(k, &self.change(std::slice::from_ref(cause), &own));
+        }
+        Some(changes)
+    }
+
+    /// Readings without the causes at their fitted amplitudes, and those.
+    pub fn clean(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+    ) -> Option<(DVector<f64>, DVector<f64>)> {
+        let (amplitudes, _) = self.amplitudes(readings, causes)?;
+        let changes = self.changes(readings, causes)?;
+        Some((self.without(readings, causes, &changes), amplitudes))
+    }
+
+    /// Readings without what causes change in them, and what they hide of the state restored.
     pub fn without(
         &self,
         readings: &DVector<f64>,
         causes: &[Cause],
-        amplitudes: &DVector<f64>,
-    ) -> M {
-        let mut clean = readings - self.change(causes, amplitudes);
-        let mut at = 0;
-        for cause in causes {
-            let count = cause.columns.len();
-            let own = amplitudes.rows(at, count).clone_owned();
-            at += count;
-            let with = &clean + self.change(std::slice::from_ref(cause), &own);
+        changes: &DMatrix<f64>,
+    ) -> DVector<f64> {
+        let mut clean = readings - changes.column_sum();
+        for (cause, change) in causes.iter().zip(changes.column_iter()) {
+            let with = &clean + change;
             if let Some(restored) = self.catalogue[cause.effect].restored(self.model, &with, &clean)
             {
                 clean = restored;
             }
         }
-        self.model.refit(clean)
+        clean
     }
 
     /// Scores of everything beside some causes.
     pub fn remainder(&self, readings: &DVector<f64>, causes: &[Cause]) -> Remainder {
-        let whole = self.residual(readings);
         let basis = span(causes, self.space.readings());
-        let residual = &whole - &basis * basis.tr_mul(&whole);
+        self.scores(readings, &basis, &Doubt::default())
+    }
+
+    /// The same with the doubt about the state at which the causes' signatures are taken, where
+    /// that can make the difference.
+    pub fn judged(&self, readings: &DVector<f64>, causes: &[Cause]) -> Remainder {
+        let plain = self.remainder(readings, causes);
+        let freedom = self.space.degrees_of_freedom() as f64;
+        let far = plain.residual.norm_squared() > freedom + FAR * (2.0 * freedom).sqrt();
+        if causes.is_empty() || plain.global > ADEQUATE || far {
+            return plain;
+        }
+        let basis = span(causes, self.space.readings());
+        let doubt = self.doubt(readings, causes, &basis);
+        if doubt.weights.is_empty() {
+            return plain;
+        }
+        self.scores(readings, &basis, &doubt)
+    }
+
+    fn scores(&self, readings: &DVector<f64>, basis: &DMatrix<f64>, doubt: &Doubt) -> Remainder {
+        let whole = self.residual(readings);
+        let residual = &whole - basis * basis.tr_mul(&whole);
+        let mut trusted = residual.clone();
+        for (direction, weight) in doubt.directions.iter().zip(&doubt.weights) {
+            trusted.axpy(-weight * direction.dot(&residual), direction, 1.0);
+        }
+        let mut spans: Vec<DVector<f64>> = basis.column_iter().map(|c| c.clone_owned()).collect();
+        // A part w of a product is taken away by √w of the direction.
+        let halves = doubt.directions.iter().zip(&doubt.weights);
+        spans.extend(halves.map(|(direction, weight)| direction * weight.sqrt()));
         let sums = |c: DVector<f64>| self.dictionary.places.sums(&c);
-        let adjoint = sums(column(self.space.adjoint(as_matrix(&residual))));
-        let directions: Vec<Sums> = self
-            .space
-            .adjoint(basis.clone())
-            .column_iter()
-            .map(|c| sums(c.clone_owned()))
-            .collect();
+        let adjoint = sums(column(self.space.adjoint(as_matrix(&trusted))));
+        let directions: Vec<Sums> = if spans.is_empty() {
+            Vec::new()
+        } else {
+            self.space
+                .adjoint(DMatrix::from_columns(&spans))
+                .column_iter()
+                .map(|c| sums(c.clone_owned()))
+                .collect()
+        };
         let surprise_of = |entry: &Entry| -> f64 {
             let score = entry.products(&adjoint);
             let t = if directions.is_empty() {
@@ -243,7 +319,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
             directions.column_iter().map(|c| c.clone_owned()).collect();
         let value = |shape: &Shape| {
             let columns = model.columns(state, shape);
-            let mut gram = self.space.gram(&columns, 0.0).matrix;
+            let mut gram = self.space.gram(&columns).matrix;
             for direction in &directions {
                 let along = products(&columns, direction);
                 gram -= &along * along.transpose();

@@ -11,7 +11,6 @@ use rayon::prelude::*;
 
 use super::folding::{BatchSums, Folded, Folding, Sums};
 use super::localise::{Item, scan_items};
-use super::noise::NoiseLaw;
 use super::space::Space;
 
 /// A signature of which less than this part is visible is not looked for.
@@ -39,8 +38,6 @@ pub struct Entry {
     pub visible: f64,
     /// Whether only positive amplitudes are possible.
     pub positive: bool,
-    /// Part of the variance of its score that comes from the shifts of traces.
-    pub shift_share: f64,
 }
 
 /// Signatures of one effect, or of one axis to look along.
@@ -119,7 +116,7 @@ impl Places {
     }
 }
 
-/// The dictionary of one model, state and law of noise.
+/// The dictionary of one model and state in one space.
 #[derive(Debug, Clone)]
 pub struct Dictionary {
     /// Signatures.
@@ -137,7 +134,6 @@ impl Dictionary {
         catalogue: &[Box<dyn Effect<M>>],
         places: Arc<Places>,
         space: &Space,
-        law: &NoiseLaw,
     ) -> Self {
         let mut dictionary = Self {
             entries: Vec::new(),
@@ -160,11 +156,10 @@ impl Dictionary {
                         folded,
                         positive,
                         space,
-                        law,
                     )
                 })
                 .collect();
-            dictionary.add(effect.name(), true, built);
+            dictionary.add(effect.name(), true, !effect.absorbed(), built);
         }
         for (axis, items) in &places.axes {
             let built = items
@@ -172,10 +167,10 @@ impl Dictionary {
                 .map(|(item, folded)| {
                     let columns: Vec<Column> = folded.iter().map(|c| folding.unfold(c)).collect();
                     let meaning = Meaning::Place(item.clone());
-                    entry(meaning, &columns, folded.clone(), false, space, law)
+                    entry(meaning, &columns, folded.clone(), false, space)
                 })
                 .collect();
-            dictionary.add(axis, false, built);
+            dictionary.add(axis, false, true, built);
         }
         dictionary
     }
@@ -186,12 +181,12 @@ impl Dictionary {
         entry.columns.iter().map(|c| folding.unfold(c)).collect()
     }
 
-    fn add(&mut self, name: &str, is_effect: bool, built: Vec<Option<Entry>>) {
+    fn add(&mut self, name: &str, is_effect: bool, sought: bool, built: Vec<Option<Entry>>) {
         let start = self.entries.len();
         let mut visible: f64 = 0.0;
         for entry in built.into_iter().flatten() {
             visible = visible.max(entry.visible);
-            if entry.visible > INVISIBLE {
+            if sought && entry.visible > INVISIBLE {
                 self.entries.push(entry);
             }
         }
@@ -225,9 +220,8 @@ fn entry(
     folded: Vec<Folded>,
     positive: bool,
     space: &Space,
-    law: &NoiseLaw,
 ) -> Option<Entry> {
-    let gram = space.gram(columns, law.shift);
+    let gram = space.gram(columns);
     if columns.is_empty() || gram.whole.is_nan() || gram.whole <= 0.0 {
         return None;
     }
@@ -237,7 +231,6 @@ fn entry(
         visible: (gram.matrix.trace() / gram.whole).clamp(0.0, 1.0),
         gram: gram.matrix,
         positive,
-        shift_share: gram.shift_share,
     })
 }
 

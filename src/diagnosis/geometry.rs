@@ -58,8 +58,8 @@ pub fn certificate<M: FittedModel>(
 ) -> Vec<Diagnosability> {
     let space = Space::new(model, law);
     let places = Arc::new(Places::new(model));
-    let dictionary = Dictionary::new(model, catalogue, places, &space, law);
-    let null = NullLaw::simulate(&dictionary, &space, law, options.draws, options.seed);
+    let dictionary = Dictionary::new(model, catalogue, places, &space);
+    let null = NullLaw::simulate(model, &dictionary, &space, law, options.draws, options.seed);
     let quantities = model.quantities();
     let level = null.level(options.false_alarm);
     let n = space.readings();
@@ -134,7 +134,7 @@ pub fn certificate<M: FittedModel>(
             row.detectable = Some(smallest);
             let per_unit = length * law.sigma() / (n as f64).sqrt();
             // The harm is that of the first shape of the grid, so its own visible part counts.
-            let first = space.gram(&first, 0.0).matrix[(0, 0)].sqrt() / length;
+            let first = space.gram(&first).matrix[(0, 0)].sqrt() / length;
             row.harm_per_visible = row
                 .harm
                 .iter()

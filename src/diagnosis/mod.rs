@@ -7,15 +7,19 @@
 mod attribute;
 mod bench;
 mod candidates;
+mod contrasts;
 mod dictionary;
+mod doubt;
 mod folding;
 mod formula;
 mod geometry;
 mod hidden;
 mod localise;
+mod mixing;
 mod noise;
 mod null;
 mod places;
+mod posterior;
 mod prove;
 mod quantify;
 mod report;
@@ -31,12 +35,13 @@ mod whitening;
 use errsep_models::model::{Effect, FittedModel};
 use nalgebra::DVector;
 
-use attribute::{Answer, attribute};
+use attribute::{Answer, attribute, roughly};
 use bench::{Bench, Remainder};
 pub use formula::{Circumstances, Formula};
 pub use geometry::{Diagnosability, certificate};
 pub use noise::{NoiseLaw, NoiseSource};
 pub use prove::{Trials, prove};
+use spikes::pulled_in;
 pub use statement::for_people;
 pub use tabulated::{Tabulated, TabulatedEffects};
 pub use verdict::{
@@ -84,23 +89,20 @@ pub fn diagnose_with<M: FittedModel>(
         .filter(|effect| !options.without.iter().any(|name| name == effect.name()))
         .collect();
     let readings = model.linearised();
-    let (calm, spikes) = if model.names_single_readings() {
-        (readings.clone(), 0)
-    } else {
-        spikes::pulled_in(model, &readings)
-    };
+    let calm = (!model.names_single_readings()).then(|| pulled_in(model, &readings));
     let calmed;
-    let (model, readings) = if spikes == 0 {
-        (model, readings)
-    } else {
-        calmed = model.refit(model.observed() + (calm - &readings));
-        let readings = calmed.linearised();
-        (&calmed, readings)
+    let (model, readings) = match &calm {
+        Some(calm) if calm.count > 0 => {
+            calmed = model.refit(model.observed() + (&calm.readings - &readings));
+            let readings = calmed.linearised();
+            (&calmed, readings)
+        }
+        _ => (model, readings),
     };
     let law = noise_of(model, &readings);
     let bench = Bench::new(model, &catalogue, law, options.draws, options.seed);
     examined(&bench, &readings, options.false_alarm, |examined| {
-        report::compose(&examined, spikes, options)
+        report::compose(&examined, calm.as_ref(), options)
     })
 }
 
@@ -133,22 +135,18 @@ fn examined<M: FittedModel, R>(
             found: None,
         });
     }
-    let found = attribute(bench, readings, &first);
+    let found = roughly(bench, readings, &first);
     let none = || {
         (
             DVector::zeros(readings.len()),
             bench.model.refit(bench.model.observed().clone()),
         )
     };
-    let (change, state) = found
-        .and_then(|answer| {
-            let (amplitudes, _) = bench.amplitudes(readings, &answer.causes)?;
-            let change = bench.change(&answer.causes, &amplitudes);
-            let observed = bench.model.observed().clone();
-            Some((
-                change,
-                bench.without(&observed, &answer.causes, &amplitudes),
-            ))
+    let (change, state) = bench
+        .changes(readings, &found)
+        .map(|changes| {
+            let clean = bench.without(bench.model.observed(), &found, &changes);
+            (changes.column_sum(), bench.model.refit(clean))
         })
         .unwrap_or_else(none);
     // The readings themselves keep what an effect had hidden of the state.

@@ -1,15 +1,15 @@
 //! What the greatest score of each family does when nothing is there.
 //!
-//! Draws of a standard normal residual, seen through the same projection and the same signatures,
+//! Draws of the noise, seen through the same projection and the same signatures,
 //! give the law of the greatest score over every shape and place looked at (Westfall and Young's
-//! max-T); the smallest tail probability over the families gives one verdict (min-P). The variance
-//! of the noise is itself an estimate: each draw scales the statistics by a chi-squared factor of
-//! the degrees of freedom behind the parts of the noise that each signature sees.
+//! max-T); the smallest tail probability over the families gives one verdict (min-P). The law of the
+//! noise is itself an estimate: each draw is made by a law that the repeats allow (`posterior.rs`)
+//! and seen through the whitening of the estimated one.
 
+use errsep_models::model::FittedModel;
 use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::dictionary::{Dictionary, inverse, surprise};
@@ -49,7 +49,8 @@ impl Tail {
     }
 
     fn beyond(&self, value: f64) -> f64 {
-        if self.sorted.is_empty() {
+        // A family that showed nothing in any draw was not there to be judged.
+        if self.from <= 0.0 {
             return 1.0;
         }
         if value > self.from {
@@ -62,7 +63,8 @@ impl Tail {
 
 impl NullLaw {
     /// The law under a space and a dictionary, from a number of draws.
-    pub fn simulate(
+    pub fn simulate<M: FittedModel>(
+        model: &M,
         dictionary: &Dictionary,
         space: &Space,
         law: &NoiseLaw,
@@ -70,9 +72,9 @@ impl NullLaw {
         seed: u64,
     ) -> Self {
         let batches = draws.div_ceil(BATCH);
-        let all: Vec<Vec<Vec<f64>>> = (0..batches as u64)
+        let all: Vec<Vec<Vec<f64>>> = (0..batches)
             .into_par_iter()
-            .map(|batch| greatest(dictionary, space, law, seed, batch))
+            .map(|batch| greatest(model, dictionary, space, law, seed, batch))
             .collect();
         let rows: Vec<Vec<f64>> = all.into_iter().flatten().collect();
         let families: Vec<Tail> = (0..dictionary.families.len())
@@ -142,46 +144,39 @@ impl NullLaw {
 }
 
 /// The greatest score of each family in each draw of one batch.
-fn greatest(
+fn greatest<M: FittedModel>(
+    model: &M,
     dictionary: &Dictionary,
     space: &Space,
     law: &NoiseLaw,
     seed: u64,
-    batch: u64,
+    batch: usize,
 ) -> Vec<Vec<f64>> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(batch + 1);
-    let draws = DMatrix::from_fn(space.readings(), BATCH, |_, _| {
-        StandardNormal.sample(&mut random)
-    });
+    random.set_stream(batch as u64 + 1);
+    let mut draws = DMatrix::zeros(space.readings(), BATCH);
+    for (k, mut column) in draws.column_iter_mut().enumerate() {
+        let law = law.possible(batch * BATCH + k, &mut random);
+        column.copy_from(&law.draw_all(model, &mut random));
+    }
+    space.whiten(&mut draws);
     let adjoint = dictionary.places.batch_sums::<BATCH>(&space.adjoint(draws));
-    let mut factor = |freedom: f64| -> Vec<f64> {
-        (0..BATCH)
-            .map(|_| match ChiSquared::new(freedom) {
-                Ok(law) if freedom < 1e6 => law.sample(&mut random) / freedom,
-                _ => 1.0,
-            })
-            .collect()
-    };
-    let (rest, shift) = (factor(law.freedom), factor(law.shift_freedom));
     let mut rows: Vec<Vec<f64>> = vec![vec![0.0; dictionary.families.len()]; BATCH];
     for (place, family) in dictionary.families.iter().enumerate() {
         for entry in &dictionary.entries[family.entries.clone()] {
             let products = entry.batch_products(&adjoint);
             let inverse = inverse(&entry.gram);
             for (draw, row) in rows.iter_mut().enumerate() {
-                let known =
-                    entry.shift_share * shift[draw] + (1.0 - entry.shift_share) * rest[draw];
-                let t = if entry.positive && products[0][draw] <= 0.0 {
+                let score = |k: usize| f64::from(products[k][draw]);
+                let t = if entry.positive && score(0) <= 0.0 {
                     0.0
                 } else {
-                    let score = |k: usize| f64::from(products[k][draw]);
                     (0..products.len())
                         .flat_map(|i| (0..products.len()).map(move |j| (i, j)))
                         .map(|(i, j)| score(i) * inverse[(i, j)] * score(j))
                         .sum()
                 };
-                row[place] = row[place].max(t / known.max(1e-6));
+                row[place] = row[place].max(t);
             }
         }
         // All entries of a family have the same number of columns.

@@ -6,7 +6,6 @@ use errsep_models::model::FittedModel;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 use super::noise::{NoiseLaw, NoiseSource};
 use super::space::Space;
@@ -338,24 +337,8 @@ impl SplitFit<'_> {
 /// Noise of the law for all readings, readings × draws.
 fn draws<M: FittedModel>(model: &M, law: &NoiseLaw, seed: u64) -> DMatrix<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x006e_6f69_7365);
-    let mut noise = DMatrix::zeros(model.places().len(), DRAWS);
-    for trace in model.traces() {
-        let x: Vec<f64> = model.places()[trace.clone()].iter().map(|p| p.x).collect();
-        for draw in 0..DRAWS {
-            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-            let shift = law.shift.sqrt() * normal();
-            let mut state = law.correlated.sqrt() * normal();
-            for (k, row) in trace.clone().enumerate() {
-                if k > 0 {
-                    let decay = (-(x[k] - x[k - 1]).abs() / law.length).exp();
-                    state =
-                        decay * state + (law.correlated * (1.0 - decay * decay)).sqrt() * normal();
-                }
-                noise[(row, draw)] = shift + state + law.white.sqrt() * normal();
-            }
-        }
-    }
-    noise
+    let columns: Vec<DVector<f64>> = (0..DRAWS).map(|_| law.draw(model, &mut random)).collect();
+    DMatrix::from_columns(&columns)
 }
 
 /// A profile by name, before and after.

@@ -10,6 +10,7 @@ use super::noise::{NoiseSource, neighbour_scatter};
 use super::places::places;
 use super::quantify::{GapMeter, biases, shrink};
 use super::shape::fingerprint;
+use super::spikes::Calmed;
 use super::statement::{separating, statement};
 use super::verdict::{Detail, Diagnosis, Gap, Kind, NoiseOut, Verdict};
 use super::{Examined, Options};
@@ -17,7 +18,7 @@ use crate::report::number::plain;
 
 pub(super) fn compose<M: FittedModel>(
     examined: &Examined<'_, M>,
-    spikes: usize,
+    calm: Option<&Calmed>,
     options: &Options,
 ) -> Diagnosis {
     let Examined {
@@ -103,7 +104,7 @@ pub(super) fn compose<M: FittedModel>(
         shape: (kind == Kind::Unknown).then(|| fingerprint(bench, readings, first, excess)),
         statement: String::new(),
         p_value: detected,
-        adequacy: found.as_ref().map_or(first.global, |a| a.adequacy),
+        adequacy: found.as_ref().map_or(first.global, |a| a.remainder.global),
     };
     verdict.separate = separating(&verdict.indistinguishable, &candidates);
     let hidden = hidden(bench, &verdict.effects, options);
@@ -119,7 +120,7 @@ pub(super) fn compose<M: FittedModel>(
         candidates,
         bias,
         hidden,
-        notes: notes(bench, &(readings - &change), spikes),
+        notes: notes(bench, &(readings - &change), calm),
         detail: Detail {
             before: meter.residuals(readings),
             after: meter.residuals(&(readings - &change)),
@@ -129,11 +130,15 @@ pub(super) fn compose<M: FittedModel>(
     }
 }
 
-fn notes<M: FittedModel>(bench: &Bench<'_, M>, clean: &DVector<f64>, spikes: usize) -> Vec<String> {
+fn notes<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    clean: &DVector<f64>,
+    calm: Option<&Calmed>,
+) -> Vec<String> {
     let mut notes = Vec::new();
-    if spikes > 0 {
+    if let Some(Calmed { count, edge, .. }) = calm.filter(|c| c.count > 0) {
         notes.push(format!(
-            "{spikes} single readings stand out of their neighbours and of their own repeats by more than four standard deviations; they are pulled in to four."
+            "{count} single readings stand out of their neighbours and of their own repeats by more than {edge} standard deviations; they are pulled in to {edge}."
         ));
     }
     notes.extend(disagreement(bench, clean));

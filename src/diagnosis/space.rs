@@ -32,8 +32,6 @@ pub struct Space {
     returned: DMatrix<f64>,
     /// The rest of what the fit absorbs; orthonormal.
     absorbed: DMatrix<f64>,
-    /// L⁻¹ 1 of each trace.
-    ones: Vec<DVector<f64>>,
     /// Number of directions the fit absorbs.
     pub rank: usize,
 }
@@ -69,7 +67,6 @@ impl Space {
             rows.extend(trace);
         }
         let freedom = model.freedom();
-        let ones = whitening.iter().map(|w| w.ones()).collect();
         let trace_of = traces
             .iter()
             .enumerate()
@@ -83,7 +80,6 @@ impl Space {
             patterns: None,
             returned: DMatrix::zeros(start, 0),
             absorbed: DMatrix::zeros(start, 0),
-            ones,
             rank: 0,
         };
         let columns = freedom.columns.select_rows(&rows);
@@ -151,7 +147,8 @@ impl Space {
         self.readings.saturating_sub(self.rank)
     }
 
-    fn whiten(&self, columns: &mut DMatrix<f64>) {
+    /// L⁻¹ of each column, in place.
+    pub fn whiten(&self, columns: &mut DMatrix<f64>) {
         let n = self.readings.max(1);
         for column in columns.as_mut_slice().chunks_mut(n) {
             for (trace, whitening) in self.traces.iter().zip(&self.whitening) {
@@ -234,7 +231,7 @@ impl Space {
 
     /// EᵀPE of sparse signatures without ever making P L⁻¹E: the cost is that of the traces in
     /// which a signature is.
-    pub fn gram(&self, columns: &[Column], shift: f64) -> Gram {
+    pub fn gram(&self, columns: &[Column]) -> Gram {
         let parts: Vec<Part> = columns.iter().map(|c| self.part(c)).collect();
         let gram = DMatrix::from_fn(parts.len(), parts.len(), |i, j| {
             if j < i {
@@ -243,15 +240,8 @@ impl Space {
                 parts[i].product(&parts[j], self)
             }
         });
-        let shift_share = match parts.first() {
-            Some(part) if shift > 0.0 && gram[(0, 0)] > 0.0 => {
-                (shift * self.shift_square(part) / gram[(0, 0)]).clamp(0.0, 1.0)
-            }
-            _ => 0.0,
-        };
         Gram {
             whole: parts.iter().map(|p| p.square).sum(),
-            shift_share,
             matrix: DMatrix::from_fn(parts.len(), parts.len(), |i, j| gram[(i.min(j), i.max(j))]),
         }
     }
@@ -333,34 +323,6 @@ impl Space {
             whitened,
         }
     }
-
-    /// Σ (1ᵀL⁻ᵀ · P L⁻¹E)² over the traces: what their shifts see of a signature.
-    fn shift_square(&self, part: &Part) -> f64 {
-        let mut seen = vec![0.0; self.traces.len()];
-        for &t in &part.touched {
-            let trace = &self.traces[t];
-            seen[t] += self.ones[t].dot(&part.whitened.rows(trace.start, trace.len()));
-        }
-        for (t, (trace, ones)) in self.traces.iter().zip(&self.ones).enumerate() {
-            if let Some(patterns) = &self.patterns {
-                for (k, sum) in part.sums.column_iter().enumerate() {
-                    if patterns[(t, k)] != 0.0 {
-                        seen[t] -= patterns[(t, k)] * ones.dot(&sum);
-                    }
-                }
-            }
-            let rows = |basis: &DMatrix<f64>, k: usize| {
-                ones.dot(&basis.column(k).rows(trace.start, trace.len()))
-            };
-            for (k, value) in part.returned.iter().enumerate() {
-                seen[t] += value * rows(&self.returned, k);
-            }
-            for (k, value) in part.absorbed.iter().enumerate() {
-                seen[t] -= value * rows(&self.absorbed, k);
-            }
-        }
-        seen.iter().map(|s| s * s).sum()
-    }
 }
 
 /// EᵀPE of a signature and what goes with it.
@@ -369,8 +331,6 @@ pub(super) struct Gram {
     pub matrix: DMatrix<f64>,
     /// Σ |L⁻¹E|².
     pub whole: f64,
-    /// The part of the score's variance that the shifts of traces make up.
-    pub shift_share: f64,
 }
 
 /// A whitened column and what the fit absorbs of it.

@@ -107,11 +107,6 @@ impl Whitening {
             }
         }
     }
-
-    /// L⁻¹ 1.
-    pub fn ones(&self) -> DVector<f64> {
-        &self.unit * (1.0 - self.pull * self.unit.norm_squared())
-    }
 }
 
 #[cfg(test)]

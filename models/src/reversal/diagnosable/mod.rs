@@ -16,7 +16,7 @@ use thiserror::Error;
 
 use super::smooth_profile::{SmoothProfile, Smoother};
 use super::{Channel, Convention, Observations};
-use crate::model::{FittedModel, Place};
+use crate::model::{Column, FittedModel, Place};
 use sorting::Sorted;
 
 /// What the set-up says of the measurement.
@@ -74,6 +74,8 @@ pub struct FirstOrder {
     m: SmoothProfile,
     s_a: SmoothProfile,
     s_b: SmoothProfile,
+    /// The smooth reading of every cell.
+    smooth: Vec<f64>,
     present: Vec<Channel>,
     span: f64,
     reach: f64,
@@ -137,6 +139,7 @@ impl FirstOrder {
             m: nothing.clone(),
             s_a: nothing.clone(),
             s_b: nothing,
+            smooth: Vec::new(),
             present,
             timed: sorted.timed,
             left_out: sorted.left_out,
@@ -206,6 +209,9 @@ impl FirstOrder {
             self.smoother.smooth_repeated(&raw[k], &own)
         };
         (self.m, self.s_a, self.s_b) = (smooth(0), smooth(1), smooth(2));
+        self.smooth = (0..n * self.present.len())
+            .map(|cell| self.smooth_at(self.present[cell / n], cell % n))
+            .collect();
         self.span = self.find_span();
         self.reach = self
             .places
@@ -246,10 +252,22 @@ impl FirstOrder {
 
     /// The smooth reading at a place, µm.
     pub fn smooth_reading(&self, place: &Place) -> f64 {
-        let (channel, k) = (self.channel(place), self.at(place));
+        self.smooth[place.channel * self.positions.len() + self.at(place)]
+    }
+
+    /// A function of the smooth reading, at every place.
+    pub(super) fn of_reading(&self, value: impl Fn(f64) -> f64) -> Column {
+        let values: Vec<f64> = self.smooth.iter().map(|reading| value(*reading)).collect();
+        let n = self.positions.len();
+        Column::from_places(&self.places, |_, place| {
+            values[place.channel * n + self.at(place)]
+        })
+    }
+
+    fn smooth_at(&self, channel: Channel, k: usize) -> f64 {
         let line = &self.lines[channel.index()];
         line.offset
-            + line.slope * place.x
+            + line.slope * self.positions[k]
             + channel.indicator_sign() * self.m.values[k]
             + self.side(channel).values[k]
     }

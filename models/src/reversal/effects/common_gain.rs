@@ -28,6 +28,10 @@ impl Effect<FirstOrder> for CommonGain {
         }]
     }
 
+    fn absorbed(&self) -> bool {
+        true
+    }
+
     fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
         vec![Column::from_places(model.places(), |_, place| {
             model.smooth_reading(place) - model.mid_reading(place)

@@ -65,17 +65,24 @@ impl Effect<FirstOrder> for CyclicError {
         };
         let turn = std::f64::consts::TAU * cycles;
         let first = model.positions().first().copied().unwrap_or(0.0);
-        let wave = |function: fn(f64) -> f64| {
+        let of_travel = |function: fn(f64) -> f64| {
+            let values: Vec<f64> = model
+                .positions()
+                .iter()
+                .map(|x| function(turn * (x - first) / model.travel()))
+                .collect();
+            // In one spindle position only; the fit spreads it over both.
             Column::from_places(model.places(), |_, place| {
-                if shape.variant == 0 {
-                    let reading = model.smooth_reading(place);
-                    function(turn * reading / model.reading_span())
-                } else {
-                    // In one spindle position only; the fit spreads it over both.
-                    let seen = model.channel(place).spindle_sign() > 0.0;
-                    f64::from(seen) * function(turn * (place.x - first) / model.travel())
-                }
+                let seen = model.channel(place).spindle_sign() > 0.0;
+                f64::from(seen) * values[place.cell % values.len()]
             })
+        };
+        let wave = |function: fn(f64) -> f64| {
+            if shape.variant == 0 {
+                model.of_reading(|reading| function(turn * reading / model.reading_span()))
+            } else {
+                of_travel(function)
+            }
         };
         vec![wave(f64::cos), wave(f64::sin)]
     }

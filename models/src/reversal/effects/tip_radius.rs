@@ -28,6 +28,10 @@ impl Effect<FirstOrder> for TipRadius {
         }]
     }
 
+    fn absorbed(&self) -> bool {
+        true
+    }
+
     fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
         vec![Column::from_places(model.places(), |_, place| {
             let slope = model.side_slope(place) * 1e-3;

@@ -1,0 +1,90 @@
+//! What the noise of the fitted state does to the signatures of causes.
+//!
+//! A signature is taken at a fitted state, and the state has noise of its own: the true change of
+//! the readings is that at the true state, so the remainder beside the right cause holds the
+//! difference. Its covariance is found by drawing: noise is laid over the readings that are free
+//! of the causes, the model fitted again, and the causes' change taken there. With B Bᵀ that
+//! covariance in whitened, projected readings, the remainder has I + B Bᵀ in place of I; along
+//! each eigenvector of B Bᵀ with eigenvalue λ a part λ/(1 + λ) of every product is taken away.
+
+use errsep_models::model::FittedModel;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::bench::{Bench, Cause};
+
+/// Draws of the state.
+const DRAWS: usize = 128;
+/// Eigenvalues below this change no product by more than three hundredths.
+const LEAST: f64 = 0.03;
+/// Greatest number of directions.
+const MOST: usize = 80;
+/// Seed of the draws: a verdict must not depend on how often it is asked for.
+const SEED: u64 = 0x0064_6f75_6274;
+
+/// Directions that are not fully trusted.
+#[derive(Default)]
+pub(super) struct Doubt {
+    /// Orthonormal directions.
+    pub directions: Vec<DVector<f64>>,
+    /// The part of each that is taken away.
+    pub weights: Vec<f64>,
+}
+
+impl<M: FittedModel> Bench<'_, M> {
+    /// The doubt about causes beside what the model and they themselves absorb (`basis`).
+    pub fn doubt(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+        basis: &DMatrix<f64>,
+    ) -> Doubt {
+        let Some((clean, amplitudes)) = self.clean(readings, causes) else {
+            return Doubt::default();
+        };
+        let change_at = |state: &M| {
+            let mut change = DVector::zeros(readings.len());
+            let mut at = 0;
+            for cause in causes {
+                for column in self.catalogue[cause.effect].columns(state, &cause.shape) {
+                    for (&row, value) in column.rows.iter().zip(&column.values) {
+                        change[row] += amplitudes[at] * value;
+                    }
+                    at += 1;
+                }
+            }
+            change
+        };
+        let base = change_at(&self.model.refit(clean.clone()));
+        let drawn = |draw: u64| {
+            let mut random = ChaCha8Rng::seed_from_u64(SEED);
+            random.set_stream(draw);
+            let noisy = &clean + self.law.draw(self.model, &mut random);
+            change_at(&self.model.refit(noisy)) - &base
+        };
+        let first = drawn(0);
+        if first.norm() <= 1e-9 * base.norm() {
+            return Doubt::default();
+        }
+        let moved: Vec<DVector<f64>> = (0..DRAWS as u64).into_par_iter().map(drawn).collect();
+        let (mut moved, _) = self.space.forward(DMatrix::from_columns(&moved));
+        let along = basis.tr_mul(&moved);
+        moved.gemm(-1.0, basis, &along, 1.0);
+        let eigen = SymmetricEigen::new(moved.tr_mul(&moved) / DRAWS as f64);
+        let mut order: Vec<usize> = (0..DRAWS)
+            .filter(|k| eigen.eigenvalues[*k] > LEAST)
+            .collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        order.truncate(MOST);
+        let mut doubt = Doubt::default();
+        for k in order {
+            let value = eigen.eigenvalues[k];
+            let direction = &moved * eigen.eigenvectors.column(k);
+            doubt.directions.push(direction / (value * DRAWS as f64).sqrt());
+            doubt.weights.push(value / (1.0 + value));
+        }
+        doubt
+    }
+}

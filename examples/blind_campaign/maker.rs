@@ -153,6 +153,13 @@ fn sized(scene: &Scene, name: &str, target: f64, random: &mut ChaCha8Rng) -> Opt
         Injection::AxisBacklash(lost) => lost < 2.0,
         Injection::ReversalShift(shift) => shift < 3.0,
         Injection::GainMismatch(gain) => gain < 0.2,
+        // An indicator that goes back while its stylus moves on is broken, not periodic.
+        Injection::CyclicError {
+            amplitude,
+            period,
+            of_reading: true,
+            ..
+        } => std::f64::consts::TAU * amplitude < 0.9 * period,
         _ => true,
     };
     (plausible && (left / target - 1.0).abs() < 0.1).then_some(injection)

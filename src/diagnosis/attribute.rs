@@ -63,7 +63,9 @@ pub(super) fn attribute<M: FittedModel>(
     });
     pairs(bench, readings, first)
         .into_iter()
-        .filter(|causes| bench.misfit(readings, &bench.relinearised(readings, causes, least)) < least)
+        .filter(|causes| {
+            bench.misfit(readings, &bench.relinearised(readings, causes, least)) < least
+        })
         .map(|causes| confidence_set(bench, readings, &causes))
         .find(|answer| answer.complete)
         .or(partial)
@@ -253,7 +255,7 @@ fn confidence_set<M: FittedModel>(
     }
     let needed = best.len() == 1
         || (0..best.len()).all(|k| {
-            let beside = bench.judged(readings, &without(&best, k));
+            let beside = bench.remainder(readings, &without(&best, k));
             bench.p_value(&beside, best[k].effect) < EARNED
         }) && predicts(bench, readings, &best);
     Answer {

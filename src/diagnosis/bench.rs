@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::dictionary::{Dictionary, Entry, Meaning, Places, products, statistic, surprise};
-use super::folding::Sums;
 use super::doubt::Doubt;
+use super::folding::Sums;
 use super::mixing::Mixing;
 use super::noise::NoiseLaw;
 use super::null::NullLaw;
@@ -26,10 +26,10 @@ const AT_REST: f64 = 1e-4;
 pub(super) const ADEQUATE: f64 = 0.002;
 
 /// Standard deviations of chi-squared beyond which no doubt about the state excuses a remainder.
-const FAR: f64 = 25.0;
+const FAR: f64 = 6.0;
 
 /// Most rounds of fitting the state without the causes.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 16;
 
 /// Everything that is fixed while causes are sought.
 pub(super) struct Bench<'a, M: FittedModel> {
@@ -71,7 +71,14 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         let places = Arc::new(Places::new(model));
         let space = Space::new(model, &law);
         let dictionary = Dictionary::new(model, catalogue, places, &space);
-        let null = Arc::new(NullLaw::simulate(model, &dictionary, &space, &law, draws, seed));
+        let null = Arc::new(NullLaw::simulate(
+            model,
+            &dictionary,
+            &space,
+            &law,
+            draws,
+            seed,
+        ));
         Self {
             model,
             catalogue,
@@ -130,6 +137,9 @@ impl<'a, M: FittedModel> Bench<'a, M> {
     ) -> Vec<Cause> {
         let mut best = (f64::INFINITY, causes.to_vec());
         let mut causes = causes.to_vec();
+        for cause in &mut causes {
+            cause.shape = finer(&cause.shape);
+        }
         let Some(mut changes) = self.changes(readings, &causes) else {
             return causes;
         };
@@ -139,8 +149,8 @@ impl<'a, M: FittedModel> Bench<'a, M> {
             for k in 0..causes.len() {
                 let mut others = causes.clone();
                 let own = others.remove(k);
-                let start = finer(&own.shape);
-                causes[k] = self.refine(&state, readings, own.effect, &start, &others).0;
+                let refined = self.refine(&state, readings, own.effect, &own.shape, &others);
+                causes[k] = refined.0;
             }
             let misfit = self.misfit(readings, &causes);
             let gained = best.0 - misfit;
@@ -167,9 +177,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         let mut changes = DMatrix::zeros(self.space.readings(), causes.len());
         let mut at = 0;
         for (k, cause) in causes.iter().enumerate() {
-            let own = amplitudes
-                .rows(at, cause.columns.len())
-                .clone_owned();
+            let own = amplitudes.rows(at, cause.columns.len()).clone_owned();
             at += cause.columns.len();
             changes.set_column(k, &self.change(std::slice::from_ref(cause), &own));
         }

@@ -150,13 +150,7 @@ impl Dictionary {
                 .map(|shape| {
                     let columns = effect.columns(model, &shape);
                     let folded = columns.iter().map(|c| folding.fold(c)).collect();
-                    entry(
-                        Meaning::Effect(shape),
-                        &columns,
-                        folded,
-                        positive,
-                        space,
-                    )
+                    entry(Meaning::Effect(shape), &columns, folded, positive, space)
                 })
                 .collect();
             dictionary.add(effect.name(), true, !effect.absorbed(), built);

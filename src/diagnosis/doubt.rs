@@ -35,12 +35,7 @@ pub(super) struct Doubt {
 
 impl<M: FittedModel> Bench<'_, M> {
     /// The doubt about causes beside what the model and they themselves absorb (`basis`).
-    pub fn doubt(
-        &self,
-        readings: &DVector<f64>,
-        causes: &[Cause],
-        basis: &DMatrix<f64>,
-    ) -> Doubt {
+    pub fn doubt(&self, readings: &DVector<f64>, causes: &[Cause], basis: &DMatrix<f64>) -> Doubt {
         let Some((clean, amplitudes)) = self.clean(readings, causes) else {
             return Doubt::default();
         };
@@ -82,7 +77,9 @@ impl<M: FittedModel> Bench<'_, M> {
         for k in order {
             let value = eigen.eigenvalues[k];
             let direction = &moved * eigen.eigenvectors.column(k);
-            doubt.directions.push(direction / (value * DRAWS as f64).sqrt());
+            doubt
+                .directions
+                .push(direction / (value * DRAWS as f64).sqrt());
             doubt.weights.push(value / (1.0 + value));
         }
         doubt

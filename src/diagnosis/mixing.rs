@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 /// Number of earlier steps that are combined.
-const DEPTH: usize = 3;
+const DEPTH: usize = 5;
 /// Part of the greatest squared step below which a combination is rounding.
 const DEPENDENT: f64 = 1e-8;
 

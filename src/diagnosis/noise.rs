@@ -81,8 +81,7 @@ impl Components {
         for (k, value) in noise.iter_mut().enumerate() {
             if k > 0 {
                 let decay = (-(positions[k] - positions[k - 1]).abs() / self.length).exp();
-                state =
-                    decay * state + (self.correlated * (1.0 - decay * decay)).sqrt() * normal();
+                state = decay * state + (self.correlated * (1.0 - decay * decay)).sqrt() * normal();
             }
             *value = shift + state + white * normal();
         }
@@ -127,8 +126,11 @@ impl NoiseLaw {
         let count = laws.len().max(1) as f64;
         let mean = |value: fn(&Components) -> f64| laws.iter().map(value).sum::<f64>() / count;
         let whole = mean(Components::whole);
-        let variance =
-            laws.iter().map(|l| (l.whole() - whole).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        let variance = laws
+            .iter()
+            .map(|l| (l.whole() - whole).powi(2))
+            .sum::<f64>()
+            / (count - 1.0).max(1.0);
         let correlated = mean(|l| l.correlated);
         let length = if correlated > 0.0 {
             (mean(|l| l.correlated * l.length.ln()) / correlated).exp()
@@ -157,11 +159,7 @@ impl NoiseLaw {
     }
 
     /// Noise of all readings of a model.
-    pub(super) fn draw<M: FittedModel>(
-        &self,
-        model: &M,
-        random: &mut ChaCha8Rng,
-    ) -> DVector<f64> {
+    pub(super) fn draw<M: FittedModel>(&self, model: &M, random: &mut ChaCha8Rng) -> DVector<f64> {
         self.components().draw_all(model, random)
     }
 

@@ -193,8 +193,7 @@ fn proposed(
             let step = &spread * &z;
             let point: Vec<f64> = mode.iter().zip(step.iter()).map(|(m, s)| m + s).collect();
             let (value, quadratic) = judged(&point);
-            let density =
-                norm - 0.5 * (TAILS + dimension) * (z.norm_squared() / TAILS).ln_1p();
+            let density = norm - 0.5 * (TAILS + dimension) * (z.norm_squared() / TAILS).ln_1p();
             value.is_finite().then(|| Proposal {
                 ratios: kind.ratios(&point),
                 quadratic,
@@ -258,9 +257,9 @@ fn spread(mode: &[f64], value: impl Fn(&[f64]) -> f64) -> Option<DMatrix<f64>> {
         }
         .max(0.05);
         for j in 0..i {
-            let cross = at(&[(i, 1.0), (j, 1.0)]) - at(&[(i, 1.0), (j, -1.0)])
-                - at(&[(i, -1.0), (j, 1.0)])
-                + at(&[(i, -1.0), (j, -1.0)]);
+            let cross =
+                at(&[(i, 1.0), (j, 1.0)]) - at(&[(i, 1.0), (j, -1.0)]) - at(&[(i, -1.0), (j, 1.0)])
+                    + at(&[(i, -1.0), (j, -1.0)]);
             if cross.is_finite() {
                 curvature[(i, j)] = 0.25 * cross;
                 curvature[(j, i)] = 0.25 * cross;

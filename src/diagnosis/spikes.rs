@@ -79,10 +79,8 @@ pub(super) fn pulled_in<M: FittedModel>(model: &M, readings: &DVector<f64>) -> C
                 .collect();
             let over = |k: usize, reach: usize| {
                 let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(length));
-                let mut others: Vec<f64> = (from..to)
-                    .filter(|j| *j != k)
-                    .map(|j| away[j].0)
-                    .collect();
+                let mut others: Vec<f64> =
+                    (from..to).filter(|j| *j != k).map(|j| away[j].0).collect();
                 away[k].0 - median(&mut others)
             };
             heights.extend((0..length).map(|k| Height {

@@ -114,9 +114,13 @@ fn jobs(set: &str, cases: u64, seed: u64, only: &str) -> Vec<Job> {
             .collect(),
         _ => SHOWN.iter().map(|n| vec![*n]).collect(),
     };
-    let wanted = |c: &[&str]| only.is_empty() || c.iter().any(|n| only.split(',').any(|o| o == *n));
+    let wanted = |c: &[&str]| {
+        set == "null" || only.is_empty() || c.iter().any(|n| only.split(',').any(|o| o == *n))
+    };
     let laws: &[Noise] = match set {
-        "null" => &[Noise::White, Noise::Correlated, Noise::Tails],
+        "null" if only.is_empty() => &[Noise::White, Noise::Correlated, Noise::Tails],
+        "null" if only == Noise::Correlated.name() => &[Noise::Correlated],
+        "null" if only == Noise::Tails.name() => &[Noise::Tails],
         _ => &[Noise::White],
     };
     let mut jobs = Vec::new();
@@ -163,7 +167,6 @@ fn solve(observations: &Observations, without: &[&str], seed: u64) -> Option<Dia
     let model = FirstOrder::new(observations, Assumptions::default()).ok()?;
     let options = Options {
         seed,
-        draws: 400,
         without: without.iter().map(|s| (*s).to_owned()).collect(),
         ..Options::default()
     };

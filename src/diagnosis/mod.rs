@@ -41,7 +41,7 @@ pub use formula::{Circumstances, Formula};
 pub use geometry::{Diagnosability, certificate};
 pub use noise::{NoiseLaw, NoiseSource};
 pub use prove::{Trials, prove};
-use spikes::pulled_in;
+use spikes::Spikes;
 pub use statement::for_people;
 pub use tabulated::{Tabulated, TabulatedEffects};
 pub use verdict::{
@@ -89,20 +89,19 @@ pub fn diagnose_with<M: FittedModel>(
         .filter(|effect| !options.without.iter().any(|name| name == effect.name()))
         .collect();
     let readings = model.linearised();
-    let calm = (!model.names_single_readings()).then(|| pulled_in(model, &readings));
+    let calm = Spikes::new(model).calmed(model, &readings);
     let calmed;
-    let (model, readings) = match &calm {
-        Some(calm) if calm.count > 0 => {
-            calmed = model.refit(model.observed() + (&calm.readings - &readings));
-            let readings = calmed.linearised();
-            (&calmed, readings)
-        }
-        _ => (model, readings),
+    let (model, readings) = if calm.count > 0 {
+        calmed = model.refit(model.observed() + (&calm.readings - &readings));
+        let readings = calmed.linearised();
+        (&calmed, readings)
+    } else {
+        (model, readings)
     };
-    let law = noise_of(model, &readings);
+    let law = noise_of(model, &readings).with_tails(calm.tails);
     let bench = Bench::new(model, &catalogue, law, options.draws, options.seed);
     examined(&bench, &readings, options.false_alarm, |examined| {
-        report::compose(&examined, calm.as_ref(), options)
+        report::compose(&examined, &calm, options)
     })
 }
 

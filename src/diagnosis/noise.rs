@@ -11,11 +11,12 @@ use std::sync::Arc;
 use errsep_models::model::FittedModel;
 use nalgebra::{DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{ChiSquared, Distribution, StandardNormal};
+use rand_distr::{ChiSquared, Distribution, StandardNormal, StudentT};
 
 use super::contrasts::Contrasts;
 use super::posterior::possible_laws;
 use super::space::Space;
+use super::spikes::{Spikes, Tails};
 
 /// Seed of the laws drawn from the repeats: an estimate must not depend on the user's seed.
 const SEED: u64 = 0x6c61_7773;
@@ -105,6 +106,8 @@ pub struct NoiseLaw {
     pub source: NoiseSource,
     /// Laws drawn from what the repeats allow; empty where only the white variance is in doubt.
     possible: Arc<Vec<Components>>,
+    /// Heavy tails of the single readings.
+    tails: Option<Tails>,
 }
 
 impl NoiseLaw {
@@ -118,6 +121,7 @@ impl NoiseLaw {
             freedom,
             source,
             possible: Arc::new(Vec::new()),
+            tails: None,
         }
     }
 
@@ -145,7 +149,14 @@ impl NoiseLaw {
             freedom: (2.0 * whole * whole / variance.max(f64::MIN_POSITIVE)).clamp(1.0, 1e9),
             source: NoiseSource::Repeats,
             possible: Arc::new(laws),
+            tails: None,
         }
+    }
+
+    /// The law with heavy tails of the single readings.
+    pub(super) fn with_tails(mut self, tails: Option<Tails>) -> Self {
+        self.tails = tails;
+        self
     }
 
     /// The parts.
@@ -163,11 +174,36 @@ impl NoiseLaw {
         self.components().draw_all(model, random)
     }
 
-    /// A law that the readings allow, for a draw of the null law.
-    pub(super) fn possible(&self, draw: usize, random: &mut ChaCha8Rng) -> Components {
-        if let Some(law) = self.possible.get(draw % self.possible.len().max(1)) {
-            return *law;
+    /// Noise of all readings for a draw of the null law: by a law that the readings allow, with
+    /// the tails of the readings, its spikes pulled in.
+    pub(super) fn draw_possible<M: FittedModel>(
+        &self,
+        model: &M,
+        spikes: &Spikes,
+        draw: usize,
+        random: &mut ChaCha8Rng,
+    ) -> DVector<f64> {
+        let law = match self.possible.get(draw % self.possible.len().max(1)) {
+            Some(law) => *law,
+            None => self.rescaled(random),
+        };
+        let Some((tails, student)) = self
+            .tails
+            .and_then(|t| Some((t, StudentT::new(t.freedom).ok()?)))
+        else {
+            return law.draw_all(model, random);
+        };
+        let scale = (law.white / tails.variance).sqrt();
+        let mut noise = Components { white: 0.0, ..law }.draw_all(model, random);
+        for value in noise.iter_mut() {
+            *value += scale * student.sample(random);
         }
+        spikes.pull_in(&mut noise);
+        noise
+    }
+
+    /// The white variance drawn from what its degrees of freedom allow.
+    fn rescaled(&self, random: &mut ChaCha8Rng) -> Components {
         let mut law = self.components();
         if let (true, Ok(chi)) = (self.freedom < 1e6, ChiSquared::new(self.freedom)) {
             law.white *= self.freedom / chi.sample(random);

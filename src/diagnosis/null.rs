@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use super::dictionary::{Dictionary, inverse, surprise};
 use super::noise::NoiseLaw;
 use super::space::Space;
+use super::spikes::Spikes;
 
 /// Draws handled at once.
 const BATCH: usize = 64;
@@ -71,12 +72,15 @@ impl NullLaw {
         draws: usize,
         seed: u64,
     ) -> Self {
+        let spikes = Spikes::new(model);
         let batches = draws.div_ceil(BATCH);
         let all: Vec<Vec<Vec<f64>>> = (0..batches)
             .into_par_iter()
-            .map(|batch| greatest(model, dictionary, space, law, seed, batch))
+            .map(|batch| greatest(model, dictionary, space, (law, &spikes), seed, batch))
             .collect();
-        let rows: Vec<Vec<f64>> = all.into_iter().flatten().collect();
+        let mut rows: Vec<Vec<f64>> = all.into_iter().flatten().collect();
+        // Two samples: tails judged by the draws that made them would look better than they are.
+        let others = rows.split_off(rows.len() / 2);
         let families: Vec<Tail> = (0..dictionary.families.len())
             .map(|family| Tail::new(rows.iter().map(|row| row[family]).collect()))
             .collect();
@@ -84,7 +88,7 @@ impl NullLaw {
             families,
             smallest: Tail::new(vec![0.0]),
         };
-        let smallest = rows
+        let smallest = others
             .iter()
             .map(|row| -2.0 * null.smallest_of(row).ln())
             .collect();
@@ -148,7 +152,7 @@ fn greatest<M: FittedModel>(
     model: &M,
     dictionary: &Dictionary,
     space: &Space,
-    law: &NoiseLaw,
+    (law, spikes): (&NoiseLaw, &Spikes),
     seed: u64,
     batch: usize,
 ) -> Vec<Vec<f64>> {
@@ -156,8 +160,7 @@ fn greatest<M: FittedModel>(
     random.set_stream(batch as u64 + 1);
     let mut draws = DMatrix::zeros(space.readings(), BATCH);
     for (k, mut column) in draws.column_iter_mut().enumerate() {
-        let law = law.possible(batch * BATCH + k, &mut random);
-        column.copy_from(&law.draw_all(model, &mut random));
+        column.copy_from(&law.draw_possible(model, spikes, batch * BATCH + k, &mut random));
     }
     space.whiten(&mut draws);
     let adjoint = dictionary.places.batch_sums::<BATCH>(&space.adjoint(draws));

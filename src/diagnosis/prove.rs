@@ -18,6 +18,7 @@ use serde::Serialize;
 use super::bench::Bench;
 use super::noise::{NoiseLaw, NoiseSource};
 use super::space::Space;
+use super::spikes::Spikes;
 use super::{Examined, Options, examined, noise_of};
 
 /// Effects of which less than this part is visible are not put in.
@@ -47,10 +48,12 @@ pub fn prove<M: FittedModel>(
     trials: usize,
 ) -> Trials {
     let readings = model.linearised();
+    let spikes = Spikes::new(model);
+    let tails = spikes.calmed(model, &readings).tails;
     let bench = Bench::new(
         model,
         catalogue,
-        noise_of(model, &readings),
+        noise_of(model, &readings).with_tails(tails),
         options.draws,
         options.seed,
     );
@@ -81,6 +84,7 @@ pub fn prove<M: FittedModel>(
                     catalogue[effect].name().clone_into(&mut truth);
                 }
             }
+            spikes.pull_in(&mut sealed);
             (truth, answer(&bench, &sealed, options))
         })
         .collect();

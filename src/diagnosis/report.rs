@@ -18,7 +18,7 @@ use crate::report::number::plain;
 
 pub(super) fn compose<M: FittedModel>(
     examined: &Examined<'_, M>,
-    calm: Option<&Calmed>,
+    calm: &Calmed,
     options: &Options,
 ) -> Diagnosis {
     let Examined {
@@ -130,15 +130,18 @@ pub(super) fn compose<M: FittedModel>(
     }
 }
 
-fn notes<M: FittedModel>(
-    bench: &Bench<'_, M>,
-    clean: &DVector<f64>,
-    calm: Option<&Calmed>,
-) -> Vec<String> {
+fn notes<M: FittedModel>(bench: &Bench<'_, M>, clean: &DVector<f64>, calm: &Calmed) -> Vec<String> {
     let mut notes = Vec::new();
-    if let Some(Calmed { count, edge, .. }) = calm.filter(|c| c.count > 0) {
+    if calm.count > 0 {
         notes.push(format!(
-            "{count} single readings stand out of their neighbours and of their own repeats by more than {edge} standard deviations; they are pulled in to {edge}."
+            "{} single readings stand out of their neighbours and of their own repeats by more than four standard deviations; they are pulled in to four.",
+            calm.count
+        ));
+    }
+    if let Some(tails) = calm.tails {
+        notes.push(format!(
+            "The noise has heavier tails than the normal law: single readings follow Student's law with about {} degrees of freedom. All probabilities are computed with that.",
+            plain(tails.freedom, 2)
         ));
     }
     notes.extend(disagreement(bench, clean));

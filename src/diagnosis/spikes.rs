@@ -3,119 +3,240 @@
 //! One such reading carries more weight than a hundred others, swells the noise and passes for dirt.
 //! It is pulled in to the edge of what noise does (Huber's winsorising) before anything is tested,
 //! so that noise, tests and sizes all see the same readings. Where such readings are too many for
-//! normal noise with a few accidents, the noise itself has heavy tails: then the edge is nearer.
+//! normal noise with a few accidents, the noise itself has heavy tails: then the null law is drawn
+//! with Student's law of as many degrees of freedom as make the same tails, pulled in likewise.
 
 use std::collections::BTreeMap;
 
 use errsep_models::model::FittedModel;
 use nalgebra::DVector;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StudentT};
+
+use super::contrasts::Contrasts;
 
 /// Standard deviations to which a reading is pulled in.
 const EDGE: f64 = 4.0;
-/// The same where the noise has heavy tails.
-const NEAR_EDGE: f64 = 2.0;
 /// Part of the readings beyond three standard deviations (normal noise: 0.003) that makes tails heavy.
 const HEAVY: f64 = 0.01;
 /// Repeats without which a spike cannot be told from a form.
 const REPEATS: usize = 3;
 /// A spike has no neighbours: it keeps this part of its height over the nearer ones.
 const ALONE: f64 = 0.6;
+/// Degrees of freedom among which the tails are sought.
+const FREEDOMS: [f64; 10] = [2.1, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0];
+/// Seed of the noise with which tails are compared.
+const SEED: u64 = 0x7461_696c;
+
+/// Student's law of the noise of single readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tails {
+    /// Degrees of freedom.
+    pub freedom: f64,
+    /// Variance that is left of noise of unit scale when its spikes are pulled in.
+    pub variance: f64,
+}
+
+/// Where spikes are looked for: traces on the same cells in the same direction.
+pub(super) struct Spikes {
+    groups: Vec<Group>,
+}
+
+struct Group {
+    starts: Vec<usize>,
+    length: usize,
+}
 
 /// Readings with single spikes pulled in.
 pub(super) struct Calmed {
     pub readings: DVector<f64>,
     /// Number of readings that were pulled in.
     pub count: usize,
-    /// Standard deviations beyond which they were.
-    pub edge: f64,
+    /// The law of the single readings where it has heavy tails.
+    pub tails: Option<Tails>,
 }
 
-/// How far a reading is from its other repeats, over its neighbours.
-struct Height {
-    row: usize,
-    /// Over the two neighbours on either side.
-    near: f64,
-    /// Over the seven.
-    far: f64,
-    /// Whether no other repeat stands farther from what is usual there.
-    farthest: bool,
+/// What tells how heavy tails are: the part of the readings beyond three standard deviations, and
+/// the 99th percentile of their heights over the median.
+struct Weight {
+    beyond: f64,
+    ratio: f64,
 }
 
-impl Height {
-    fn stands_out(&self, edge: f64) -> bool {
-        self.farthest && self.near.abs() > edge && self.near.abs() > ALONE * self.far.abs()
-    }
-}
-
-/// Pulls single spikes in.
-///
-/// The deviation of a reading from the median of its other repeats holds no form; less the median of
-/// its four neighbours it holds no step, no drift and nothing wider than a reading or two; a bump,
-/// of which the nearer neighbours have their part, is not alone.
-pub(super) fn pulled_in<M: FittedModel>(model: &M, readings: &DVector<f64>) -> Calmed {
-    let mut groups: BTreeMap<(Vec<usize>, bool), Vec<usize>> = BTreeMap::new();
-    for (t, trace) in model.traces().iter().enumerate() {
-        let places = &model.places()[trace.clone()];
-        let cells = places.iter().map(|p| p.cell).collect();
-        let backward = places.first().is_some_and(|p| p.direction < 0.0);
-        groups.entry((cells, backward)).or_default().push(t);
-    }
-    let mut heights: Vec<Height> = Vec::new();
-    for group in groups.values().filter(|g| g.len() >= REPEATS) {
-        let starts: Vec<usize> = group.iter().map(|t| model.traces()[*t].start).collect();
-        let length = model.traces()[group[0]].len();
-        for (own, start) in starts.iter().enumerate() {
-            // Less the others' median; and whether no other repeat is farther from all their median.
-            let away: Vec<(f64, bool)> = (0..length)
-                .map(|k| {
-                    let all: Vec<f64> = starts.iter().map(|s| readings[s + k]).collect();
-                    let mut others = all.clone();
-                    others.remove(own);
-                    let usual = median(&mut all.clone());
-                    let distance = |value: &f64| (value - usual).abs();
-                    let farthest = all.iter().all(|v| distance(v) <= distance(&all[own]));
-                    (all[own] - median(&mut others), farthest)
+impl Spikes {
+    pub fn new<M: FittedModel>(model: &M) -> Self {
+        let mut groups: BTreeMap<(Vec<usize>, bool), Group> = BTreeMap::new();
+        if model.names_single_readings() {
+            return Self { groups: Vec::new() };
+        }
+        for trace in model.traces() {
+            let places = &model.places()[trace.clone()];
+            let cells = places.iter().map(|p| p.cell).collect();
+            let backward = places.first().is_some_and(|p| p.direction < 0.0);
+            groups
+                .entry((cells, backward))
+                .or_insert_with(|| Group {
+                    starts: Vec::new(),
+                    length: trace.len(),
                 })
-                .collect();
-            let over = |k: usize, reach: usize| {
-                let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(length));
-                let mut others: Vec<f64> =
-                    (from..to).filter(|j| *j != k).map(|j| away[j].0).collect();
-                away[k].0 - median(&mut others)
-            };
-            heights.extend((0..length).map(|k| Height {
-                row: start + k,
-                near: over(k, 2),
-                far: over(k, 7),
-                farthest: away[k].1,
-            }));
+                .starts
+                .push(trace.start);
+        }
+        Self {
+            groups: groups
+                .into_values()
+                .filter(|g| g.starts.len() >= REPEATS)
+                .collect(),
         }
     }
-    let mut calmed = Calmed {
-        readings: readings.clone(),
-        count: 0,
-        edge: EDGE,
-    };
-    if heights.is_empty() {
-        return calmed;
+
+    /// The readings with their spikes pulled in, and the law of heavy tails if they have them.
+    pub fn calmed<M: FittedModel>(&self, model: &M, readings: &DVector<f64>) -> Calmed {
+        let mut calmed = readings.clone();
+        let count = self.pull_in(&mut calmed);
+        let tails = self
+            .weight(readings)
+            .filter(|w| w.beyond > HEAVY)
+            .and_then(|weight| {
+                FREEDOMS
+                    .iter()
+                    .filter_map(|freedom| self.compared(model, *freedom, &weight))
+                    .min_by(|a, b| a.0.total_cmp(&b.0))
+            })
+            .map(|(_, tails)| tails);
+        Calmed {
+            readings: calmed,
+            count,
+            tails,
+        }
     }
-    // 1.4826: the standard deviation of normal numbers over the median of their absolute values.
-    let mut sizes: Vec<f64> = heights.iter().map(|h| h.near.abs()).collect();
-    let sigma = 1.4826 * median(&mut sizes);
-    let beyond = heights.iter().filter(|h| h.stands_out(3.0 * sigma)).count();
-    if beyond as f64 > HEAVY * heights.len() as f64 {
-        calmed.edge = NEAR_EDGE;
+
+    /// How far Student's law is from the tails seen, and what it leaves when pulled in.
+    fn compared<M: FittedModel>(
+        &self,
+        model: &M,
+        freedom: f64,
+        seen: &Weight,
+    ) -> Option<(f64, Tails)> {
+        let law = StudentT::new(freedom).ok()?;
+        let mut random = ChaCha8Rng::seed_from_u64(SEED);
+        let mut noise = DVector::from_fn(model.places().len(), |_, _| law.sample(&mut random));
+        let weight = self.weight(&noise)?;
+        self.pull_in(&mut noise);
+        let (variance, _) = Contrasts::new(model.places(), model.traces(), &noise).scatter();
+        Some((
+            (weight.ratio / seen.ratio).ln().abs(),
+            Tails { freedom, variance },
+        ))
     }
-    let edge = calmed.edge * sigma;
-    for height in heights.iter().filter(|h| h.stands_out(edge)) {
-        calmed.readings[height.row] -= height.near - edge.copysign(height.near);
-        calmed.count += 1;
+
+    fn weight(&self, readings: &DVector<f64>) -> Option<Weight> {
+        let mut sizes: Vec<f64> = Vec::new();
+        for group in &self.groups {
+            for (_, near) in group.heights(readings) {
+                sizes.extend(near.iter().map(|h| h.abs()));
+            }
+        }
+        if sizes.is_empty() {
+            return None;
+        }
+        sizes.sort_by(f64::total_cmp);
+        let n = sizes.len();
+        let middle = sizes[n / 2];
+        let far = sizes.partition_point(|s| *s <= 3.0 * SIGMA * middle);
+        Some(Weight {
+            beyond: (n - far) as f64 / n as f64,
+            ratio: sizes[n * 99 / 100] / middle.max(f64::MIN_POSITIVE),
+        })
     }
-    calmed
+
+    /// Pulls single spikes in, and counts them.
+    ///
+    /// The deviation of a reading from the median of its other repeats holds no form; less the
+    /// median of its four neighbours it holds no step, no drift and nothing wider than a reading or
+    /// two; a bump, of which the nearer neighbours have their part, is not alone.
+    pub fn pull_in(&self, readings: &mut DVector<f64>) -> usize {
+        let mut found: Vec<(&Group, usize, Vec<f64>, Vec<f64>)> = Vec::new();
+        let mut sizes: Vec<f64> = Vec::new();
+        for group in &self.groups {
+            for (own, (away, near)) in group.heights(readings).into_iter().enumerate() {
+                sizes.extend(near.iter().map(|h| h.abs()));
+                found.push((group, own, away, near));
+            }
+        }
+        if sizes.is_empty() {
+            return 0;
+        }
+        let middle = sizes.len() / 2;
+        let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+        let edge = EDGE * SIGMA * *median;
+        let mut pulled = Vec::new();
+        for (group, own, away, near) in found {
+            for (k, height) in near.iter().enumerate() {
+                let spike = || {
+                    let far = away[k] - around(&away, k, 7);
+                    height.abs() > ALONE * far.abs() && group.farthest(readings, own, k)
+                };
+                if height.abs() > edge && spike() {
+                    pulled.push((group.starts[own] + k, height - edge.copysign(*height)));
+                }
+            }
+        }
+        for (row, excess) in &pulled {
+            readings[*row] -= excess;
+        }
+        pulled.len()
+    }
+}
+
+/// The standard deviation of normal numbers over the median of their absolute values.
+const SIGMA: f64 = 1.4826;
+
+impl Group {
+    /// For each trace the deviations from the other repeats, and their heights over the neighbours.
+    fn heights(&self, readings: &DVector<f64>) -> Vec<(Vec<f64>, Vec<f64>)> {
+        let mut others = Vec::with_capacity(self.starts.len());
+        (0..self.starts.len())
+            .map(|own| {
+                let away: Vec<f64> = (0..self.length)
+                    .map(|k| {
+                        others.clear();
+                        let rest = self.starts.iter().enumerate().filter(|(j, _)| *j != own);
+                        others.extend(rest.map(|(_, start)| readings[start + k]));
+                        readings[self.starts[own] + k] - median(&mut others)
+                    })
+                    .collect();
+                let near = (0..self.length)
+                    .map(|k| away[k] - around(&away, k, 2))
+                    .collect();
+                (away, near)
+            })
+            .collect()
+    }
+
+    /// Whether no other repeat is farther from the median of all.
+    fn farthest(&self, readings: &DVector<f64>, own: usize, k: usize) -> bool {
+        let all: Vec<f64> = self.starts.iter().map(|s| readings[s + k]).collect();
+        let usual = median(&mut all.clone());
+        let distance = |value: &f64| (value - usual).abs();
+        all.iter().all(|v| distance(v) <= distance(&all[own]))
+    }
+}
+
+/// The median of the neighbours up to a distance on either side.
+fn around(values: &[f64], k: usize, reach: usize) -> f64 {
+    let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(values.len()));
+    let mut others = [0.0; 14];
+    let left = k - from;
+    let count = left + to - k - 1;
+    others[..left].copy_from_slice(&values[from..k]);
+    others[left..count].copy_from_slice(&values[k + 1..to]);
+    median(&mut others[..count])
 }
 
 fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
+    values.sort_unstable_by(f64::total_cmp);
     let n = values.len();
     if n == 0 {
         0.0

@@ -203,6 +203,31 @@ pub struct About {
     pub source: &'static str,
 }
 
+/// Where in the chain from the machine to the reading an effect acts. Signatures that depend on what
+/// is seen are taken with the changes of the effects that come before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Link {
+    /// It moves what the sensor sees.
+    Stylus,
+    /// It depends on what the sensor sees.
+    Sensor,
+    /// It adds to the reading.
+    Reading,
+    /// It depends on the reading, with all that any other effect has added to it.
+    Pointer,
+}
+
+impl Link {
+    /// Whether an effect here depends on what an effect at another link changes.
+    pub fn sees(self, other: Self) -> bool {
+        match self {
+            Self::Stylus | Self::Reading => false,
+            Self::Sensor => other == Self::Stylus,
+            Self::Pointer => other != Self::Pointer,
+        }
+    }
+}
+
 /// A physical effect that a model leaves out.
 pub trait Effect<M>: Send + Sync {
     /// Name in verdicts, options and files.
@@ -226,6 +251,11 @@ pub trait Effect<M>: Send + Sync {
 
     /// The change of the readings per unit of each amplitude, at the fitted state of the model.
     fn columns(&self, model: &M, shape: &Shape) -> Vec<Column>;
+
+    /// Where in the chain from the machine to the reading it acts.
+    fn link(&self) -> Link {
+        Link::Reading
+    }
 
     /// Whether the model absorbs this effect whatever its size: it is listed as undetectable and
     /// never named, whatever small part of it bent states or missing traces leave visible.
@@ -293,7 +323,7 @@ pub trait Effect<M>: Send + Sync {
 }
 
 /// A model fitted to readings, as the diagnosis sees it.
-pub trait FittedModel: Sized + Send + Sync {
+pub trait FittedModel: Clone + Send + Sync {
     /// Name of the model, for reports.
     fn name(&self) -> &'static str;
 
@@ -365,6 +395,13 @@ pub trait FittedModel: Sized + Send + Sync {
 
     /// The same model fitted to other values of the same readings.
     fn refit(&self, observed: DVector<f64>) -> Self;
+
+    /// The fitted state with a change of what is seen, one value a reading, that is not fitted:
+    /// signatures of effects that depend on it are taken there.
+    #[must_use]
+    fn beneath(self, _change: &DVector<f64>) -> Self {
+        self
+    }
 
     /// The effects which the model leaves out.
     fn effects(&self) -> Vec<Box<dyn Effect<Self>>>;

@@ -8,7 +8,7 @@
 use errsep_models::model::FittedModel;
 use nalgebra::DVector;
 
-use super::bench::{ADEQUATE, Bench, Cause, Remainder, finer, raw_signatures};
+use super::bench::{Bench, Cause, Remainder, adequate, finer, raw_signatures};
 use super::quantify::held_out_square;
 
 /// A further cause must stand out beside the others at this level.
@@ -91,7 +91,7 @@ pub(super) fn roughly<M: FittedModel>(
         }
         causes = bench.relinearised(readings, &causes, f64::INFINITY);
         let remainder = bench.judged(readings, &causes);
-        if remainder.global > ADEQUATE {
+        if adequate(&causes, &remainder) {
             break;
         }
         left = Some(remainder);
@@ -259,7 +259,7 @@ fn confidence_set<M: FittedModel>(
             bench.p_value(&beside, best[k].effect) < EARNED
         }) && predicts(bench, readings, &best);
     Answer {
-        complete: needed && remainder.global > ADEQUATE,
+        complete: needed && adequate(&best, &remainder),
         causes: best,
         groups,
         remainder,
@@ -281,6 +281,18 @@ fn predicts<M: FittedModel>(
     let Some(with) = square(causes) else {
         return true;
     };
+    if std::env::var("DBG").is_ok() {
+        eprintln!(
+            "PRED {:?} with {with:e} without {:?} noise {noise:e}",
+            causes
+                .iter()
+                .map(|c| bench.catalogue[c.effect].name())
+                .collect::<Vec<_>>(),
+            (0..causes.len())
+                .map(|k| square(&without(causes, k)))
+                .collect::<Vec<_>>()
+        );
+    }
     (0..causes.len()).all(|k| square(&without(causes, k)).is_none_or(|s| s > with))
 }
 
@@ -331,7 +343,7 @@ fn alternatives<M: FittedModel>(
             bench.relinearised(readings, &trial, least)
         };
         let left = bench.judged(readings, &trial);
-        if left.global > ADEQUATE {
+        if adequate(&trial, &left) {
             members.push(Member {
                 effect,
                 size: part_of_plausible(bench, readings, &trial, k),

@@ -1,5 +1,6 @@
 //! The workbench of one pass: state of the model, noise, space, dictionary and their null law.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use errsep_models::model::{Column, Effect, FittedModel, Shape};
@@ -22,8 +23,9 @@ const SEPARABLE: f64 = 0.02;
 /// Relative change of the amplitudes at which refining stops.
 const AT_REST: f64 = 1e-4;
 
-/// A set of causes whose remainder is less probable than this is not adequate.
-pub(super) const ADEQUATE: f64 = 0.002;
+/// A set of one, two, three causes whose remainder is less probable than this is not adequate: the
+/// more of them, the more freely they imitate what none of them is.
+const ADEQUATE: [f64; 3] = [0.002, 0.01, 0.05];
 
 /// Standard deviations of chi-squared beyond which no doubt about the state excuses a remainder.
 const FAR: f64 = 6.0;
@@ -149,6 +151,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
             for k in 0..causes.len() {
                 let mut others = causes.clone();
                 let own = others.remove(k);
+                let state = self.seen_by(k, &state, &causes, &changes);
                 let refined = self.refine(&state, readings, own.effect, &own.shape, &others);
                 causes[k] = refined.0;
             }
@@ -171,6 +174,29 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         best.1
     }
 
+    /// The state at which the signature of one of several causes is taken: with what the others
+    /// change before it.
+    pub fn seen_by<'s>(
+        &self,
+        which: usize,
+        state: &'s M,
+        causes: &[Cause],
+        changes: &DMatrix<f64>,
+    ) -> Cow<'s, M> {
+        let link = |k: usize| self.catalogue[causes[k].effect].link();
+        let mut sum = DVector::zeros(self.space.readings());
+        let mut any = false;
+        for k in (0..causes.len()).filter(|k| *k != which && link(which).sees(link(*k))) {
+            sum += changes.column(k);
+            any = true;
+        }
+        if any {
+            Cow::Owned(state.clone().beneath(&sum))
+        } else {
+            Cow::Borrowed(state)
+        }
+    }
+
     /// What each cause changes in the readings at its fitted amplitudes, readings × causes.
     pub fn changes(&self, readings: &DVector<f64>, causes: &[Cause]) -> Option<DMatrix<f64>> {
         let (amplitudes, _) = self.amplitudes(readings, causes)?;
@@ -182,17 +208,6 @@ impl<'a, M: FittedModel> Bench<'a, M> {
             changes.set_column(k, &self.change(std::slice::from_ref(cause), &own));
         }
         Some(changes)
-    }
-
-    /// Readings without the causes at their fitted amplitudes, and those.
-    pub fn clean(
-        &self,
-        readings: &DVector<f64>,
-        causes: &[Cause],
-    ) -> Option<(DVector<f64>, DVector<f64>)> {
-        let (amplitudes, _) = self.amplitudes(readings, causes)?;
-        let changes = self.changes(readings, causes)?;
-        Some((self.without(readings, causes, &changes), amplitudes))
     }
 
     /// Readings without what causes change in them, and what they hide of the state restored.
@@ -225,7 +240,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         let plain = self.remainder(readings, causes);
         let freedom = self.space.degrees_of_freedom() as f64;
         let far = plain.residual.norm_squared() > freedom + FAR * (2.0 * freedom).sqrt();
-        if causes.is_empty() || plain.global > ADEQUATE || far {
+        if causes.is_empty() || adequate(causes, &plain) || far {
             return plain;
         }
         let basis = span(causes, self.space.readings());
@@ -443,6 +458,12 @@ fn overlaps(entry: &Entry, directions: &[Sums]) -> DMatrix<f64> {
         overlap.set_column(j, &entry.products(direction));
     }
     overlap
+}
+
+/// Whether causes leave nothing that stands out.
+pub(super) fn adequate(causes: &[Cause], left: &Remainder) -> bool {
+    let least = ADEQUATE[causes.len().clamp(1, ADEQUATE.len()) - 1];
+    left.global > least
 }
 
 /// The same shape with the steps of a finer search.

@@ -36,14 +36,19 @@ pub(super) struct Doubt {
 impl<M: FittedModel> Bench<'_, M> {
     /// The doubt about causes beside what the model and they themselves absorb (`basis`).
     pub fn doubt(&self, readings: &DVector<f64>, causes: &[Cause], basis: &DMatrix<f64>) -> Doubt {
-        let Some((clean, amplitudes)) = self.clean(readings, causes) else {
+        let fitted = self
+            .amplitudes(readings, causes)
+            .zip(self.changes(readings, causes));
+        let Some(((amplitudes, _), changes)) = fitted else {
             return Doubt::default();
         };
+        let clean = self.without(readings, causes, &changes);
         let change_at = |state: &M| {
             let mut change = DVector::zeros(readings.len());
             let mut at = 0;
-            for cause in causes {
-                for column in self.catalogue[cause.effect].columns(state, &cause.shape) {
+            for (k, cause) in causes.iter().enumerate() {
+                let state = self.seen_by(k, state, causes, &changes);
+                for column in self.catalogue[cause.effect].columns(&state, &cause.shape) {
                     for (&row, value) in column.rows.iter().zip(&column.values) {
                         change[row] += amplitudes[at] * value;
                     }

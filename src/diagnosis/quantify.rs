@@ -247,12 +247,15 @@ impl Split {
     fn fit<'a>(&'a self, signatures: &'a DMatrix<f64>) -> Option<SplitFit<'a>> {
         let columns = signatures.select_rows(&self.rows);
         let (projected, _) = self.space.forward(columns.clone());
-        let gram = projected.tr_mul(&projected);
-        let inverse = if gram.is_empty() {
-            gram
-        } else {
-            gram.pseudo_inverse(1e-9).ok()?
-        };
+        let mut inverse = projected.tr_mul(&projected);
+        if !inverse.is_empty() {
+            // Signatures have the units of their amplitudes: the rank is that of unit columns.
+            let scale = inverse
+                .diagonal()
+                .map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt());
+            let scaled = |m: DMatrix<f64>| m.map_with_location(|i, j, v| v * scale[i] * scale[j]);
+            inverse = scaled(scaled(inverse).pseudo_inverse(1e-9).ok()?);
+        }
         Some(SplitFit {
             split: self,
             columns,

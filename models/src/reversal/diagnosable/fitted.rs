@@ -162,6 +162,11 @@ impl FittedModel for FirstOrder {
         fitted
     }
 
+    fn beneath(mut self, change: &DVector<f64>) -> Self {
+        self.beneath = Some(change.clone());
+        self
+    }
+
     fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
         effects::all()
     }

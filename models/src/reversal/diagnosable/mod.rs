@@ -76,6 +76,8 @@ pub struct FirstOrder {
     s_b: SmoothProfile,
     /// The smooth reading of every cell.
     smooth: Vec<f64>,
+    /// What effects add to the smooth reading before it is seen, by reading.
+    beneath: Option<DVector<f64>>,
     present: Vec<Channel>,
     span: f64,
     reach: f64,
@@ -140,6 +142,7 @@ impl FirstOrder {
             s_a: nothing.clone(),
             s_b: nothing,
             smooth: Vec::new(),
+            beneath: None,
             present,
             timed: sorted.timed,
             left_out: sorted.left_out,
@@ -213,10 +216,11 @@ impl FirstOrder {
             .map(|cell| self.smooth_at(self.present[cell / n], cell % n))
             .collect();
         self.span = self.find_span();
+        self.beneath = None;
         self.reach = self
-            .places
+            .smooth
             .iter()
-            .map(|p| self.smooth_reading(p).abs())
+            .map(|reading| reading.abs())
             .fold(f64::MIN_POSITIVE, f64::max);
     }
 
@@ -250,18 +254,19 @@ impl FirstOrder {
         place.cell % self.positions.len()
     }
 
-    /// The smooth reading at a place, µm.
-    pub fn smooth_reading(&self, place: &Place) -> f64 {
-        self.smooth[place.channel * self.positions.len() + self.at(place)]
+    /// The smooth value of a reading, µm.
+    pub fn smooth_reading(&self, reading: usize) -> f64 {
+        let added = self.beneath.as_ref().map_or(0.0, |b| b[reading]);
+        self.smooth[self.places[reading].cell] + added
     }
 
-    /// A function of the smooth reading, at every place.
+    /// A function of the smooth reading, for every reading.
     pub(super) fn of_reading(&self, value: impl Fn(f64) -> f64) -> Column {
+        if self.beneath.is_some() {
+            return Column::from_places(&self.places, |k, _| value(self.smooth_reading(k)));
+        }
         let values: Vec<f64> = self.smooth.iter().map(|reading| value(*reading)).collect();
-        let n = self.positions.len();
-        Column::from_places(&self.places, |_, place| {
-            values[place.channel * n + self.at(place)]
-        })
+        Column::from_places(&self.places, |_, place| values[place.cell])
     }
 
     fn smooth_at(&self, channel: Channel, k: usize) -> f64 {
@@ -294,6 +299,18 @@ impl FirstOrder {
         let side = self.side(self.channel(place));
         let moved = side.at(&self.positions, place.x + shift);
         (moved - side.values[self.at(place)]) / shift
+    }
+
+    /// Change of the smooth reading when the slide stands `shift` mm further, per mm.
+    pub fn reading_chord(&self, place: &Place, shift: f64) -> f64 {
+        if shift.abs() < 1e-9 * self.travel() {
+            return self.reading_slope(place);
+        }
+        let (channel, k) = (self.channel(place), self.at(place));
+        let moved = self.m.at(&self.positions, place.x + shift) - self.m.values[k];
+        self.lines[channel.index()].slope
+            + channel.indicator_sign() * moved / shift
+            + self.side_chord(place, shift)
     }
 
     /// The tilt of a channel, mm/mm.
@@ -337,7 +354,7 @@ impl FirstOrder {
     fn find_span(&self) -> f64 {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for place in &self.places {
-            let value = self.smooth_reading(place) - self.mid_reading(place);
+            let value = self.smooth[place.cell] - self.mid_reading(place);
             low = low.min(value);
             high = high.max(value);
         }

@@ -1,7 +1,7 @@
 //! The slide lags behind its command by half the backlash, to either side.
 
-use super::FirstOrder;
-use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use super::{FirstOrder, SETTLING, settled_at};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file.
 pub(super) struct AxisBacklash;
@@ -15,8 +15,12 @@ impl Effect<FirstOrder> for AxisBacklash {
         About {
             physics: "the slide stands half the backlash behind its command, so form and slope return shifted between forward and backward",
             confirm: "reverse the axis under a dial gauge or laser and read the lost motion",
-            source: "ISO 230-2 reversal value; first-order Taylor expansion of I(x -/+ B/2)",
+            source: "ISO 230-2 reversal value; I(x -/+ B/2)",
         }
+    }
+
+    fn link(&self) -> Link {
+        Link::Stylus
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
@@ -28,9 +32,18 @@ impl Effect<FirstOrder> for AxisBacklash {
         }]
     }
 
-    fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
+    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+        vec![SETTLING]
+    }
+
+    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+        let lost = shape.values.first().copied().unwrap_or(0.0);
         vec![Column::from_places(model.places(), |_, place| {
-            -0.5 * place.direction * model.reading_slope(place)
+            -0.5 * place.direction * model.reading_chord(place, -0.5 * place.direction * lost)
         })]
+    }
+
+    fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
+        settled_at(shape, amplitudes)
     }
 }

@@ -1,7 +1,7 @@
 //! Both indicators have the same wrong gain.
 
 use super::FirstOrder;
-use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file.
 pub(super) struct CommonGain;
@@ -19,6 +19,10 @@ impl Effect<FirstOrder> for CommonGain {
         }
     }
 
+    fn link(&self) -> Link {
+        Link::Sensor
+    }
+
     fn amplitudes(&self) -> Vec<Parameter> {
         vec![Parameter {
             name: "gain",
@@ -33,8 +37,8 @@ impl Effect<FirstOrder> for CommonGain {
     }
 
     fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
-        vec![Column::from_places(model.places(), |_, place| {
-            model.smooth_reading(place) - model.mid_reading(place)
+        vec![Column::from_places(model.places(), |k, place| {
+            model.smooth_reading(k) - model.mid_reading(place)
         })]
     }
 }

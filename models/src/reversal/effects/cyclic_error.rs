@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::FirstOrder;
-use crate::model::{About, Column, Effect, Estimate, FittedModel, Parameter, Shape};
+use crate::model::{About, Column, Effect, Estimate, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file. Variants: 0, periodic in the reading (interpolation error of an
 /// incremental indicator); 1, periodic in position and different in the two spindle positions
@@ -21,6 +21,10 @@ impl Effect<FirstOrder> for CyclicError {
             confirm: "compare the period with the signal period of the indicator and the pitch of the screw",
             source: "first harmonic of the interpolation error of incremental scales; ISO 230-2 periodic error",
         }
+    }
+
+    fn link(&self) -> Link {
+        Link::Sensor
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {

@@ -1,7 +1,7 @@
 //! Near and far indicator have different gains.
 
 use super::FirstOrder;
-use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file.
 pub(super) struct GainMismatch;
@@ -19,6 +19,10 @@ impl Effect<FirstOrder> for GainMismatch {
         }
     }
 
+    fn link(&self) -> Link {
+        Link::Sensor
+    }
+
     fn amplitudes(&self) -> Vec<Parameter> {
         vec![Parameter {
             name: "mismatch",
@@ -29,9 +33,9 @@ impl Effect<FirstOrder> for GainMismatch {
     }
 
     fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
-        vec![Column::from_places(model.places(), |_, place| {
+        vec![Column::from_places(model.places(), |k, place| {
             0.5 * model.channel(place).indicator_sign()
-                * (model.smooth_reading(place) - model.mid_reading(place))
+                * (model.smooth_reading(k) - model.mid_reading(place))
         })]
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::DVector;
 
 use super::FirstOrder;
-use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file. The lag saturates at half the width once the stylus has moved by the
 /// width, so the signature depends on the size where the reading turns round within a trace. Where
@@ -27,6 +27,10 @@ impl Effect<FirstOrder> for Hysteresis {
             confirm: "move the stylus up and down over gauge blocks and read the difference",
             source: "play operator (Brokate and Sprekels, Hysteresis and Phase Transitions, section 2.2); ISO 463 hysteresis of dial gauges",
         }
+    }
+
+    fn link(&self) -> Link {
+        Link::Pointer
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
@@ -87,14 +91,14 @@ impl Effect<FirstOrder> for Hysteresis {
                 .copied()
                 .unwrap_or(0.0);
             let forward = places[trace.start].direction > 0.0;
-            let mut pointer = model.smooth_reading(&places[first_of(model, trace)]) + begins * half;
+            let mut pointer = model.smooth_reading(first_of(model, trace)) + begins * half;
             for step in 0..trace.len() {
                 let k = if forward {
                     trace.start + step
                 } else {
                     trace.end - 1 - step
                 };
-                let stylus = model.smooth_reading(&places[k]);
+                let stylus = model.smooth_reading(k);
                 pointer = pointer.clamp(stylus - half, stylus + half);
                 column.rows.push(k);
                 column.values.push((pointer - stylus) / (2.0 * half));

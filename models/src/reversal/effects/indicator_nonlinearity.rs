@@ -1,7 +1,7 @@
 //! The indicator's reading is not proportional to its displacement.
 
 use super::FirstOrder;
-use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use crate::model::{About, Column, Effect, Link, Parameter, Shape};
 
 /// See the head of the file. Variants: quadratic (lever at an angle) and cubic (transducer near the
 /// end of its range), both as the deviation at the
@@ -21,6 +21,10 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
         }
     }
 
+    fn link(&self) -> Link {
+        Link::Sensor
+    }
+
     fn amplitudes(&self) -> Vec<Parameter> {
         vec![Parameter {
             name: "deviation",
@@ -37,10 +41,7 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let reach = model.reading_reach();
         let power = if shape.variant == 0 { 2 } else { 3 };
-        vec![Column::from_places(model.places(), |_, place| {
-            let part = model.smooth_reading(place) / reach;
-            part.powi(power)
-        })]
+        vec![model.of_reading(|reading| (reading / reach).powi(power))]
     }
 
     fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {

@@ -1,7 +1,7 @@
 //! A chip or a film of dirt under the stylus at one place.
 
 use super::FirstOrder;
-use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file. It only shows where it was not always there: in one channel (it came
 /// or went when the spindle was turned) or in one repeat of one channel.
@@ -20,6 +20,10 @@ impl Effect<FirstOrder> for LocalContamination {
             confirm: "wipe the artefact there and measure that trace again",
             source: "bump of Gaussian section, always towards the indicator",
         }
+    }
+
+    fn link(&self) -> Link {
+        Link::Stylus
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {

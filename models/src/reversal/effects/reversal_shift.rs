@@ -1,7 +1,7 @@
 //! The artefact moves along its axis when the spindle turns.
 
 use super::{FirstOrder, SETTLING, settled_at};
-use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file.
 pub(super) struct ReversalShift;
@@ -17,6 +17,10 @@ impl Effect<FirstOrder> for ReversalShift {
             confirm: "touch the end face of the artefact with an indicator in both spindle positions",
             source: "first-order Taylor expansion of S(x - shift) in the second spindle position",
         }
+    }
+
+    fn link(&self) -> Link {
+        Link::Stylus
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {

@@ -1,7 +1,7 @@
 //! The artefact is a cone: both surfaces fall away from its axis.
 
 use super::FirstOrder;
-use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file.
 pub(super) struct Taper;
@@ -17,6 +17,10 @@ impl Effect<FirstOrder> for Taper {
             confirm: "measure the diameter at both ends with a micrometer",
             source: "rigid-body geometry of a frustum between two indicators (contrast + + + + of the four slopes)",
         }
+    }
+
+    fn link(&self) -> Link {
+        Link::Stylus
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {

@@ -1,7 +1,7 @@
 //! The probed point lies half a thickness from the tilted axis.
 
 use super::{FirstOrder, SETTLING, settled_at};
-use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file.
 pub(super) struct ThicknessShift;
@@ -17,6 +17,10 @@ impl Effect<FirstOrder> for ThicknessShift {
             confirm: "measure the thickness and give it in the set-up, or align the artefact better and repeat",
             source: "exact geometry of a tilted artefact, u = x + h psi to first order",
         }
+    }
+
+    fn link(&self) -> Link {
+        Link::Stylus
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {

@@ -207,8 +207,10 @@ pub struct About {
 /// is seen are taken with the changes of the effects that come before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Link {
-    /// It moves what the sensor sees.
+    /// It moves what the sensor sees at a place.
     Stylus,
+    /// It moves the place: what is seen there comes with it.
+    Slide,
     /// It depends on what the sensor sees.
     Sensor,
     /// It adds to the reading.
@@ -222,7 +224,8 @@ impl Link {
     pub fn sees(self, other: Self) -> bool {
         match self {
             Self::Stylus | Self::Reading => false,
-            Self::Sensor => other == Self::Stylus,
+            Self::Slide => other == Self::Stylus,
+            Self::Sensor => matches!(other, Self::Stylus | Self::Slide),
             Self::Pointer => other != Self::Pointer,
         }
     }

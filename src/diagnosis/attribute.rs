@@ -196,7 +196,7 @@ fn polish<M: FittedModel>(bench: &Bench<'_, M>, readings: &DVector<f64>, causes:
                 bench.refine(bench.model, readings, causes[k].effect, &start, &others);
             let remainder = bench.remainder(readings, &others);
             let swapped = strongest(bench, readings, &remainder, &others)
-                .filter(|c| c.effect != refined.effect)
+                .filter(|c| c.effect != refined.effect || c.shape.variant != refined.shape.variant)
                 .map(|c| bench.refine(bench.model, readings, c.effect, &finer(&c.shape), &others));
             match swapped {
                 Some((other, other_t)) if other_t > t + 1e-6 => {
@@ -281,18 +281,6 @@ fn predicts<M: FittedModel>(
     let Some(with) = square(causes) else {
         return true;
     };
-    if std::env::var("DBG").is_ok() {
-        eprintln!(
-            "PRED {:?} with {with:e} without {:?} noise {noise:e}",
-            causes
-                .iter()
-                .map(|c| bench.catalogue[c.effect].name())
-                .collect::<Vec<_>>(),
-            (0..causes.len())
-                .map(|k| square(&without(causes, k)))
-                .collect::<Vec<_>>()
-        );
-    }
     (0..causes.len()).all(|k| square(&without(causes, k)).is_none_or(|s| s > with))
 }
 

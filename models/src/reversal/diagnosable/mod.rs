@@ -301,16 +301,40 @@ impl FirstOrder {
         (moved - side.values[self.at(place)]) / shift
     }
 
-    /// Change of the smooth reading when the slide stands `shift` mm further, per mm.
-    pub fn reading_chord(&self, place: &Place, shift: f64) -> f64 {
-        if shift.abs() < 1e-9 * self.travel() {
-            return self.reading_slope(place);
-        }
+    /// Change of the smooth value of a reading when the slide stands `shift` mm further, per mm.
+    pub fn reading_chord(&self, reading: usize, shift: f64) -> f64 {
+        let place = &self.places[reading];
+        // A slope is a chord too short to matter.
+        let shift = if shift.abs() < 1e-6 * self.travel() {
+            1e-6 * self.travel()
+        } else {
+            shift
+        };
         let (channel, k) = (self.channel(place), self.at(place));
         let moved = self.m.at(&self.positions, place.x + shift) - self.m.values[k];
         self.lines[channel.index()].slope
             + channel.indicator_sign() * moved / shift
             + self.side_chord(place, shift)
+            + self.beneath_chord(reading, shift)
+    }
+
+    /// The same of what effects add beneath, by the parabola through three neighbours.
+    fn beneath_chord(&self, reading: usize, shift: f64) -> f64 {
+        let Some(beneath) = &self.beneath else {
+            return 0.0;
+        };
+        let n = self.positions.len();
+        let k = self.at(&self.places[reading]);
+        let start = reading - k;
+        let x = self.positions[k] + shift;
+        let nearest = self.positions.partition_point(|p| *p < x);
+        let from = nearest.saturating_sub(1).min(n - 3);
+        let [a, b, c] = [from, from + 1, from + 2].map(|j| self.positions[j]);
+        let [p, q, r] = [from, from + 1, from + 2].map(|j| beneath[start + j]);
+        let there = p * (x - b) * (x - c) / ((a - b) * (a - c))
+            + q * (x - a) * (x - c) / ((b - a) * (b - c))
+            + r * (x - a) * (x - b) / ((c - a) * (c - b));
+        (there - beneath[reading]) / shift
     }
 
     /// The tilt of a channel, mm/mm.

@@ -20,7 +20,7 @@ impl Effect<FirstOrder> for AxisBacklash {
     }
 
     fn link(&self) -> Link {
-        Link::Stylus
+        Link::Slide
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
@@ -38,8 +38,9 @@ impl Effect<FirstOrder> for AxisBacklash {
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let lost = shape.values.first().copied().unwrap_or(0.0);
-        vec![Column::from_places(model.places(), |_, place| {
-            -0.5 * place.direction * model.reading_chord(place, -0.5 * place.direction * lost)
+        vec![Column::from_places(model.places(), |k, place| {
+            let half = -0.5 * place.direction;
+            half * model.reading_chord(k, half * lost)
         })]
     }
 

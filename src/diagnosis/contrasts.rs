@@ -202,3 +202,73 @@ fn steady_free(times: &[f64]) -> Vec<Vec<f64>> {
 fn norm(vector: &[f64]) -> f64 {
     vector.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::NoiseLaw;
+    use proptest::prelude::*;
+
+    fn repeats(positions: &[f64], traces: usize) -> (Vec<Place>, Vec<Range<usize>>) {
+        let n = positions.len();
+        let places = (0..n * traces)
+            .map(|k| Place {
+                channel: 0,
+                x: positions[k % n],
+                time: (k / n) as f64,
+                repeat: (k / n) as u32,
+                direction: 1.0,
+                cell: k % n,
+            })
+            .collect();
+        (places, (0..traces).map(|t| t * n..(t + 1) * n).collect())
+    }
+
+    proptest! {
+        /// The filter's likelihood is that of the dense covariance, with the scale at its best.
+        #[test]
+        fn the_likelihood_is_the_dense_one(
+            correlated in 0.0f64..3.0, length in 0.5f64..20.0, shift in 0.0f64..2.0,
+            steps in prop::collection::vec(0.1f64..4.0, 5..12),
+            values in prop::collection::vec(-2.0f64..2.0, 52),
+        ) {
+            let mut x = vec![0.0];
+            for step in steps {
+                x.push(x[x.len() - 1] + step);
+            }
+            let (places, traces) = repeats(&x, 4);
+            let readings = DVector::from_column_slice(&values[..places.len().min(52)]);
+            prop_assume!(readings.len() == places.len());
+            let contrasts = Contrasts::new(&places, &traces, &readings);
+            let covariance = NoiseLaw::of(1.0, correlated, length, shift).covariance(&x);
+            let factor = covariance.cholesky().unwrap();
+            let log_determinant = 2.0 * factor.l().diagonal().map(f64::ln).sum();
+            let (mut quadratic, mut determinants) = (0.0, 0.0);
+            for row in contrasts.rows() {
+                quadratic += row.dot(&factor.solve(row));
+                determinants += log_determinant;
+            }
+            let count = contrasts.count() as f64;
+            let dense = 0.5 * (count * (quadratic / count).ln() + determinants);
+            let filtered = contrasts.likelihood(correlated, length, shift);
+            // Rounding: twelve readings a row, condition of the covariance below 100.
+            prop_assert!((filtered.minus_log - dense).abs() < 1e-9 * (1.0 + dense.abs()));
+            prop_assert!((filtered.quadratic / quadratic - 1.0).abs() < 1e-9);
+        }
+
+        /// Neither what all repeats have nor what grows evenly from one to the next is in a contrast.
+        #[test]
+        fn a_steady_drift_is_in_no_contrast(
+            form in prop::collection::vec(-5.0f64..5.0, 6),
+            drift in prop::collection::vec(-5.0f64..5.0, 6),
+        ) {
+            let x: Vec<f64> = (0..6).map(f64::from).collect();
+            let (places, traces) = repeats(&x, 5);
+            let readings = DVector::from_fn(30, |k, _| form[k % 6] + drift[k % 6] * (k / 6) as f64);
+            let contrasts = Contrasts::new(&places, &traces, &readings);
+            prop_assert_eq!(contrasts.count(), 18);
+            // Rounding of sums of five terms below 25.
+            prop_assert!(contrasts.rows().all(|row| row.amax() < 1e-12));
+        }
+    }
+}

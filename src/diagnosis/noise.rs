@@ -66,7 +66,7 @@ impl Components {
     }
 
     /// Noise of one trace.
-    fn draw(&self, positions: &[f64], random: &mut ChaCha8Rng, noise: &mut [f64]) {
+    pub(super) fn draw(&self, positions: &[f64], random: &mut ChaCha8Rng, noise: &mut [f64]) {
         let mut normal = || -> f64 { StandardNormal.sample(random) };
         let white = self.white.sqrt();
         let shift = if self.shift > 0.0 {
@@ -122,6 +122,18 @@ impl NoiseLaw {
             source,
             possible: Arc::new(Vec::new()),
             tails: None,
+        }
+    }
+
+    /// A law of given parts.
+    #[cfg(test)]
+    pub(super) fn of(white: f64, correlated: f64, length: f64, shift: f64) -> Self {
+        Self {
+            white,
+            correlated,
+            length,
+            shift,
+            ..Self::white(1.0, f64::INFINITY, NoiseSource::Stated)
         }
     }
 

@@ -246,3 +246,61 @@ fn median(values: &mut [f64]) -> f64 {
         0.5 * (values[n / 2 - 1] + values[n / 2])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+    use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
+    use rand_distr::StandardNormal;
+
+    fn model() -> FirstOrder {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let scene = Scene::random(100, 4, 1e-5, 2.0, SceneNoise::default(), &mut random);
+        FirstOrder::new(&scene.exact(), Assumptions::default()).unwrap()
+    }
+
+    /// Student's noise with three degrees of freedom is taken for 2.5 to 4, with 3200 readings, and
+    /// normal noise for normal, whatever its seed.
+    #[test]
+    fn heavy_tails_are_told_from_normal_ones() {
+        let model = model();
+        let spikes = Spikes::new(&model);
+        let n = model.observed().len();
+        for seed in 0..10 {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let student = StudentT::new(3.0).unwrap();
+            let heavy = DVector::from_fn(n, |_, _| student.sample(&mut random));
+            let tails = spikes.calmed(&model, &heavy).tails.expect("heavy tails");
+            assert!((2.5..=4.0).contains(&tails.freedom), "{tails:?}");
+            let normal = DVector::from_fn(n, |_, _| StandardNormal.sample(&mut random));
+            let calmed = spikes.calmed(&model, &normal);
+            assert_eq!(calmed.tails, None);
+            // 3200 normal readings hold 0.2 beyond four standard deviations.
+            assert!(calmed.count < 5, "{}", calmed.count);
+        }
+    }
+
+    /// A bump three readings wide in one repeat is no spike; one reading is, and is pulled in.
+    #[test]
+    fn a_bump_is_left_and_a_spike_is_pulled_in() {
+        let model = model();
+        let spikes = Spikes::new(&model);
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let n = model.observed().len();
+        let noise = DVector::from_fn(n, |_, _| StandardNormal.sample(&mut random));
+        let mut bumped = noise.clone();
+        for k in 0..100 {
+            let away = (k as f64 - 40.3) / 1.5;
+            bumped[k] += 60.0 * (-0.5 * away * away).exp();
+        }
+        let mut calmed = bumped.clone();
+        spikes.pull_in(&mut calmed);
+        assert!((30..50).all(|k| calmed[k] == bumped[k]));
+        let mut spiked = noise;
+        spiked[1040] += 30.0;
+        assert!(spikes.pull_in(&mut spiked) >= 1);
+        // Four standard deviations of the deviation, 1.3 of the reading's, and the reading's own.
+        assert!(spiked[1040] < 10.0, "{}", spiked[1040]);
+    }
+}

@@ -112,19 +112,8 @@ impl Whitening {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::NoiseSource;
     use nalgebra::DMatrix;
     use proptest::prelude::*;
-
-    fn law(white: f64, correlated: f64, length: f64, shift: f64) -> NoiseLaw {
-        NoiseLaw {
-            white,
-            correlated,
-            length,
-            shift,
-            ..NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated)
-        }
-    }
 
     proptest! {
         /// L⁻¹ V L⁻ᵀ = I against the dense covariance, and the adjoint is the transpose.
@@ -137,7 +126,7 @@ mod tests {
             for step in steps {
                 x.push(x[x.len() - 1] + step);
             }
-            let law = law(white, correlated, length, shift);
+            let law = NoiseLaw::of(white, correlated, length, shift);
             let whitening = Whitening::new(&law, &x);
             let n = x.len();
             let mut inverse = DMatrix::identity(n, n);
@@ -155,7 +144,7 @@ mod tests {
 
     #[test]
     fn noise_without_a_white_part_stays_finite() {
-        let whitening = Whitening::new(&law(0.0, 1.0, 3.0, 0.5), &[0.0, 1.0, 1.0, 2.0]);
+        let whitening = Whitening::new(&NoiseLaw::of(0.0, 1.0, 3.0, 0.5), &[0.0, 1.0, 1.0, 2.0]);
         let mut y = [1.0, -2.0, 0.5, 4.0];
         whitening.whiten(&mut y);
         assert!(y.iter().all(|v| v.is_finite()));

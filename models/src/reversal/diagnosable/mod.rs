@@ -260,6 +260,11 @@ impl FirstOrder {
         self.smooth[self.places[reading].cell] + added
     }
 
+    /// Whether effects add to the smooth reading before it is seen.
+    pub fn lies_beneath(&self) -> bool {
+        self.beneath.is_some()
+    }
+
     /// A function of the smooth reading, for every reading.
     pub(super) fn of_reading(&self, value: impl Fn(f64) -> f64) -> Column {
         if self.beneath.is_some() {
@@ -267,6 +272,16 @@ impl FirstOrder {
         }
         let values: Vec<f64> = self.smooth.iter().map(|reading| value(*reading)).collect();
         Column::from_places(&self.places, |_, place| values[place.cell])
+    }
+
+    /// A function that is the same for all readings of a cell in one direction, for every reading.
+    pub(super) fn of_cell(&self, value: impl Fn(usize, &Place) -> f64) -> Column {
+        let slot = |place: &Place| 2 * place.cell + usize::from(place.direction < 0.0);
+        let mut values = vec![None; 2 * self.smooth.len()];
+        for (k, place) in self.places.iter().enumerate() {
+            values[slot(place)].get_or_insert_with(|| value(k, place));
+        }
+        Column::from_places(&self.places, |_, place| values[slot(place)].unwrap_or(0.0))
     }
 
     fn smooth_at(&self, channel: Channel, k: usize) -> f64 {
@@ -304,18 +319,24 @@ impl FirstOrder {
     /// Change of the smooth value of a reading when the slide stands `shift` mm further, per mm.
     pub fn reading_chord(&self, reading: usize, shift: f64) -> f64 {
         let place = &self.places[reading];
-        // A slope is a chord too short to matter.
-        let shift = if shift.abs() < 1e-6 * self.travel() {
-            1e-6 * self.travel()
-        } else {
-            shift
-        };
+        let shift = self.no_point(shift);
         let (channel, k) = (self.channel(place), self.at(place));
         let moved = self.m.at(&self.positions, place.x + shift) - self.m.values[k];
         self.lines[channel.index()].slope
             + channel.indicator_sign() * moved / shift
-            + self.side_chord(place, shift)
-            + self.beneath_chord(reading, shift)
+            + self.probed_chord(reading, shift)
+    }
+
+    /// Change of a reading when the probed point moves `shift` mm along the artefact, per mm.
+    pub fn probed_chord(&self, reading: usize, shift: f64) -> f64 {
+        let shift = self.no_point(shift);
+        self.side_chord(&self.places[reading], shift) + self.beneath_chord(reading, shift)
+    }
+
+    /// A slope is a chord too short to matter.
+    fn no_point(&self, shift: f64) -> f64 {
+        let short = 1e-6 * self.travel();
+        if shift.abs() < short { short } else { shift }
     }
 
     /// The same of what effects add beneath, by the parabola through three neighbours.

@@ -1,7 +1,7 @@
 //! The slide lags behind its command by half the backlash, to either side.
 
 use super::{FirstOrder, SETTLING, settled_at};
-use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Place, Shape};
 
 /// See the head of the file.
 pub(super) struct AxisBacklash;
@@ -38,10 +38,15 @@ impl Effect<FirstOrder> for AxisBacklash {
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let lost = shape.values.first().copied().unwrap_or(0.0);
-        vec![Column::from_places(model.places(), |k, place| {
+        let change = |k: usize, place: &Place| {
             let half = -0.5 * place.direction;
             half * model.reading_chord(k, half * lost)
-        })]
+        };
+        vec![if model.lies_beneath() {
+            Column::from_places(model.places(), change)
+        } else {
+            model.of_cell(change)
+        }]
     }
 
     fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {

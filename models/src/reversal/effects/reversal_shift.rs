@@ -1,7 +1,7 @@
 //! The artefact moves along its axis when the spindle turns.
 
 use super::{FirstOrder, SETTLING, settled_at};
-use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
+use crate::model::{About, Column, Effect, Link, Parameter, Shape};
 
 /// See the head of the file.
 pub(super) struct ReversalShift;
@@ -38,7 +38,7 @@ impl Effect<FirstOrder> for ReversalShift {
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let shift = shape.values.first().copied().unwrap_or(0.0);
-        vec![Column::from_places(model.places(), |_, place| {
+        vec![model.of_cell(|_, place| {
             if model.channel(place).spindle_sign() > 0.0 {
                 0.0
             } else {

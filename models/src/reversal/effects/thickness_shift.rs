@@ -1,7 +1,7 @@
 //! The probed point lies half a thickness from the tilted axis.
 
 use super::{FirstOrder, SETTLING, settled_at};
-use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Place, Shape};
 
 /// See the head of the file.
 pub(super) struct ThicknessShift;
@@ -20,7 +20,7 @@ impl Effect<FirstOrder> for ThicknessShift {
     }
 
     fn link(&self) -> Link {
-        Link::Stylus
+        Link::Slide
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
@@ -38,10 +38,15 @@ impl Effect<FirstOrder> for ThicknessShift {
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let thickness = shape.values.first().copied().unwrap_or(0.0);
-        vec![Column::from_places(model.places(), |_, place| {
+        let change = |k: usize, place: &Place| {
             let per_mm = 0.5 * model.tilt(model.channel(place));
-            per_mm * model.side_chord(place, per_mm * thickness)
-        })]
+            per_mm * model.probed_chord(k, per_mm * thickness)
+        };
+        vec![if model.lies_beneath() {
+            Column::from_places(model.places(), change)
+        } else {
+            model.of_cell(change)
+        }]
     }
 
     fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {

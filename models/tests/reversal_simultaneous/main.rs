@@ -1,0 +1,6 @@
+//! The simultaneous solution against known truth, against the staged solution, and against itself.
+
+mod minimum;
+mod plan;
+mod refusals;
+mod uncertainty;

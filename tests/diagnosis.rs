@@ -162,7 +162,7 @@ fn without_an_effect_nothing_is_named_and_what_could_hide_is_listed() {
 }
 
 /// A period of the reading bends the state at which its own signature is taken: the change is 0.88
-/// times as steep as the reading itself, and what the state's noise makes of it is above the noise.
+/// times as steep as the reading itself.
 #[test]
 fn a_steep_period_of_the_reading_is_named() {
     let mut random = ChaCha8Rng::seed_from_u64(5);

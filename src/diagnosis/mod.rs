@@ -22,6 +22,7 @@ mod places;
 mod posterior;
 mod prove;
 mod quantify;
+mod refit;
 mod report;
 mod search;
 mod shape;

@@ -319,7 +319,7 @@ impl FirstOrder {
     /// Change of the smooth value of a reading when the slide stands `shift` mm further, per mm.
     pub fn reading_chord(&self, reading: usize, shift: f64) -> f64 {
         let place = &self.places[reading];
-        let shift = self.no_point(shift);
+        let shift = self.chord_length(shift);
         let (channel, k) = (self.channel(place), self.at(place));
         let moved = self.m.at(&self.positions, place.x + shift) - self.m.values[k];
         self.lines[channel.index()].slope
@@ -329,12 +329,12 @@ impl FirstOrder {
 
     /// Change of a reading when the probed point moves `shift` mm along the artefact, per mm.
     pub fn probed_chord(&self, reading: usize, shift: f64) -> f64 {
-        let shift = self.no_point(shift);
+        let shift = self.chord_length(shift);
         self.side_chord(&self.places[reading], shift) + self.beneath_chord(reading, shift)
     }
 
     /// A slope is a chord too short to matter.
-    fn no_point(&self, shift: f64) -> f64 {
+    fn chord_length(&self, shift: f64) -> f64 {
         let short = 1e-6 * self.travel();
         if shift.abs() < short { short } else { shift }
     }

@@ -37,12 +37,15 @@ pub struct Column {
 impl Column {
     /// The signature whose value at each reading is given by a function of its circumstances.
     pub fn from_places(places: &[Place], value: impl Fn(usize, &Place) -> f64) -> Self {
-        let (rows, values) = places
-            .iter()
-            .enumerate()
-            .map(|(k, place)| (k, value(k, place)))
-            .filter(|(_, v)| *v != 0.0)
-            .unzip();
+        let mut rows = Vec::with_capacity(places.len());
+        let mut values = Vec::with_capacity(places.len());
+        for (k, place) in places.iter().enumerate() {
+            let change = value(k, place);
+            if change != 0.0 {
+                rows.push(k);
+                values.push(change);
+            }
+        }
         Self { rows, values }
     }
 
@@ -271,6 +274,12 @@ pub trait Effect<M>: Send + Sync {
         true
     }
 
+    /// Whether amplitudes inside their ranges are possible at this state too: an indicator's
+    /// reading rises with what it sees.
+    fn possible(&self, _model: &M, _shape: &Shape, _amplitudes: &[f64]) -> bool {
+        true
+    }
+
     /// The shape that belongs to estimated amplitudes, for effects whose signature depends on
     /// their size.
     fn settled(&self, _shape: &Shape, _amplitudes: &[f64]) -> Option<Shape> {
@@ -346,6 +355,12 @@ pub trait FittedModel: Clone + Send + Sync {
 
     /// The readings.
     fn observed(&self) -> &DVector<f64>;
+
+    /// What the fitted state makes every reading, where that is smoother than the least-squares
+    /// fit: a state to put known effects into, without the noise that the fit has taken up.
+    fn smooth(&self) -> Option<DVector<f64>> {
+        None
+    }
 
     /// What the fit can absorb, at its optimum.
     fn freedom(&self) -> Freedom;

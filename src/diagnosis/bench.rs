@@ -12,7 +12,7 @@ use super::doubt::Doubt;
 use super::folding::Sums;
 use super::noise::NoiseLaw;
 use super::null::NullLaw;
-use super::search::compass;
+use super::search::coordinate_search;
 use super::space::{Space, orthonormal};
 
 /// Beside other causes a signature must keep this part of its visible length to be told apart.
@@ -21,6 +21,9 @@ const SEPARABLE: f64 = 0.02;
 /// A set of one, two, three causes whose remainder is less probable than this is not adequate: the
 /// more of them, the more freely they imitate what none of them is.
 const ADEQUATE: [f64; 3] = [0.002, 0.01, 0.05];
+
+/// Part of a shape's first step that its search settles to.
+const PRECISION: f64 = 1e-2;
 
 /// Standard deviations of chi-squared beyond which no doubt about the state excuses a remainder.
 const FAR: f64 = 6.0;
@@ -243,7 +246,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         };
         let mut shape = start.clone();
         if shape.steps.iter().any(|s| *s != 0.0) {
-            let (values, _) = compass(&start.values, &start.steps, 5e-3, |values| {
+            let (values, _) = coordinate_search(&start.values, &start.steps, PRECISION, |values| {
                 let trial = Shape {
                     values: values.to_vec(),
                     ..start.clone()
@@ -335,6 +338,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
             .zip(stds)
             .all(|((p, a), u)| *a > p.low - 2.0 * u && *a < p.high + 2.0 * u);
         inside
+            && effect.possible(self.model, &cause.shape, amplitudes)
             && effect
                 .shape_parameters()
                 .iter()

@@ -1,86 +1,13 @@
-//! Every effect of the catalogue against the readings.
+//! What each effect of the catalogue says of the gap.
 
-use errsep_models::model::{Estimate, FittedModel, Shape};
-use nalgebra::{DMatrix, DVector};
+use errsep_models::model::FittedModel;
+use nalgebra::DVector;
 
 use super::attribute::Answer;
 use super::bench::{Bench, Cause, Remainder};
 use super::dictionary::statistic;
+use super::sizes::Sizes;
 use super::verdict::Candidate;
-
-/// Parameters of a cause beside others: amplitudes and shape with their joint covariance.
-fn parameters<M: FittedModel>(
-    bench: &Bench<'_, M>,
-    readings: &DVector<f64>,
-    causes: &[Cause],
-    which: usize,
-) -> Vec<Estimate> {
-    let Some((amplitudes, _)) = bench.amplitudes(readings, causes) else {
-        return Vec::new();
-    };
-    let mut columns: Vec<DVector<f64>> = Vec::new();
-    let mut own = (0, 0);
-    let mut at = 0;
-    for (k, cause) in causes.iter().enumerate() {
-        let count = cause.projected.ncols();
-        let used = amplitudes.rows(at, count).clone_owned();
-        if k == which {
-            own = (columns.len(), at);
-        }
-        columns.extend(cause.projected.column_iter().map(|c| c.clone_owned()));
-        for (j, step) in cause.shape.steps.iter().enumerate() {
-            if *step == 0.0 {
-                continue;
-            }
-            let moved = |sign: f64| {
-                let mut shape: Shape = cause.shape.clone();
-                shape.values[j] += sign * 0.1 * step;
-                bench.cause(bench.model, cause.effect, shape).projected * &used
-            };
-            let slope = (moved(1.0) - moved(-1.0)) / (0.2 * step);
-            if slope.norm() > 0.0 {
-                columns.push(slope);
-            }
-        }
-        at += count;
-    }
-    let count = causes[which].projected.ncols();
-    let stacked = DMatrix::from_columns(&columns);
-    let gram = stacked.tr_mul(&stacked);
-    let covariance = gram
-        .clone()
-        .cholesky()
-        .map(|c| c.inverse())
-        .or_else(|| gram.pseudo_inverse(1e-12).ok());
-    let size = count + causes[which].shape.values.len();
-    let covariance = covariance.map_or_else(
-        || DMatrix::from_element(size, size, f64::NAN),
-        |all| {
-            DMatrix::from_fn(size, size, |i, j| {
-                all.get((own.0 + i, own.0 + j)).map_or(f64::NAN, |v| *v)
-            })
-        },
-    );
-    let (effect, shape) = (&bench.catalogue[causes[which].effect], &causes[which].shape);
-    let mut estimates = effect.estimates(
-        shape,
-        &amplitudes.as_slice()[own.1..own.1 + count],
-        &covariance,
-    );
-    // Shape parameters follow the amplitudes. A step between two readings has no derivative.
-    for (estimate, own) in estimates
-        .iter_mut()
-        .skip(count)
-        .zip(effect.resolution(bench.model, shape))
-    {
-        estimate.std = if estimate.std.is_nan() {
-            own
-        } else {
-            estimate.std.hypot(own)
-        };
-    }
-    estimates
-}
 
 /// What each effect explains, by that.
 pub(super) fn candidates<M: FittedModel>(
@@ -92,6 +19,7 @@ pub(super) fn candidates<M: FittedModel>(
     causes: &[Cause],
 ) -> Vec<Candidate> {
     let readings_count = bench.space.readings() as f64;
+    let fitted = Sizes::fitted_with_state(bench, readings, causes);
     let mut list: Vec<(f64, Candidate)> = Vec::new();
     for (effect, description) in bench.catalogue.iter().enumerate() {
         let Some(family) = bench.family_of(effect) else {
@@ -99,12 +27,19 @@ pub(super) fn candidates<M: FittedModel>(
         };
         let about = description.about();
         let named = causes.iter().position(|c| c.effect == effect);
-        let (cause, beside, which) = match named {
-            Some(which) => (Some(causes[which].clone()), causes.to_vec(), which),
+        let (cause, parameters) = match named {
+            Some(which) => (
+                Some(causes[which].clone()),
+                fitted.as_ref().map(|f| f.of(bench, causes, which)),
+            ),
             None => {
                 let start = bench.start(first, effect).cloned();
                 let cause = start.map(|shape| bench.cause(bench.model, effect, shape));
-                (cause.clone(), cause.into_iter().collect(), 0)
+                let parameters = cause.as_ref().and_then(|cause| {
+                    let alone = std::slice::from_ref(cause);
+                    Some(Sizes::fitted(bench, readings, alone)?.of(bench, alone, 0))
+                });
+                (cause, parameters)
             }
         };
         let (t, unknowns) = cause.as_ref().map_or((0.0, 0), |c| {
@@ -127,14 +62,7 @@ pub(super) fn candidates<M: FittedModel>(
                 variant: cause
                     .as_ref()
                     .and_then(|c| description.variant_name(bench.model, &c.shape)),
-                parameters: if cause.is_some() {
-                    parameters(bench, readings, &beside, which)
-                        .into_iter()
-                        .map(Into::into)
-                        .collect()
-                } else {
-                    Vec::new()
-                },
+                parameters: parameters.into_iter().flatten().map(Into::into).collect(),
                 physics: about.physics.to_owned(),
                 confirm: about.confirm.to_owned(),
             },

@@ -5,7 +5,8 @@
 //! difference. Its covariance is found by drawing: noise is laid over the readings that are free
 //! of the causes, the model fitted again, and the causes' change taken there. With B Bᵀ that
 //! covariance in whitened, projected readings, the remainder has I + B Bᵀ in place of I; along
-//! each eigenvector of B Bᵀ with eigenvalue λ a part λ/(1 + λ) of every product is taken away.
+//! each eigenvector of B Bᵀ with eigenvalue λ a part λ/(1 + λ) of every product is taken away. The
+//! same draws give what the noise of the state adds to the uncertainty of the causes' sizes.
 
 use errsep_models::model::FittedModel;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -33,15 +34,19 @@ pub(super) struct Doubt {
     pub weights: Vec<f64>,
 }
 
+/// Draws of noise over readings that are free of causes.
+pub(super) struct StateDraws {
+    /// The noise, whitened and projected, readings × draws.
+    pub noise: DMatrix<f64>,
+    /// How the causes' change moves with the state that is fitted to it, likewise.
+    pub moved: DMatrix<f64>,
+}
+
 impl<M: FittedModel> Bench<'_, M> {
-    /// The doubt about causes beside what the model and they themselves absorb (`basis`).
-    pub fn doubt(&self, readings: &DVector<f64>, causes: &[Cause], basis: &DMatrix<f64>) -> Doubt {
-        let fitted = self
-            .amplitudes(readings, causes)
-            .zip(self.changes(readings, causes));
-        let Some(((amplitudes, _), changes)) = fitted else {
-            return Doubt::default();
-        };
+    /// Draws of the state; nothing where the causes' change does not depend on it.
+    pub fn state_draws(&self, readings: &DVector<f64>, causes: &[Cause]) -> Option<StateDraws> {
+        let (amplitudes, _) = self.amplitudes(readings, causes)?;
+        let changes = self.changes(readings, causes)?;
         let clean = self.without(readings, causes, &changes);
         let change_at = |state: &M| {
             let mut change = DVector::zeros(readings.len());
@@ -61,15 +66,28 @@ impl<M: FittedModel> Bench<'_, M> {
         let drawn = |draw: u64| {
             let mut random = ChaCha8Rng::seed_from_u64(SEED);
             random.set_stream(draw);
-            let noisy = &clean + self.law.draw(self.model, &mut random);
-            change_at(&self.model.refit(noisy)) - &base
+            let noise = self.law.draw(self.model, &mut random);
+            let moved = change_at(&self.model.refit(&clean + &noise)) - &base;
+            (noise, moved)
         };
-        let first = drawn(0);
-        if first.norm() <= 1e-9 * base.norm() {
-            return Doubt::default();
+        if drawn(0).1.norm() <= 1e-9 * base.norm() {
+            return None;
         }
-        let moved: Vec<DVector<f64>> = (0..DRAWS as u64).into_par_iter().map(drawn).collect();
-        let (mut moved, _) = self.space.forward(DMatrix::from_columns(&moved));
+        let (noise, moved): (Vec<DVector<f64>>, Vec<DVector<f64>>) =
+            (0..DRAWS as u64).into_par_iter().map(drawn).unzip();
+        let forward =
+            |columns: &[DVector<f64>]| self.space.forward(DMatrix::from_columns(columns)).0;
+        Some(StateDraws {
+            noise: forward(&noise),
+            moved: forward(&moved),
+        })
+    }
+
+    /// The doubt about causes beside what the model and they themselves absorb (`basis`).
+    pub fn doubt(&self, readings: &DVector<f64>, causes: &[Cause], basis: &DMatrix<f64>) -> Doubt {
+        let Some(StateDraws { mut moved, .. }) = self.state_draws(readings, causes) else {
+            return Doubt::default();
+        };
         let along = basis.tr_mul(&moved);
         moved.gemm(-1.0, basis, &along, 1.0);
         let eigen = SymmetricEigen::new(moved.tr_mul(&moved) / DRAWS as f64);
@@ -88,5 +106,16 @@ impl<M: FittedModel> Bench<'_, M> {
             doubt.weights.push(value / (1.0 + value));
         }
         doubt
+    }
+}
+
+impl StateDraws {
+    /// What the noise of the state adds to the covariance of estimates that are `gain` times
+    /// whitened, projected readings: the same noise is in readings and state, so it may also take
+    /// away.
+    pub fn added(&self, gain: &DMatrix<f64>) -> DMatrix<f64> {
+        let own = gain * &self.noise;
+        let all = &own - gain * &self.moved;
+        (&all * all.transpose() - &own * own.transpose()) / DRAWS as f64
     }
 }

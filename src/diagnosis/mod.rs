@@ -26,6 +26,7 @@ mod refit;
 mod report;
 mod search;
 mod shape;
+mod sizes;
 mod space;
 mod spikes;
 mod statement;

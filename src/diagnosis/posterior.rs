@@ -17,7 +17,7 @@ use statrs::function::gamma::ln_gamma;
 
 use super::contrasts::Contrasts;
 use super::noise::Components;
-use super::search::compass;
+use super::search::coordinate_search;
 
 /// Proposals for each kind of law.
 const PROPOSALS: usize = 300;
@@ -159,7 +159,7 @@ fn proposed(
     let mode = kind
         .starts(range)
         .into_iter()
-        .map(|(start, steps)| compass(&start, &steps, 1e-2, |p| judged(p).0))
+        .map(|(start, steps)| coordinate_search(&start, &steps, 1e-2, |p| judged(p).0))
         .fold((Vec::new(), f64::INFINITY), |best, next| {
             if next.1 < best.1 { next } else { best }
         })

@@ -24,6 +24,12 @@ use super::{Examined, Options, examined, noise_of};
 /// Effects of which less than this part is visible are not put in.
 const SHOWN: f64 = 0.01;
 
+/// Most steps towards a size at which amplitude and signature belong together.
+const SCALINGS: usize = 24;
+
+/// Relative distance from the size drawn that is near enough.
+const SCALED: f64 = 0.05;
+
 /// How often each truth got each answer.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Trials {
@@ -62,7 +68,10 @@ pub fn prove<M: FittedModel>(
     let residual = plain.forward_vector(&readings);
     // The fit has taken a part of the noise with it.
     let swell = (readings.len() as f64 / plain.degrees_of_freedom().max(1) as f64).sqrt();
-    let fitted = &readings - &residual;
+    let fitted = model.smooth().map_or_else(
+        || &readings - &residual,
+        |smooth| smooth + (&readings - model.observed()),
+    );
     let seen: Vec<usize> = (0..catalogue.len())
         .filter(|k| {
             bench
@@ -77,11 +86,17 @@ pub fn prove<M: FittedModel>(
             random.set_stream(trial + 1);
             let mut sealed = &fitted + dealt(model, &(&residual * swell), &mut random);
             let mut truth = "none".to_owned();
-            if trial % 10 != 0 && !seen.is_empty() {
-                let effect = seen[random.random_range(0..seen.len())];
-                if let Some(change) = sealed_change(&bench, &plain, effect, &mut random) {
+            if trial % 10 != 0 {
+                // Some show such a size only where they are no longer plausible.
+                let mut effects = seen.clone();
+                effects.shuffle(&mut random);
+                let put = effects.into_iter().find_map(|effect| {
+                    let change = sealed_change(&bench, &plain, effect, &mut random)?;
+                    Some((catalogue[effect].name(), change))
+                });
+                if let Some((name, change)) = put {
                     sealed += change;
-                    catalogue[effect].name().clone_into(&mut truth);
+                    name.clone_into(&mut truth);
                 }
             }
             spikes.pull_in(&mut sealed);
@@ -116,7 +131,7 @@ fn dealt<M: FittedModel>(
     noise
 }
 
-/// An effect at a random shape and a size that shows.
+/// An effect at a random shape and a size that shows, its signature that which belongs to its size.
 fn sealed_change<M: FittedModel>(
     bench: &Bench<'_, M>,
     plain: &Space,
@@ -124,33 +139,59 @@ fn sealed_change<M: FittedModel>(
     random: &mut ChaCha8Rng,
 ) -> Option<DVector<f64>> {
     let description = &bench.catalogue[effect];
+    let positive = description
+        .amplitudes()
+        .first()
+        .is_some_and(|p| p.low >= 0.0);
     let grid = description.grid(bench.model);
     let n = bench.space.readings();
     for _ in 0..30 {
         let mut shape = grid.get(random.random_range(0..grid.len().max(1)))?.clone();
-        for (value, step) in shape.values.iter_mut().zip(&shape.steps) {
-            *value += step * (2.0 * random.random::<f64>() - 1.0);
+        for k in 0..shape.values.len() {
+            let mut moved = shape.clone();
+            moved.values[k] += shape.steps[k] * (2.0 * random.random::<f64>() - 1.0);
+            if description.allowed(bench.model, &moved) {
+                shape = moved;
+            }
         }
         if !description.allowed(bench.model, &shape) {
             continue;
         }
-        let mut change = DVector::zeros(n);
-        for column in description.columns(bench.model, &shape) {
-            let positive = description
-                .amplitudes()
-                .first()
-                .is_some_and(|p| p.low >= 0.0);
-            let sign = if positive || random.random_bool(0.5) {
-                1.0
-            } else {
-                -1.0
-            };
-            change += column.dense(n) * sign * (0.5 + random.random::<f64>());
-        }
-        let left = plain.forward_vector(&change).norm() / (n as f64).sqrt();
         let size = bench.law.sigma() * (0.7 + 2.3 * random.random::<f64>());
-        if left > 0.0 {
-            return Some(change * (size / left));
+        let mut amplitudes: Vec<f64> = description
+            .amplitudes()
+            .iter()
+            .map(|_| {
+                let sign = if positive || random.random_bool(0.5) {
+                    1.0
+                } else {
+                    -1.0
+                };
+                sign * (0.5 + random.random::<f64>())
+            })
+            .collect();
+        for _ in 0..SCALINGS {
+            shape = description.settled(&shape, &amplitudes).unwrap_or(shape);
+            let mut change = DVector::zeros(n);
+            let columns = description.columns(bench.model, &shape);
+            for (column, amplitude) in columns.iter().zip(&amplitudes) {
+                change += column.dense(n) * *amplitude;
+            }
+            let left = plain.forward_vector(&change).norm() / (n as f64).sqrt();
+            let scale = size / left;
+            let plausible = description
+                .amplitudes()
+                .iter()
+                .zip(&amplitudes)
+                .all(|(p, a)| (p.low..=p.high).contains(a))
+                && description.possible(bench.model, &shape, &amplitudes);
+            if !scale.is_finite() {
+                break;
+            }
+            if (scale - 1.0).abs() < SCALED {
+                return plausible.then_some(change);
+            }
+            amplitudes.iter_mut().for_each(|a| *a *= scale);
         }
     }
     None

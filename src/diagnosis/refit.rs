@@ -89,6 +89,11 @@ impl<M: FittedModel> Bench<'_, M> {
     /// What each cause changes in the readings at its fitted amplitudes, readings × causes.
     pub fn changes(&self, readings: &DVector<f64>, causes: &[Cause]) -> Option<DMatrix<f64>> {
         let (amplitudes, _) = self.amplitudes(readings, causes)?;
+        Some(self.changes_at(causes, &amplitudes))
+    }
+
+    /// The same at given amplitudes.
+    pub fn changes_at(&self, causes: &[Cause], amplitudes: &DVector<f64>) -> DMatrix<f64> {
         let mut changes = DMatrix::zeros(self.space.readings(), causes.len());
         let mut at = 0;
         for (k, cause) in causes.iter().enumerate() {
@@ -96,7 +101,7 @@ impl<M: FittedModel> Bench<'_, M> {
             at += cause.columns.len();
             changes.set_column(k, &self.change(std::slice::from_ref(cause), &own));
         }
-        Some(changes)
+        changes
     }
 
     /// Readings without what causes change in them, and what they hide of the state restored.

@@ -65,7 +65,9 @@ pub(super) fn compose<M: FittedModel>(
         predicted_shrink: 1.0 - (1.0 - explained / excess).max(0.0).sqrt(),
         held_out: meter.held_out(bench.model, readings, &signatures),
     };
-    let candidates = candidates(bench, readings, first, excess, found.as_ref(), causes);
+    // Without a gap there is nothing to explain.
+    let whole = if alarmed { excess } else { f64::INFINITY };
+    let candidates = candidates(bench, readings, first, whole, found.as_ref(), causes);
     let names = |effects: &[usize]| -> Vec<String> {
         effects
             .iter()

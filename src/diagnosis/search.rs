@@ -1,8 +1,10 @@
-//! A derivative-free search for functions with kinks and steps.
+//! A derivative-free search for functions that are smooth in places, with kinks and steps in others.
 
-/// Compass search: the smallest value found from a start, with a first step for each coordinate
-/// (zero keeps it); steps are halved down to `precision` of their first length.
-pub(super) fn compass(
+/// Coordinate search: the smallest value found from a start, with a first step for each coordinate
+/// (zero keeps it). Each coordinate is tried on both sides and at the vertex of the parabola through
+/// the three values; steps shrink to what the vertex asks for, or to half, down to `precision` of
+/// their first length.
+pub(super) fn coordinate_search(
     start: &[f64],
     steps: &[f64],
     precision: f64,
@@ -10,27 +12,48 @@ pub(super) fn compass(
 ) -> (Vec<f64>, f64) {
     let mut at = start.to_vec();
     let mut best = value(&at);
-    let mut scale = 1.0;
+    let mut scales = vec![1.0; steps.len()];
     let mut left = 400;
-    while scale > precision && left > 0 {
-        let mut improved = false;
+    loop {
+        let mut searching = false;
         for (k, step) in steps.iter().enumerate().filter(|(_, s)| **s != 0.0) {
-            for sign in [1.0, -1.0] {
-                let mut trial = at.clone();
-                trial[k] += sign * scale * step;
-                left -= 1;
-                let found = value(&trial);
-                if found < best {
-                    // Keep going while it pays.
-                    (at, best) = (trial, found);
-                    improved = true;
-                    break;
-                }
+            if scales[k] <= precision || left <= 0 {
+                continue;
             }
+            searching = true;
+            let centre = at[k];
+            let reach = scales[k] * step;
+            let mut here = |position: f64| {
+                let mut trial = at.clone();
+                trial[k] = position;
+                left -= 1;
+                value(&trial)
+            };
+            let (below, above) = (here(centre - reach), here(centre + reach));
+            let bend = below - 2.0 * best + above;
+            let vertex = 0.5 * (below - above) / bend;
+            let inside = bend > 0.0 && vertex.abs() < 1.0;
+            let mut moved = (0.0, best);
+            let mut offer = |part: f64, found: f64| {
+                if found < moved.1 {
+                    moved = (part, found);
+                }
+            };
+            offer(-1.0, below);
+            offer(1.0, above);
+            if inside && vertex != 0.0 {
+                offer(vertex, here(centre + vertex * reach));
+            }
+            best = moved.1;
+            at[k] = centre + moved.0 * reach;
+            scales[k] *= match moved.0.abs() {
+                1.0 => 1.0,
+                part if inside => (0.5 * part).clamp(0.05, 0.5),
+                _ => 0.5,
+            };
         }
-        if !improved {
-            scale *= 0.5;
+        if !searching {
+            return (at, best);
         }
     }
-    (at, best)
 }

@@ -30,6 +30,14 @@ impl FittedModel for FirstOrder {
         &self.observed
     }
 
+    fn smooth(&self) -> Option<DVector<f64>> {
+        let readings = 0..self.places.len();
+        Some(DVector::from_iterator(
+            self.places.len(),
+            readings.map(|k| self.smooth_reading(k)),
+        ))
+    }
+
     fn freedom(&self) -> Freedom {
         let traces = self.traces.len();
         let n = self.positions.len();

@@ -99,6 +99,14 @@ impl Effect<FirstOrder> for CyclicError {
             .is_some_and(|cycles| *cycles > 2.5 && *cycles < highest)
     }
 
+    fn possible(&self, model: &FirstOrder, shape: &Shape, amplitudes: &[f64]) -> bool {
+        let (&[cosine, sine], Some(&cycles)) = (amplitudes, shape.values.first()) else {
+            return true;
+        };
+        let steepest = std::f64::consts::TAU * cycles / model.reading_span();
+        shape.variant != 0 || cosine.hypot(sine) * steepest < 1.0
+    }
+
     fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
         let cycles = shape.values.first()?;
         Some(if shape.variant == 0 {

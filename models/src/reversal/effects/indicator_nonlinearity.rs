@@ -40,8 +40,12 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let reach = model.reading_reach();
-        let power = if shape.variant == 0 { 2 } else { 3 };
-        vec![model.of_reading(|reading| (reading / reach).powi(power))]
+        vec![model.of_reading(|reading| (reading / reach).powi(power(shape)))]
+    }
+
+    fn possible(&self, model: &FirstOrder, shape: &Shape, amplitudes: &[f64]) -> bool {
+        let steepest = f64::from(power(shape)) / model.reading_reach();
+        amplitudes.iter().all(|a| a.abs() * steepest < 1.0)
     }
 
     fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
@@ -54,4 +58,8 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
             .to_owned(),
         )
     }
+}
+
+fn power(shape: &Shape) -> i32 {
+    if shape.variant == 0 { 2 } else { 3 }
 }

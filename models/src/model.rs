@@ -414,6 +414,12 @@ pub trait FittedModel: Clone + Send + Sync {
     /// The same model fitted to other values of the same readings.
     fn refit(&self, observed: DVector<f64>) -> Self;
 
+    /// Measurements that could be made beside this one, in words, each as the model fitted to what
+    /// the present state predicts for it; the cheapest first.
+    fn further(&self) -> Vec<(String, Self)> {
+        Vec::new()
+    }
+
     /// The fitted state with a change of what is seen, one value a reading, that is not fitted:
     /// signatures of effects that depend on it are taken there.
     #[must_use]

@@ -62,12 +62,13 @@ impl<M: FittedModel> Bench<'_, M> {
             }
             change
         };
-        let base = change_at(&self.model.refit(clean.clone()));
+        let base = change_at(&self.model.refit(clean));
         let drawn = |draw: u64| {
             let mut random = ChaCha8Rng::seed_from_u64(SEED);
             random.set_stream(draw);
             let noise = self.law.draw(self.model, &mut random);
-            let moved = change_at(&self.model.refit(&clean + &noise)) - &base;
+            let clean = self.without(&(readings + &noise), causes, &changes);
+            let moved = change_at(&self.model.refit(clean)) - &base;
             (noise, moved)
         };
         if drawn(0).1.norm() <= 1e-9 * base.norm() {

@@ -29,6 +29,7 @@ mod shape;
 mod sizes;
 mod space;
 mod spikes;
+mod splitting;
 mod statement;
 mod tabulated;
 mod verdict;

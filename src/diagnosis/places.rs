@@ -4,7 +4,7 @@ use errsep_models::model::FittedModel;
 use nalgebra::DMatrix;
 
 use super::bench::{Bench, Remainder};
-use super::dictionary::{Meaning, statistic};
+use super::dictionary::{Entry, Meaning, statistic};
 use super::verdict::Where;
 
 /// Places that are not reported beyond this probability.
@@ -35,7 +35,15 @@ pub(super) fn places<M: FittedModel>(
     places
 }
 
-/// An entry of the dictionary as a place, with the part of the gap that it explains.
+/// Places of one kind whose statistics differ by less are equally likely: the 95 % quantile of
+/// chi-squared for middle and width.
+const AS_LIKELY: f64 = 5.99;
+
+/// A range over more than this part of all that was tried says nothing of where.
+const EVERYWHERE: f64 = 0.8;
+
+/// An entry of the dictionary as a place, with the part of the gap that it explains. Where the same
+/// pattern explains as much nearly everywhere, the place is the pattern alone.
 pub(super) fn place_of<M: FittedModel>(
     bench: &Bench<'_, M>,
     remainder: &Remainder,
@@ -43,19 +51,66 @@ pub(super) fn place_of<M: FittedModel>(
     excess: f64,
     p_value: f64,
 ) -> Option<Where> {
-    let entry = &bench.dictionary.entries[entry];
-    let Meaning::Place(item) = &entry.meaning else {
+    let dictionary = &bench.dictionary;
+    let Meaning::Place(item) = &dictionary.entries[entry].meaning else {
         return None;
     };
     let residual = &remainder.residual;
     let whole = DMatrix::from_column_slice(residual.len(), 1, residual.as_slice());
     let adjoint = bench.space.adjoint(whole).column(0).clone_owned();
-    let score = entry.products(&bench.dictionary.places.sums(&adjoint));
-    let t = statistic(&entry.gram, &score, false);
+    let sums = dictionary.places.sums(&adjoint);
+    let explained = |entry: &Entry| statistic(&entry.gram, &entry.products(&sums), false);
+    let t = explained(&dictionary.entries[entry]);
+    let alike = dictionary
+        .families
+        .iter()
+        .find(|family| family.entries.contains(&entry))
+        .map_or(&[][..], |family| {
+            &dictionary.entries[family.entries.clone()]
+        })
+        .iter()
+        .filter_map(|other| match &other.meaning {
+            Meaning::Place(place) if place.axis == item.axis && place.value == item.value => {
+                Some((place.from?, place.to?, other))
+            }
+            _ => None,
+        });
+    let (mut tried, mut likely) = (Reach::default(), Reach::default());
+    for (from, to, other) in alike {
+        tried.take(from, to);
+        if explained(other) > t - AS_LIKELY {
+            likely.take(from, to);
+        }
+    }
     let reach = 1.96 * 2.0 * t.sqrt() / excess;
     let share = (t / excess).clamp(0.0, 1.0);
     let interval = [(share - reach).max(0.0), (share + reach).min(1.0)];
-    Some(Where::new(item, share, interval, p_value))
+    let mut place = Where::new(item, share, interval, p_value);
+    if likely.length() > EVERYWHERE * tried.length() {
+        (place.from, place.to) = (None, None);
+    }
+    // A wavelength that is not known is no place.
+    (item.axis != "wavelength" || place.from.is_some()).then_some(place)
+}
+
+/// From the least to the greatest.
+struct Reach(f64, f64);
+
+impl Default for Reach {
+    fn default() -> Self {
+        Self(f64::INFINITY, f64::NEG_INFINITY)
+    }
+}
+
+impl Reach {
+    fn take(&mut self, from: f64, to: f64) {
+        self.0 = self.0.min(from.min(to));
+        self.1 = self.1.max(from.max(to));
+    }
+
+    fn length(&self) -> f64 {
+        (self.1 - self.0).max(0.0)
+    }
 }
 
 /// The part of the gap in each channel.

@@ -11,6 +11,7 @@ use super::places::places;
 use super::quantify::{GapMeter, biases, shrink};
 use super::shape::fingerprint;
 use super::spikes::Calmed;
+use super::splitting::splits;
 use super::statement::{separating, statement};
 use super::verdict::{Detail, Diagnosis, Gap, Kind, NoiseOut, Verdict};
 use super::{Examined, Options};
@@ -108,7 +109,11 @@ pub(super) fn compose<M: FittedModel>(
         p_value: detected,
         adequacy: found.as_ref().map_or(first.global, |a| a.remainder.global),
     };
-    verdict.separate = separating(&verdict.indistinguishable, &candidates);
+    let splits = match (found, kind) {
+        (Some(answer), Kind::Effect) => splits(bench, readings, answer),
+        _ => Vec::new(),
+    };
+    verdict.separate = separating(&verdict.indistinguishable, &candidates, &splits);
     let hidden = hidden(bench, &verdict.effects, options);
     verdict.statement = statement(&verdict, &gap, &places, &candidates, &hidden);
     let (bias, profiles) = biases(bench.model, &bench.law, readings, &change);

@@ -1,5 +1,6 @@
 //! The verdict in a sentence that a person can act on.
 
+use super::splitting::Split;
 use super::verdict::{Candidate, Fingerprint, Gap, Hidden, Kind, Verdict, Where};
 use crate::report::number::{measured, plain};
 
@@ -104,23 +105,41 @@ fn describe(candidate: &Candidate) -> String {
             (1.0, for_people(&p.unit))
         };
         let value = measured(scale * p.value, Some(scale * p.std));
-        format!("{} {value} {unit}", p.name)
+        format!("{} {value} {unit}", p.name).trim_end().to_owned()
     }));
     format!(" ({})", parts.join(", "))
 }
 
-/// For each group the observation that would split it: that which confirms or refutes the effect
-/// named first.
-pub(super) fn separating(groups: &[Vec<String>], candidates: &[Candidate]) -> Vec<String> {
+/// For each group what would split it: a further measurement where one suffices, and else the
+/// observation that confirms or refutes the effect named first.
+pub(super) fn separating(
+    groups: &[Vec<String>],
+    candidates: &[Candidate],
+    splits: &[Option<Split>],
+) -> Vec<String> {
     groups
         .iter()
-        .filter_map(|group| {
+        .enumerate()
+        .filter_map(|(k, group)| {
             let first = group.first()?;
             let candidate = candidates.iter().find(|c| c.effect == *first)?;
-            Some(format!(
-                "{} (only {first} would show there)",
-                candidate.confirm
-            ))
+            let observe = format!("{} (only {first} would show there)", candidate.confirm);
+            let split = splits.get(k).and_then(Option::as_ref);
+            Some(match split {
+                Some(split) if split.suffices() => format!(
+                    "{}, which takes them from {} to {} standard deviations apart, or {observe}",
+                    split.measurement,
+                    plain(split.now, 2),
+                    plain(split.then, 2)
+                ),
+                Some(split) => format!(
+                    "{observe}; to {} would take them from {} to {} standard deviations apart only",
+                    split.measurement,
+                    plain(split.now, 2),
+                    plain(split.then, 2)
+                ),
+                None => observe,
+            })
         })
         .collect()
 }

@@ -170,6 +170,10 @@ impl FittedModel for FirstOrder {
         fitted
     }
 
+    fn further(&self) -> Vec<(String, Self)> {
+        self.further_measurements()
+    }
+
     fn beneath(mut self, change: &DVector<f64>) -> Self {
         self.beneath = Some(change.clone());
         self

@@ -6,6 +6,7 @@
 //! and everything that differs between repeats or directions of one channel.
 
 mod fitted;
+mod further;
 mod sorting;
 
 use std::collections::BTreeSet;

@@ -1,5 +1,5 @@
 //! Blind campaign for every model but the reversal: `cargo run --release --example
-//! other_models_campaign -- CASES SEED`. Prints, for each effect, how often it was named, and what
+//! other_models_campaign -- CASES SEED`. Prints, as tables, for each effect, how often it was named, and what
 //! was said with the effect withheld and with nothing there.
 
 #[path = "../tests/other_models/mod.rs"]
@@ -28,7 +28,8 @@ fn main() {
             without: without.iter().map(|s| (*s).to_owned()).collect(),
             ..Options::default()
         };
-        println!("\n{}", maker.model);
+        println!("\n### {}\n", maker.model);
+        println!("| effect | seen from | put in | the same, withheld |\n|---|---|---|---|");
         for effect in maker.effects {
             let smallest = seen_from(&maker, effect, &options(&[]));
             let outcomes: Vec<[String; 2]> = (0..cases)
@@ -66,7 +67,7 @@ fn main() {
                 parts.join(", ")
             };
             println!(
-                "  {effect} (seen from {smallest:.3e}): {} | withheld: {}",
+                "| {effect} | {smallest:.3e} | {} | {} |",
                 count(0),
                 count(1)
             );
@@ -78,6 +79,6 @@ fn main() {
                 judged(&diagnosis, None) != "none, right"
             })
             .count();
-        println!("  nothing there: {alarms} alarms in {}", 10 * cases);
+        println!("\nNothing there: {alarms} alarms in {}.", 10 * cases);
     }
 }

@@ -13,8 +13,9 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::{Answer, CommonArgs};
-use crate::diagnosis::{Diagnosability, NoiseLaw, NoiseSource, Options, certificate};
+use crate::diagnosis::{Diagnosability, NoiseLaw, NoiseSource, Options, certificate, for_people};
 use crate::io::{Message, SetupFile, Status};
+use crate::report::number::plain;
 use crate::report::{Cell, Page, Section, Table};
 
 /// What a planned reversal can show: visible part, smallest detectable and identifiable size,
@@ -72,6 +73,9 @@ fn expected_forms() -> [f64; 2] {
 
 /// Most readings of a plan.
 const MOST_READINGS: usize = 100_000;
+
+/// Biases below this, rad, are rounding.
+const NO_BIAS: f64 = 1e-12;
 
 /// Draws behind the thresholds of a plan.
 const DRAWS: usize = 400;
@@ -212,11 +216,12 @@ fn size(value: Option<f64>, unit: &str) -> String {
     value.map_or_else(
         || "never".to_owned(),
         |v| {
-            if unit == "rad" {
-                format!("{:.3} urad", v * 1e6)
+            let (value, unit) = if unit == "rad" {
+                (v * 1e6, "µrad")
             } else {
-                format!("{v:.3} {unit}")
-            }
+                (v, for_people(unit))
+            };
+            format!("{} {unit}", plain(value, 3)).trim_end().to_owned()
         },
     )
 }
@@ -229,8 +234,10 @@ fn harm(row: &Diagnosability) -> String {
             .cloned()
     };
     match (greatest(&row.harm_per_visible), greatest(&row.harm)) {
-        (Some((name, bias, _)), _) => format!("{:.3} µrad in {name}", 1e6 * bias),
-        (None, Some((name, bias, _))) if bias.abs() > 1e-15 => format!("unseen, in {name}"),
+        (Some((name, bias, _)), _) if bias.abs() > NO_BIAS => {
+            format!("{} µrad in {name}", plain(1e6 * bias, 3))
+        }
+        (None, Some((name, bias, _))) if bias.abs() > NO_BIAS => format!("unseen, in {name}"),
         _ => String::new(),
     }
 }

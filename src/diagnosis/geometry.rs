@@ -30,9 +30,10 @@ pub struct Diagnosability {
     pub effect: String,
     /// Part of it that the fit cannot absorb.
     pub visible: f64,
-    /// Smallest amplitude seen with 80 % probability, if any.
+    /// Smallest amplitude seen with 80 % probability, if any that is plausible is.
     pub detectable: Option<f64>,
-    /// Smallest amplitude told from every other effect with 99 % probability, if any.
+    /// Smallest amplitude told from every other effect with 99 % probability, if any that is
+    /// plausible is.
     pub identifiable: Option<f64>,
     /// Unit of the amplitudes.
     pub unit: String,
@@ -113,25 +114,34 @@ pub fn certificate<M: FittedModel>(
                 .column(0)
                 .clone_owned();
             let adjoint = dictionary.places.sums(&adjoint);
-            for other in dictionary
-                .families
-                .iter()
-                .filter(|f| f.is_effect && f.name != effect.name())
-            {
-                for candidate in &dictionary.entries[other.entries.clone()] {
+            let seen = null.threshold(family, level).sqrt() + POWER;
+            for other in catalogue.iter().filter(|o| o.name() != effect.name()) {
+                let Some(rival) = dictionary
+                    .families
+                    .iter()
+                    .find(|f| f.is_effect && f.name == other.name())
+                else {
+                    continue;
+                };
+                for candidate in &dictionary.entries[rival.entries.clone()] {
                     let score = candidate.products(&adjoint);
                     let cosine = statistic(&candidate.gram, &score, false)
                         .clamp(0.0, 1.0)
                         .sqrt();
-                    if cosine > row.cosine && matches!(candidate.meaning, Meaning::Effect(_)) {
+                    // What it takes to imitate the smallest size that is seen must be plausible.
+                    let needed = seen * cosine / candidate.gram[(0, 0)].sqrt();
+                    if cosine > row.cosine
+                        && needed <= greatest_plausible(other.as_ref())
+                        && matches!(candidate.meaning, Meaning::Effect(_))
+                    {
                         row.cosine = cosine;
-                        row.confused_with = Some(other.name.clone());
+                        row.confused_with = Some(other.name().to_owned());
                     }
                 }
             }
-            let threshold = null.threshold(family, level);
-            let smallest = (threshold.sqrt() + POWER) / length;
-            row.detectable = Some(smallest);
+            let plausible = |size: &f64| *size <= greatest_plausible(effect.as_ref());
+            let smallest = seen / length;
+            row.detectable = Some(smallest).filter(plausible);
             let per_unit = length * law.sigma() / (n as f64).sqrt();
             // The harm is that of the first shape of the grid, so its own visible part counts.
             let first = space.gram(&first).matrix[(0, 0)].sqrt() / length;
@@ -143,9 +153,18 @@ pub fn certificate<M: FittedModel>(
             row.visible_rms = Some(smallest * length * law.sigma() / (n as f64).sqrt());
             let half_angle = 0.5 * row.cosine.acos();
             row.identifiable = (half_angle.sin() > 1e-3)
-                .then(|| (TELL / (length * half_angle.sin())).max(smallest));
+                .then(|| (TELL / (length * half_angle.sin())).max(smallest))
+                .filter(plausible);
         }
         rows.push(row);
     }
     rows
+}
+
+/// The greatest plausible size of an effect.
+pub(super) fn greatest_plausible<M>(effect: &dyn Effect<M>) -> f64 {
+    effect
+        .amplitudes()
+        .first()
+        .map_or(f64::INFINITY, |p| p.low.abs().max(p.high.abs()))
 }

@@ -4,6 +4,7 @@ use errsep_models::model::FittedModel;
 
 use super::Options;
 use super::bench::Bench;
+use super::geometry::greatest_plausible;
 use super::quantify::weighted_std;
 use super::verdict::{Harm, Hidden};
 
@@ -41,10 +42,7 @@ pub(super) fn hidden<M: FittedModel>(
         let entries = &bench.dictionary.entries[bench.dictionary.families[family].entries.clone()];
         let gram = entries.iter().map(|e| e.gram[(0, 0)]).fold(0.0, f64::max);
         let threshold = bench.null.threshold(family, level);
-        let most = description
-            .amplitudes()
-            .first()
-            .map_or(f64::INFINITY, |p| p.low.abs().max(p.high.abs()));
+        let most = greatest_plausible(description.as_ref());
         let detectable = (visible >= UNDETECTABLE && gram > 0.0)
             .then(|| (threshold.sqrt() + POWER) / gram.sqrt())
             .filter(|size| *size <= most);

@@ -57,3 +57,49 @@ pub(super) fn coordinate_search(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A parabola is found in its vertex, not by halving alone.
+    #[test]
+    fn a_smooth_minimum_takes_few_values() {
+        let mut count = 0;
+        let (at, value) = coordinate_search(&[0.0, 0.0], &[1.0, 1.0], 1e-2, |v| {
+            count += 1;
+            (v[0] - 0.4).powi(2) + 3.0 * (v[1] + 0.7).powi(2)
+        });
+        // A hundredth of the first step, as asked for; the vertex of a parabola is exact.
+        assert!(
+            (at[0] - 0.4).abs() < 1e-9 && (at[1] + 0.7).abs() < 1e-9,
+            "{at:?}"
+        );
+        assert!(value < 1e-18);
+        // Halving to a hundredth takes 2 · 7 values a coordinate and the moves; this three rounds.
+        assert!(count <= 20, "{count}");
+    }
+
+    #[test]
+    fn a_minimum_several_steps_away_is_walked_to() {
+        let far = coordinate_search(&[0.0], &[1.0], 1e-2, |v| (v[0] - 25.3).abs());
+        assert!((far.0[0] - 25.3).abs() < 1e-2, "{:?}", far.0);
+    }
+
+    #[test]
+    fn steps_and_what_is_not_allowed_are_withstood() {
+        let (at, value) = coordinate_search(&[0.2, 5.0], &[1.0, 0.0], 1e-2, |v| {
+            if v[0] > 2.5 {
+                f64::INFINITY
+            } else {
+                (2.0 - v[0]).abs().ceil()
+            }
+        });
+        assert!(
+            value <= 1.0 && at[0] <= 2.5 && at[0] >= 1.0,
+            "{at:?} {value}"
+        );
+        // A step of zero keeps its coordinate.
+        assert!((at[1] - 5.0).abs() < f64::EPSILON);
+    }
+}

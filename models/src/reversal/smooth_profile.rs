@@ -113,10 +113,22 @@ impl Smoother {
         let whole = own
             .iter()
             .fold(DVector::zeros(mean.len()), |sum, c| sum + c);
+        // Σ (c − k·rest)² over the repeats as squares and products that no weight changes.
+        let sums: Vec<(f64, f64, f64)> = (0..mean.len())
+            .map(|d| {
+                own.iter().fold((0.0, 0.0, 0.0), |(cc, cr, rr), c| {
+                    let (c, rest) = (c[d], whole[d] - c[d]);
+                    (cc + c * c, cr + c * rest, rr + rest * rest)
+                })
+            })
+            .collect();
         let missed = |weight: f64| -> f64 {
-            own.iter()
-                .flat_map(|c| c.iter().zip(whole.iter()).zip(self.roughness.iter()))
-                .map(|((c, all), d)| (c - (all - c) / ((count - 1.0) * (1.0 + weight * d))).powi(2))
+            sums.iter()
+                .zip(self.roughness.iter())
+                .map(|((cc, cr, rr), d)| {
+                    let k = 1.0 / ((count - 1.0) * (1.0 + weight * d));
+                    cc - 2.0 * k * cr + k * k * rr
+                })
                 .sum()
         };
         let top = self.roughness.max();

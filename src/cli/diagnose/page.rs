@@ -3,7 +3,7 @@
 use errsep_models::model::{FittedModel, Place};
 
 use super::words::shown;
-use crate::diagnosis::{Diagnosis, Kind};
+use crate::diagnosis::{Diagnosis, Kind, for_people};
 use crate::report::diagnosis as sheet;
 use crate::report::number::plain;
 
@@ -30,7 +30,7 @@ pub(super) fn view<M: FittedModel>(
         },
         statement: diagnosis.verdict.statement.clone(),
         gap: sheet::Gap {
-            unit: gap.unit.to_owned(),
+            unit: for_people(gap.unit).to_owned(),
             noise: gap.noise,
             before: size(gap.before),
             after: size(gap.after),
@@ -67,7 +67,7 @@ pub(super) fn view<M: FittedModel>(
             })
             .collect(),
         hidden: diagnosis.hidden.iter().map(hidden).collect(),
-        warnings: diagnosis.notes.clone(),
+        notes: diagnosis.notes.clone(),
         trials: None,
     }
 }
@@ -180,7 +180,7 @@ fn hidden(hidden: &crate::diagnosis::Hidden) -> sheet::Hidden {
                 "{} {unit} in {} per {}",
                 plain(value, 3),
                 h.quantity,
-                hidden.unit
+                for_people(&hidden.unit)
             )
         }),
     }

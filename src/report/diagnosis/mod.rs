@@ -30,14 +30,14 @@ pub fn page(view: &View) -> Page {
 
 fn gap(view: &View) -> Section {
     let gap = &view.gap;
-    let warned = view
-        .warnings
+    let noted = view
+        .notes
         .iter()
         .fold(Section::new("The gap"), |section, text| {
-            section.warning(text.clone())
+            section.note(text.clone())
         });
     if gap.unit.is_empty() {
-        return warned;
+        return noted;
     }
     let unit = || gap.unit.clone();
     let size = |name: &str, size: &Size| {
@@ -76,7 +76,7 @@ fn gap(view: &View) -> Section {
                     .note(shrunk(shrink)),
             );
     }
-    let section = warned.key_figures(figures);
+    let section = noted.key_figures(figures);
     if view.finding == Finding::None {
         return section;
     }

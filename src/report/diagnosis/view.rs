@@ -40,8 +40,8 @@ pub struct View {
     pub profiles: Vec<Profile>,
     /// Effects that these data show badly or not at all.
     pub hidden: Vec<Hidden>,
-    /// Anything the reader has to be careful about.
-    pub warnings: Vec<String>,
+    /// What the reader should know.
+    pub notes: Vec<String>,
     /// Outcome of blind trials with effects put into these data, where they were asked for.
     pub trials: Option<Trials>,
 }

@@ -329,6 +329,34 @@ fn a_group_comes_with_the_measurement_that_splits_it() {
     assert!(groups >= 2, "{groups}");
 }
 
+/// Two effects of like size are both named. Beside a cone ten times as large the same period may as
+/// well be what the cone's signature leaves, and the answer is that both would leave nothing.
+#[test]
+fn a_small_cause_beside_a_strong_one_is_partial() {
+    let verdict = |half_angle: f64| {
+        let mut truth = scene(14, 3e-5);
+        let period = Injection::CyclicError {
+            amplitude: 0.15,
+            period: truth.travel() / 9.3,
+            phase: 0.4,
+            of_reading: false,
+        };
+        truth.effects = vec![Injection::Taper(half_angle), period];
+        let mut verdict = diagnosed(&truth.measured(14), &[]).verdict;
+        verdict.effects.sort();
+        verdict.partial.sort();
+        verdict
+    };
+    let both = ["cyclic-error", "taper"];
+    assert_eq!(verdict(2e-6).effects, both);
+    let beside = verdict(2e-5);
+    assert_eq!(beside.kind, Kind::Unknown, "{}", beside.statement);
+    assert!(
+        both.iter()
+            .all(|name| beside.partial.contains(&(*name).to_owned()))
+    );
+}
+
 /// A cone is a straight line in S_A + S_B: everywhere and nowhere. A speck of dirt has a place.
 #[test]
 fn a_place_is_told_only_where_there_is_one() {

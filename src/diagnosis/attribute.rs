@@ -13,6 +13,9 @@ use super::quantify::held_out_square;
 
 /// A further cause must stand out beside the others at this level.
 const EARNED: f64 = 0.002;
+/// Part of the strongest cause's statistic that a further one must reach. What is less may be the
+/// remainder of a cause taken for another whose signature is off by a seventh of its size.
+const WEIGHTY: f64 = 0.02;
 /// A cause whose statistic is this much below the best cannot be adequate.
 const HOPELESS: f64 = 80.0;
 /// Causes whose misfits differ by less fit equally well: the one of more usual size goes first.
@@ -254,16 +257,33 @@ fn confidence_set<M: FittedModel>(
         }
     }
     let needed = best.len() == 1
-        || (0..best.len()).all(|k| {
-            let beside = bench.remainder(readings, &without(&best, k));
-            bench.p_value(&beside, best[k].effect) < EARNED
-        }) && predicts(bench, readings, &best);
+        || weighty(bench, readings, &best)
+            && (0..best.len()).all(|k| {
+                let beside = bench.remainder(readings, &without(&best, k));
+                bench.p_value(&beside, best[k].effect) < EARNED
+            })
+            && predicts(bench, readings, &best);
     Answer {
         complete: needed && adequate(&best, &remainder),
         causes: best,
         groups,
         remainder,
     }
+}
+
+/// Whether each of several causes explains more than may be left of the strongest of them because
+/// its signature is not quite that of the true cause.
+fn weighty<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> bool {
+    let all = bench.misfit(readings, causes);
+    let explained: Vec<f64> = (0..causes.len())
+        .map(|k| bench.misfit(readings, &without(causes, k)) - all)
+        .collect();
+    let most = explained.iter().copied().fold(0.0, f64::max);
+    explained.iter().all(|own| *own > WEIGHTY * most)
 }
 
 /// Whether each of several causes makes the prediction of held-out repeats better; a cause that

@@ -18,9 +18,9 @@ use super::space::{Space, orthonormal};
 /// Beside other causes a signature must keep this part of its visible length to be told apart.
 const SEPARABLE: f64 = 0.02;
 
-/// A set of one, two, three causes whose remainder is less probable than this is not adequate: the
-/// more of them, the more freely they imitate what none of them is.
-const ADEQUATE: [f64; 3] = [0.002, 0.01, 0.05];
+/// A set of one, two, three causes whose remainder is less probable than this is not adequate:
+/// three imitate freely what none of them is.
+const ADEQUATE: [f64; 3] = [0.002, 0.002, 0.01];
 
 /// Part of a shape's first step that its search settles to.
 const PRECISION: f64 = 1e-2;

@@ -159,7 +159,16 @@ fn tried(set: &str, job: &Job) -> Option<Outcome> {
     let diagnosis = solve(&made.observations, withheld, job.case)?;
     let seconds = start.elapsed().as_secs_f64();
     let report = seal(&format!("{:?} {:?}", diagnosis.verdict, diagnosis.gap));
-    Some(opened(set, job, &made, &diagnosis, seconds, report))
+    let mut outcome = opened(set, job, &made, &diagnosis, seconds, report);
+    if !withheld.is_empty() && outcome.kind == "effect" {
+        let whole = solve(&made.observations, &[], job.case)?.verdict;
+        let alike = |group: &Vec<String>| {
+            let same = |names: &[String]| names.iter().all(|name| group.contains(name));
+            same(&outcome.truth) && same(&outcome.said)
+        };
+        outcome.alias = whole.indistinguishable.iter().any(alike);
+    }
+    Some(outcome)
 }
 
 /// The solver: it sees readings only.
@@ -223,6 +232,7 @@ fn opened(
         partial: verdict.partial.clone(),
         p_value: verdict.p_value,
         adequacy: verdict.adequacy,
+        alias: false,
         gap_true: made.gap,
         gap: diagnosis.gap.before.rms,
         held_after: held.map(|h| h.after),

@@ -27,6 +27,9 @@ pub struct Outcome {
     pub partial: Vec<String>,
     pub p_value: f64,
     pub adequacy: f64,
+    /// Withheld: what was named is one that the whole catalogue cannot tell from the truth.
+    #[serde(default)]
+    pub alias: bool,
     pub gap_true: f64,
     pub gap: f64,
     pub held_after: Option<f64>,

@@ -286,6 +286,12 @@ pub trait Effect<M>: Send + Sync {
         None
     }
 
+    /// The same physical effect at another state of the model, where shape or amplitudes are told
+    /// relative to the state.
+    fn carried(&self, _from: &M, _to: &M, shape: &Shape, amplitudes: &[f64]) -> (Shape, Vec<f64>) {
+        (shape.clone(), amplitudes.to_vec())
+    }
+
     /// The readings without this effect, where taking its change out of them does not suffice
     /// because the effect hides a part of the state: from the readings with it and those less its
     /// change, `clean`.

@@ -41,6 +41,10 @@ pub(super) fn splits<M: FittedModel>(
     answer: &Answer,
 ) -> Vec<Option<Split>> {
     let groups = answer.groups.iter().enumerate();
+    let mut groups = groups.filter(|(_, group)| group.len() > 1).peekable();
+    if groups.peek().is_none() {
+        return Vec::new();
+    }
     let further: Vec<(String, M, Space)> = bench
         .model
         .further()
@@ -51,7 +55,6 @@ pub(super) fn splits<M: FittedModel>(
         })
         .collect();
     groups
-        .filter(|(_, group)| group.len() > 1)
         .map(|(k, group)| split(bench, readings, &answer.causes, k, group, &further))
         .collect()
 }
@@ -86,8 +89,14 @@ fn split<M: FittedModel>(
         let signatures = |cause: &Cause| {
             let here = cause.projected.clone();
             extra.map_or(here.clone(), |(_, model, space)| {
-                let columns = bench.catalogue[cause.effect].columns(model, &cause.shape);
-                below(&here, &space.forward_columns(&columns).0)
+                let effect = &bench.catalogue[cause.effect];
+                let unit = vec![1.0; cause.columns.len()];
+                let (shape, grown) = effect.carried(bench.model, model, &cause.shape, &unit);
+                let mut there = space.forward_columns(&effect.columns(model, &shape)).0;
+                for (mut column, grown) in there.column_iter_mut().zip(grown) {
+                    column *= grown;
+                }
+                below(&here, &there)
             })
         };
         let change = signatures(&named) * &own;

@@ -107,6 +107,22 @@ impl Effect<FirstOrder> for CyclicError {
         shape.variant != 0 || cosine.hypot(sine) * steepest < 1.0
     }
 
+    /// A period of the reading is told by its cycles over the span of the readings.
+    fn carried(
+        &self,
+        from: &FirstOrder,
+        to: &FirstOrder,
+        shape: &Shape,
+        amplitudes: &[f64],
+    ) -> (Shape, Vec<f64>) {
+        let mut shape = shape.clone();
+        if shape.variant == 0 {
+            let grown = to.reading_span() / from.reading_span();
+            shape.values.iter_mut().for_each(|cycles| *cycles *= grown);
+        }
+        (shape, amplitudes.to_vec())
+    }
+
     fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
         let cycles = shape.values.first()?;
         Some(if shape.variant == 0 {

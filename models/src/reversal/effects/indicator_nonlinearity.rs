@@ -48,6 +48,21 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
         amplitudes.iter().all(|a| a.abs() * steepest < 1.0)
     }
 
+    /// The deviation is told at the greatest reading.
+    fn carried(
+        &self,
+        from: &FirstOrder,
+        to: &FirstOrder,
+        shape: &Shape,
+        amplitudes: &[f64],
+    ) -> (Shape, Vec<f64>) {
+        let grown = (to.reading_reach() / from.reading_reach()).powi(power(shape));
+        (
+            shape.clone(),
+            amplitudes.iter().map(|a| a * grown).collect(),
+        )
+    }
+
     fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
         Some(
             if shape.variant == 0 {

@@ -1,17 +1,29 @@
 //! Blind campaign for every model but the reversal: `cargo run --release --example
-//! other_models_campaign -- CASES SEED`. Prints, as tables, for each effect, how often it was named, and what
-//! was said with the effect withheld and with nothing there.
+//! other_models_campaign -- CASES SEED`. Prints, as tables, for each effect, how often it was named, how
+//! often its size was within two standard uncertainties, and what was said with the effect withheld; for
+//! each pair of effects whether both were named; and the alarms with nothing there.
 
 #[path = "../tests/other_models/mod.rs"]
 mod other_models;
 
 use std::collections::BTreeMap;
 
-use errsep::diagnosis::Options;
-use other_models::{MAKERS, judged, seen_from};
+use errsep::diagnosis::{Diagnosis, Options};
+use other_models::{MAKERS, Maker, judged, judged_pair, seen_from};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+
+/// Data with nothing there for one case of an effect.
+const NULLS: u64 = 40;
+
+fn options(without: &[&str]) -> Options {
+    Options {
+        draws: 400,
+        without: without.iter().map(|s| (*s).to_owned()).collect(),
+        ..Options::default()
+    }
+}
 
 fn main() {
     let mut arguments = std::env::args()
@@ -23,62 +35,116 @@ fn main() {
     );
     println!("{cases} cases an effect, seed {first}; sizes 1.5 to 4 times what is seen with 80 %");
     for maker in MAKERS {
-        let options = |without: &[&str]| Options {
-            draws: 400,
-            without: without.iter().map(|s| (*s).to_owned()).collect(),
-            ..Options::default()
-        };
         println!("\n### {}\n", maker.model);
-        println!("| effect | seen from | put in | the same, withheld |\n|---|---|---|---|");
-        for effect in maker.effects {
-            let smallest = seen_from(&maker, effect, &options(&[]));
-            let outcomes: Vec<[String; 2]> = (0..cases)
-                .into_par_iter()
-                .map(|case| {
-                    let mut random = ChaCha8Rng::seed_from_u64(first * 10_000 + case);
-                    let size = smallest * (1.5 + 2.5 * random.random::<f64>());
-                    let seed = random.random_range(2..1_000_000);
-                    let put = Some((*effect, size));
-                    let known = (maker.diagnosed)(put, seed, &options(&[]));
-                    let withheld = (maker.diagnosed)(put, seed, &options(&[effect]));
-                    let said = judged(&known, Some(effect));
-                    let other = match judged(&withheld, Some(effect)) {
-                        "another named" => withheld.verdict.effects.join(" + "),
-                        word => word.to_owned(),
-                    };
-                    let said = match said {
-                        "another named" | "with another" => {
-                            format!("{said} ({})", known.verdict.effects.join(" + "))
-                        }
-                        word => word.to_owned(),
-                    };
-                    [said, other]
-                })
-                .collect();
-            let count = |which: usize| {
-                let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-                for outcome in &outcomes {
-                    *counts.entry(outcome[which].as_str()).or_default() += 1;
-                }
-                let parts: Vec<String> = counts
-                    .iter()
-                    .map(|(said, n)| format!("{said} {n}"))
-                    .collect();
-                parts.join(", ")
-            };
-            println!(
-                "| {effect} | {smallest:.3e} | {} | {} |",
-                count(0),
-                count(1)
-            );
-        }
-        let alarms = (0..10 * cases)
+        let seen: Vec<(&str, f64)> = maker
+            .effects
+            .iter()
+            .map(|effect| (*effect, seen_from(&maker, effect, &options(&[]))))
+            .collect();
+        single(&maker, &seen, cases, first);
+        pairs(&maker, &seen, cases, first);
+        let alarms = (0..NULLS * cases)
             .into_par_iter()
             .filter(|case| {
-                let diagnosis = (maker.diagnosed)(None, first * 20_000 + case, &options(&[]));
+                let diagnosis = (maker.diagnosed)(&[], first * 20_000 + case, &options(&[]));
                 judged(&diagnosis, None) != "none, right"
             })
             .count();
-        println!("\nNothing there: {alarms} alarms in {}.", 10 * cases);
+        println!("\nNothing there: {alarms} alarms in {}.", NULLS * cases);
     }
+}
+
+/// Each effect alone, with the whole catalogue and withheld.
+fn single(maker: &Maker, seen: &[(&str, f64)], cases: u64, first: u64) {
+    println!("| effect | seen from | put in | size within 2 u | the same, withheld |");
+    println!("|---|---|---|---|---|");
+    for (effect, smallest) in seen {
+        let outcomes: Vec<(String, Option<bool>, String)> = (0..cases)
+            .into_par_iter()
+            .map(|case| {
+                let mut random = ChaCha8Rng::seed_from_u64(first * 10_000 + case);
+                let size = smallest * (1.5 + 2.5 * random.random::<f64>());
+                let seed = random.random_range(2..1_000_000);
+                let put = [(*effect, size)];
+                let known = (maker.diagnosed)(&put, seed, &options(&[]));
+                let withheld = (maker.diagnosed)(&put, seed, &options(&[effect]));
+                let other = match judged(&withheld, Some(effect)) {
+                    "another named" => withheld.verdict.effects.join(" + "),
+                    word => word.to_owned(),
+                };
+                let said = judged(&known, Some(effect));
+                let near = (said == "named alone").then(|| within(&known, effect, size));
+                let said = match said {
+                    "another named" | "with another" => {
+                        format!("{said} ({})", known.verdict.effects.join(" + "))
+                    }
+                    word => word.to_owned(),
+                };
+                (said, near, other)
+            })
+            .collect();
+        let sized = outcomes.iter().filter_map(|o| o.1).count();
+        let near = outcomes.iter().filter(|o| o.1 == Some(true)).count();
+        println!(
+            "| {effect} | {smallest:.3e} | {} | {near} of {sized} | {} |",
+            counted(outcomes.iter().map(|o| o.0.as_str())),
+            counted(outcomes.iter().map(|o| o.2.as_str()))
+        );
+    }
+}
+
+/// Every two effects at once.
+fn pairs(maker: &Maker, seen: &[(&str, f64)], cases: u64, first: u64) {
+    let both: Vec<[(&str, f64); 2]> = seen
+        .iter()
+        .enumerate()
+        .flat_map(|(k, a)| seen[k + 1..].iter().map(move |b| [*a, *b]))
+        .collect();
+    let trials: Vec<([(&str, f64); 2], u64)> = both
+        .iter()
+        .flat_map(|pair| (0..cases.div_ceil(4)).map(move |case| (*pair, case)))
+        .collect();
+    let outcomes: Vec<(&str, [&str; 2])> = trials
+        .par_iter()
+        .map(|(pair, case)| {
+            let mut random = ChaCha8Rng::seed_from_u64(first * 30_000 + case);
+            let put = pair.map(|(effect, smallest)| {
+                (effect, smallest * (1.5 + 2.5 * random.random::<f64>()))
+            });
+            let seed = random.random_range(2..1_000_000);
+            let diagnosis = (maker.diagnosed)(&put, seed, &options(&[]));
+            let names = pair.map(|(effect, _)| effect);
+            (judged_pair(&diagnosis, names), names)
+        })
+        .collect();
+    println!(
+        "\nTwo at once, {} cases: {}.",
+        outcomes.len(),
+        counted(outcomes.iter().map(|o| o.0))
+    );
+    let missed = outcomes.iter().filter(|o| o.0 == "another among them");
+    let names: Vec<String> = missed.map(|o| o.1.join(" + ")).collect();
+    if !names.is_empty() {
+        println!("Another among them: {}.", counted(names.iter().map(String::as_str)));
+    }
+}
+
+/// Whether the size that was found is within two standard uncertainties of the true one.
+fn within(diagnosis: &Diagnosis, effect: &str, size: f64) -> bool {
+    let candidate = diagnosis.candidates.iter().find(|c| c.effect == effect);
+    candidate
+        .and_then(|c| c.parameters.first())
+        .is_some_and(|p| (p.value.abs() - size).abs() <= 2.0 * p.std)
+}
+
+fn counted<'a>(words: impl Iterator<Item = &'a str>) -> String {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for word in words {
+        *counts.entry(word).or_default() += 1;
+    }
+    let parts: Vec<String> = counts
+        .iter()
+        .map(|(said, n)| format!("{said} {n}"))
+        .collect();
+    parts.join(", ")
 }

@@ -21,7 +21,7 @@ fn options(without: &[&str]) -> Options {
 fn found_blind(maker: &Maker) {
     for effect in maker.effects {
         let size = 4.0 * seen_from(maker, effect, &options(&[]));
-        let diagnosis = (maker.diagnosed)(Some((effect, size)), 7, &options(&[]));
+        let diagnosis = (maker.diagnosed)(&[(effect, size)], 7, &options(&[]));
         let said = judged(&diagnosis, Some(effect));
         assert!(
             ["named alone", "in its group"].contains(&said),
@@ -40,7 +40,7 @@ fn found_blind(maker: &Maker) {
     }
     let alarms = (0..6)
         .filter(|seed| {
-            let diagnosis = (maker.diagnosed)(None, 50 + seed, &options(&[]));
+            let diagnosis = (maker.diagnosed)(&[], 50 + seed, &options(&[]));
             judged(&diagnosis, None) != "none, right"
         })
         .count();
@@ -51,7 +51,7 @@ fn found_blind(maker: &Maker) {
 /// An effect that is withheld is not passed over: the gap is still told.
 fn not_passed_over(maker: &Maker, effect: &str) {
     let size = 4.0 * seen_from(maker, effect, &options(&[]));
-    let diagnosis = (maker.diagnosed)(Some((effect, size)), 7, &options(&[effect]));
+    let diagnosis = (maker.diagnosed)(&[(effect, size)], 7, &options(&[effect]));
     assert_ne!(
         diagnosis.verdict.kind,
         Kind::None,
@@ -110,7 +110,7 @@ fn a_shape_that_is_withheld_is_unknown() {
     for effect in ["lobes", "ovality"] {
         let circle = maker("circle");
         let size = 4.0 * seen_from(circle, effect, &options(&[]));
-        let diagnosis = (circle.diagnosed)(Some((effect, size)), 7, &options(&[effect]));
+        let diagnosis = (circle.diagnosed)(&[(effect, size)], 7, &options(&[effect]));
         assert_eq!(
             diagnosis.verdict.kind,
             Kind::Unknown,
@@ -124,7 +124,7 @@ fn a_shape_that_is_withheld_is_unknown() {
 /// surface but for a part too small to be seen.
 #[test]
 fn a_slide_position_hides() {
-    let bare = (maker("four-sensor").diagnosed)(None, 3, &options(&[]));
+    let bare = (maker("four-sensor").diagnosed)(&[], 3, &options(&[]));
     let hidden = bare
         .hidden
         .iter()
@@ -137,7 +137,7 @@ fn a_slide_position_hides() {
 /// as hidden, not guessed.
 #[test]
 fn a_dead_path_hides() {
-    let bare = (maker("step-diagonal").diagnosed)(None, 3, &options(&[]));
+    let bare = (maker("step-diagonal").diagnosed)(&[], 3, &options(&[]));
     let hidden = bare
         .hidden
         .iter()

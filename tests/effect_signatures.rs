@@ -12,7 +12,11 @@ use errsep_models::machine::{
     Chain, Machine, MeasuredParts, PartDisturbance, Position, Sense, simulate_parts_disturbed,
 };
 use errsep_models::model::{FittedModel, Shape};
+use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
 use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 
 /// The part of vectors that the fit of a model cannot absorb.
 fn visible<M: FittedModel>(model: &M, vectors: &DMatrix<f64>) -> DMatrix<f64> {
@@ -249,4 +253,25 @@ fn machine() {
         let rest = left(&bare, &with, name, &at(variant, &[]));
         assert!(rest < 1e-5, "{name}: {rest:e}");
     }
+}
+
+/// Indicators are set to zero at mid travel, where the form is part of what they read: a gain counted
+/// from elsewhere would shift the phase of an error of the reading beside it.
+#[test]
+fn readings_are_counted_from_mid_travel() {
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let scene = Scene::random(151, 2, 3e-5, 2.0, SceneNoise::default(), &mut random);
+    let model = FirstOrder::new(&scene.exact(), Assumptions::default()).unwrap();
+    let middle = scene.travel() / 2.0;
+    let mut form: f64 = 0.0;
+    for trace in model.traces() {
+        let k = trace.start + 75;
+        let place = &model.places()[k];
+        assert!((place.x - middle).abs() < 1e-9);
+        // The form at mid travel is a micrometre; smoothing may take a hundredth of it.
+        assert!((model.mid_reading(place) - model.observed()[k]).abs() < 0.02);
+        let line = (model.observed()[trace.start] + model.observed()[trace.end - 1]) / 2.0;
+        form = form.max((model.observed()[k] - line).abs());
+    }
+    assert!(form > 0.5, "{form}");
 }

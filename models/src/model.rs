@@ -420,6 +420,13 @@ pub trait FittedModel: Clone + Send + Sync {
     /// The same model fitted to other values of the same readings.
     fn refit(&self, observed: DVector<f64>) -> Self;
 
+    /// The same model with a draw of what its fit, where it smooths, may have taken away of the
+    /// truth. `noise`: a draw of the readings' noise that has no part in the fit.
+    #[must_use]
+    fn roughened(self, _noise: &DVector<f64>) -> Self {
+        self
+    }
+
     /// Measurements that could be made beside this one, in words, each as the model fitted to what
     /// the present state predicts for it; the cheapest first.
     fn further(&self) -> Vec<(String, Self)> {

@@ -9,7 +9,9 @@ use errsep_models::model::FittedModel;
 use nalgebra::DVector;
 
 use super::bench::{Bench, Cause, Remainder, adequate, finer, raw_signatures};
+use super::noise::{NoiseLaw, NoiseSource};
 use super::quantify::held_out_square;
+use super::space::{Space, orthonormal};
 
 /// A further cause must stand out beside the others at this level.
 const EARNED: f64 = 0.002;
@@ -271,19 +273,31 @@ fn confidence_set<M: FittedModel>(
     }
 }
 
-/// Whether each of several causes explains more than may be left of the strongest of them because
-/// its signature is not quite that of the true cause.
+/// Whether each of several causes changes the readings by more than may be left of the strongest of
+/// them because its signature is not quite that of the true cause. Counted in the readings' own
+/// unit, as signatures differ, and not by the noise, under which a slow change shows less.
 fn weighty<M: FittedModel>(
     bench: &Bench<'_, M>,
     readings: &DVector<f64>,
     causes: &[Cause],
 ) -> bool {
-    let all = bench.misfit(readings, causes);
-    let explained: Vec<f64> = (0..causes.len())
-        .map(|k| bench.misfit(readings, &without(causes, k)) - all)
+    let Some(changes) = bench.changes(readings, causes) else {
+        return false;
+    };
+    let unit = NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated);
+    let shown = Space::new(bench.model, &unit).forward(changes).0;
+    let sizes: Vec<f64> = shown.column_iter().map(|c| c.norm()).collect();
+    let own: Vec<f64> = (0..causes.len())
+        .map(|k| {
+            let mut others = sizes.clone();
+            others.remove(k);
+            let basis = orthonormal(&shown.clone().remove_column(k), &others);
+            let change = shown.column(k);
+            (change - &basis * basis.tr_mul(&change)).norm_squared()
+        })
         .collect();
-    let most = explained.iter().copied().fold(0.0, f64::max);
-    explained.iter().all(|own| *own > WEIGHTY * most)
+    let most = own.iter().copied().fold(0.0, f64::max);
+    own.iter().all(|square| *square > WEIGHTY * most)
 }
 
 /// Whether each of several causes makes the prediction of held-out repeats better; a cause that

@@ -20,7 +20,7 @@ const SEPARABLE: f64 = 0.02;
 
 /// A set of one, two, three causes whose remainder is less probable than this is not adequate:
 /// three imitate freely what none of them is.
-const ADEQUATE: [f64; 3] = [0.002, 0.002, 0.01];
+const ADEQUATE: [f64; 3] = [0.001, 0.001, 0.01];
 
 /// Part of a shape's first step that its search settles to.
 const PRECISION: f64 = 1e-2;

@@ -3,7 +3,8 @@
 //! A signature is taken at a fitted state, and the state has noise of its own: the true change of
 //! the readings is that at the true state, so the remainder beside the right cause holds the
 //! difference. Its covariance is found by drawing: noise is laid over the readings that are free
-//! of the causes, the model fitted again, and the causes' change taken there. With B Bᵀ that
+//! of the causes, the model fitted again and moved by a draw of what smoothing may have taken away
+//! of the forms, and the causes' change taken there. With B Bᵀ that
 //! covariance in whitened, projected readings, the remainder has I + B Bᵀ in place of I; along
 //! each eigenvector of B Bᵀ with eigenvalue λ a part λ/(1 + λ) of every product is taken away. The
 //! same draws give what the noise of the state adds to the uncertainty of the causes' sizes.
@@ -67,8 +68,10 @@ impl<M: FittedModel> Bench<'_, M> {
             let mut random = ChaCha8Rng::seed_from_u64(SEED);
             random.set_stream(draw);
             let noise = self.law.draw(self.model, &mut random);
+            let other = self.law.draw(self.model, &mut random);
             let clean = self.without(&(readings + &noise), causes, &changes);
-            let moved = change_at(&self.model.refit(clean)) - &base;
+            let state = self.model.refit(clean).roughened(&other);
+            let moved = change_at(&state) - &base;
             (noise, moved)
         };
         if drawn(0).1.norm() <= 1e-9 * base.norm() {

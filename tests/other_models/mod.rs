@@ -14,8 +14,8 @@ use errsep_models::machine::{
     Spread, simulate_parts_disturbed,
 };
 
-/// An effect by its name and size.
-pub type Put<'a> = Option<(&'a str, f64)>;
+/// Effects by their names and sizes.
+pub type Put<'a> = &'a [(&'a str, f64)];
 
 /// A model with its effects and a way to diagnose one measurement of it.
 pub struct Maker {
@@ -89,8 +89,8 @@ fn calibration_line(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
         sets: REPEATS,
         noise: 1e-3,
         disturbances: put
-            .and_then(|(name, size)| line::Disturbance::named(name, size, REPEATS))
-            .into_iter()
+            .iter()
+            .filter_map(|(name, size)| line::Disturbance::named(name, *size, REPEATS))
             .collect(),
     };
     let readings = line::simulate(&what, seed).unwrap();
@@ -107,9 +107,9 @@ fn circle(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
     for repeat in 1..=REPEATS {
         // Dirt lies in one pass only.
         let disturbances: Vec<circle::Disturbance> = put
+            .iter()
             .filter(|(name, _)| repeat == 1 || *name != "outlier")
-            .and_then(|(name, size)| circle::Disturbance::named(name, size, what.count))
-            .into_iter()
+            .filter_map(|(name, size)| circle::Disturbance::named(name, *size, what.count))
             .collect();
         let pass_seed = seed * 100 + u64::from(repeat);
         let pass = circle::simulate_disturbed(&what, &disturbances, pass_seed).unwrap();
@@ -122,8 +122,8 @@ fn four_sensor(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
     let geometry = Geometry::new(5.0, [1, 1, 5], 62).unwrap();
     let truth = Example::of(&geometry);
     let mut disturbances = Disturbances::noise(0.1);
-    if let Some((name, size)) = put {
-        assert!(disturbances.add(name, size), "{name}");
+    for (name, size) in put {
+        assert!(disturbances.add(name, *size), "{name}");
     }
     let repeats: Vec<_> = (0..u64::from(REPEATS))
         .map(|repeat| simulate(&geometry, &truth, &disturbances, seed * 100 + repeat).unwrap())
@@ -140,8 +140,8 @@ fn fourier(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
         ..FourierSimulation::default()
     };
     let disturbances: Vec<_> = put
-        .and_then(|(name, size)| fourier::Disturbance::named(name, size, what.spacings.len()))
-        .into_iter()
+        .iter()
+        .filter_map(|(name, size)| fourier::Disturbance::named(name, *size, what.spacings.len()))
         .collect();
     let (scans, _) = fourier::simulate_disturbed(&what, &disturbances, seed).unwrap();
     let section = Section {
@@ -159,8 +159,8 @@ fn step_diagonal(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
         ..DiagonalSimulation::default()
     };
     let disturbances: Vec<_> = put
-        .and_then(|(name, size)| diagonal::Disturbance::named(name, size, &what))
-        .into_iter()
+        .iter()
+        .filter_map(|(name, size)| diagonal::Disturbance::named(name, *size, &what))
         .collect();
     let (readings, _, _) = diagonal::simulate_disturbed(&what, &disturbances, seed);
     let rotations: Vec<Component> = Component::all().filter(|c| c.rotation).collect();
@@ -190,8 +190,8 @@ fn machine(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
         .map(|(k, p)| (format!("{}", k + 1), p))
         .collect();
     let disturbances: Vec<_> = put
-        .and_then(|(name, size)| PartDisturbance::named(name, size))
-        .into_iter()
+        .iter()
+        .filter_map(|(name, size)| PartDisturbance::named(name, *size))
         .collect();
     let readings =
         simulate_parts_disturbed(&machine, &points, 6, REPEATS, 0.5, &disturbances, seed).unwrap();
@@ -200,7 +200,7 @@ fn machine(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
 
 /// The smallest size of an effect that data without it would have shown with 80 % probability.
 pub fn seen_from(maker: &Maker, effect: &str, options: &Options) -> f64 {
-    let bare = (maker.diagnosed)(None, 1, options);
+    let bare = (maker.diagnosed)(&[], 1, options);
     let hidden = bare.hidden.iter().find(|h| h.effect == effect);
     hidden
         .and_then(|h| h.detectable)
@@ -226,5 +226,29 @@ pub fn judged(diagnosis: &Diagnosis, truth: Option<&str>) -> &'static str {
             }
         }
         (Kind::Effect, None) => "another named",
+    }
+}
+
+/// A verdict against two effects that were put in.
+pub fn judged_pair(diagnosis: &Diagnosis, truth: [&str; 2]) -> &'static str {
+    let verdict = &diagnosis.verdict;
+    let named = |effect: &str| verdict.effects.iter().any(|e| e == effect);
+    let grouped = |effect: &str| verdict.indistinguishable.iter().flatten().any(|e| e == effect);
+    let found = |effect: &&str| named(effect) || grouped(effect);
+    let stranger = verdict.effects.iter().any(|said| {
+        let alike = verdict
+            .indistinguishable
+            .iter()
+            .filter(|group| group.contains(said))
+            .flatten();
+        !truth.contains(&said.as_str()) && !alike.into_iter().any(|e| truth.contains(&e.as_str()))
+    });
+    match (verdict.kind, truth.iter().filter(|e| found(e)).count()) {
+        (Kind::None, _) => "none",
+        (Kind::Unknown, _) => "unknown",
+        (Kind::Effect, _) if stranger => "another among them",
+        (Kind::Effect, 2) if verdict.indistinguishable.is_empty() => "both named",
+        (Kind::Effect, 2) => "both, in groups",
+        (Kind::Effect, _) => "one of them",
     }
 }

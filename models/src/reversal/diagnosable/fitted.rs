@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::FirstOrder;
+use super::{FirstOrder, forms};
 use crate::model::{Effect, FittedModel, Freedom, Pattern, Place, Profile, Profiles, Quantity};
 use crate::reversal::smooth_profile::SmoothProfile;
 use crate::reversal::{Channel, effects};
@@ -168,6 +168,18 @@ impl FittedModel for FirstOrder {
         fitted.observed = observed;
         fitted.fit();
         fitted
+    }
+
+    fn roughened(mut self, noise: &DVector<f64>) -> Self {
+        let drawn = forms(&self.channel_means(noise, None), self.positions.len());
+        for (form, noise) in [&mut self.m, &mut self.s_a, &mut self.s_b]
+            .into_iter()
+            .zip(&drawn)
+        {
+            *form = self.smoother.roughened(form, noise);
+        }
+        self.settle();
+        self
     }
 
     fn further(&self) -> Vec<(String, Self)> {

@@ -85,6 +85,8 @@ pub struct FirstOrder {
     duration: f64,
     repeats: Vec<u32>,
     middle: f64,
+    /// The smooth reading of every channel at mid travel.
+    mid_readings: [f64; 4],
     /// Whether the readings came with times.
     pub timed: bool,
     /// Readings at positions that not every trace has: not used.
@@ -115,10 +117,7 @@ impl FirstOrder {
             });
         }
         let n = sorted.positions.len();
-        let nothing = SmoothProfile {
-            values: DVector::zeros(n),
-            slopes: DVector::zeros(n),
-        };
+        let nothing = SmoothProfile::zero(n);
         let flat = ChannelLine {
             slope: 0.0,
             offset: 0.0,
@@ -131,6 +130,7 @@ impl FirstOrder {
             duration: last.max(f64::MIN_POSITIVE),
             repeats: repeats.into_iter().collect(),
             middle: sorted.positions.iter().sum::<f64>() / n as f64,
+            mid_readings: [0.0; 4],
             assumptions,
             observed: DVector::zeros(0),
             places: sorted.places,
@@ -213,11 +213,27 @@ impl FirstOrder {
             self.smoother.smooth_repeated(&raw[k], &own)
         };
         (self.m, self.s_a, self.s_b) = (smooth(0), smooth(1), smooth(2));
-        self.smooth = (0..n * self.present.len())
-            .map(|cell| self.smooth_at(self.present[cell / n], cell % n))
-            .collect();
-        self.span = self.find_span();
         self.beneath = None;
+        self.settle();
+    }
+
+    /// What follows from lines and forms.
+    fn settle(&mut self) {
+        self.smooth = (0..self.positions.len() * self.present.len())
+            .map(|cell| {
+                let n = self.positions.len();
+                self.smooth_at(self.present[cell / n], cell % n)
+            })
+            .collect();
+        self.mid_readings = Channel::ALL.map(|channel| {
+            let line = &self.lines[channel.index()];
+            let at = |form: &SmoothProfile| form.at(&self.positions, self.middle);
+            line.offset
+                + line.slope * self.middle
+                + channel.indicator_sign() * at(&self.m)
+                + at(self.side(channel))
+        });
+        self.span = self.find_span();
         self.reach = self
             .smooth
             .iter()
@@ -407,10 +423,9 @@ impl FirstOrder {
         (high - low).max(f64::MIN_POSITIVE)
     }
 
-    /// The smooth reading of a place's channel at mid travel, by its line, µm.
+    /// The smooth reading of a place's channel at mid travel, µm.
     pub fn mid_reading(&self, place: &Place) -> f64 {
-        let line = &self.lines[self.channel(place).index()];
-        line.offset + line.slope * self.middle
+        self.mid_readings[self.channel(place).index()]
     }
 }
 

@@ -420,6 +420,13 @@ pub trait FittedModel: Clone + Send + Sync {
     /// The same model fitted to other values of the same readings.
     fn refit(&self, observed: DVector<f64>) -> Self;
 
+    /// The same where readings are changed by what is itself taken from the fitted state: how smooth
+    /// the state is must not be learnt from them, as their roughness may be its own.
+    #[must_use]
+    fn refit_as_smooth(&self, observed: DVector<f64>) -> Self {
+        self.refit(observed)
+    }
+
     /// The same model with a draw of what its fit, where it smooths, may have taken away of the
     /// truth. `noise`: a draw of the readings' noise that has no part in the fit.
     #[must_use]

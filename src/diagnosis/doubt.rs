@@ -63,14 +63,14 @@ impl<M: FittedModel> Bench<'_, M> {
             }
             change
         };
-        let base = change_at(&self.model.refit(clean));
+        let base = change_at(&self.model.refit_as_smooth(clean));
         let drawn = |draw: u64| {
             let mut random = ChaCha8Rng::seed_from_u64(SEED);
             random.set_stream(draw);
             let noise = self.law.draw(self.model, &mut random);
             let other = self.law.draw(self.model, &mut random);
             let clean = self.without(&(readings + &noise), causes, &changes);
-            let state = self.model.refit(clean).roughened(&other);
+            let state = self.model.refit_as_smooth(clean).roughened(&other);
             let moved = change_at(&state) - &base;
             (noise, moved)
         };

@@ -171,7 +171,7 @@ fn predicted<M: FittedModel>(
     amplitudes: &DVector<f64>,
 ) -> DVector<f64> {
     let changes = bench.changes_at(causes, amplitudes);
-    let state = bench.model.refit(bench.without(readings, causes, &changes));
+    let state = bench.model.refit_as_smooth(bench.without(readings, causes, &changes));
     let mut at = 0;
     let mut moved = Vec::new();
     for (k, cause) in causes.iter().enumerate() {

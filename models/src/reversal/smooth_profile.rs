@@ -151,6 +151,11 @@ impl Smoother {
         self.smoothed(&self.basis.tr_mul(mean), weight)
     }
 
+    /// The profile of other values, as smooth as a given one.
+    pub fn smooth_as(&self, profile: &SmoothProfile, values: &DVector<f64>) -> SmoothProfile {
+        self.smoothed(&self.basis.tr_mul(values), profile.weight)
+    }
+
     /// The profile with a draw of what smoothing may have taken away of the form. A component of
     /// the basis kept by a part k has the posterior variance kσ² (Wahba, Journal of the Royal
     /// Statistical Society B 45 (1983) 133), of which the noise that is kept makes k²σ²; the rest,

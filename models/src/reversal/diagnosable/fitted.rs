@@ -166,7 +166,14 @@ impl FittedModel for FirstOrder {
     fn refit(&self, observed: DVector<f64>) -> Self {
         let mut fitted = self.clone();
         fitted.observed = observed;
-        fitted.fit();
+        fitted.fit(true);
+        fitted
+    }
+
+    fn refit_as_smooth(&self, observed: DVector<f64>) -> Self {
+        let mut fitted = self.clone();
+        fitted.observed = observed;
+        fitted.fit(false);
         fitted
     }
 

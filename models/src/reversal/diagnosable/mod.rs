@@ -177,7 +177,8 @@ impl FirstOrder {
         sums
     }
 
-    fn fit(&mut self) {
+    /// Fits the readings; `anew`: with the weight of the smoothing chosen by them.
+    fn fit(&mut self, anew: bool) {
         let means = self.channel_means(&self.observed, None);
         let n = self.positions.len();
         let mean_x = self.positions.iter().sum::<f64>() / n as f64;
@@ -203,16 +204,25 @@ impl FirstOrder {
             ));
         }
         let raw = forms(&residual, n);
-        let singles: Vec<[DVector<f64>; 3]> = self
-            .repeats
-            .iter()
-            .map(|repeat| forms(&self.channel_means(&self.observed, Some(*repeat)), n))
-            .collect();
-        let smooth = |k: usize| {
-            let own: Vec<&DVector<f64>> = singles.iter().map(|forms| &forms[k]).collect();
-            self.smoother.smooth_repeated(&raw[k], &own)
+        (self.m, self.s_a, self.s_b) = if anew {
+            let singles: Vec<[DVector<f64>; 3]> = self
+                .repeats
+                .iter()
+                .map(|repeat| forms(&self.channel_means(&self.observed, Some(*repeat)), n))
+                .collect();
+            let smooth = |k: usize| {
+                let own: Vec<&DVector<f64>> = singles.iter().map(|forms| &forms[k]).collect();
+                self.smoother.smooth_repeated(&raw[k], &own)
+            };
+            (smooth(0), smooth(1), smooth(2))
+        } else {
+            let smooth = |form: &SmoothProfile, k: usize| self.smoother.smooth_as(form, &raw[k]);
+            (
+                smooth(&self.m, 0),
+                smooth(&self.s_a, 1),
+                smooth(&self.s_b, 2),
+            )
         };
-        (self.m, self.s_a, self.s_b) = (smooth(0), smooth(1), smooth(2));
         self.beneath = None;
         self.settle();
     }

@@ -5,7 +5,7 @@
 //! inversion of the test); significance alone names nothing. One cause is tried first, then two,
 //! then three; each further one must earn its place beside the others.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{FittedModel, Shape};
 use nalgebra::DVector;
 
 use super::bench::{Bench, Cause, Remainder, adequate, finer, raw_signatures};
@@ -18,6 +18,8 @@ const EARNED: f64 = 0.002;
 /// Part of the strongest cause's statistic that a further one must reach. What is less may be the
 /// remainder of a cause taken for another whose signature is off by a seventh of its size.
 const WEIGHTY: f64 = 0.02;
+/// A swap must raise the statistic by more than what searches leave open.
+const BETTER: f64 = 0.01;
 /// A cause whose statistic is this much below the best cannot be adequate.
 const HOPELESS: f64 = 80.0;
 /// Causes whose misfits differ by less fit equally well: the one of more usual size goes first.
@@ -190,7 +192,8 @@ fn possible<M: FittedModel>(
     bench.plausible(cause, &amplitudes.as_slice()[from..], &stds)
 }
 
-/// Refines each cause beside the others, and swaps it for any effect that explains more.
+/// Refines each cause beside the others, and swaps it for any effect that explains more, itself
+/// begun elsewhere among them.
 fn polish<M: FittedModel>(bench: &Bench<'_, M>, readings: &DVector<f64>, causes: &mut [Cause]) {
     for _ in 0..3 {
         let mut changed = false;
@@ -201,10 +204,9 @@ fn polish<M: FittedModel>(bench: &Bench<'_, M>, readings: &DVector<f64>, causes:
                 bench.refine(bench.model, readings, causes[k].effect, &start, &others);
             let remainder = bench.remainder(readings, &others);
             let swapped = strongest(bench, readings, &remainder, &others)
-                .filter(|c| c.effect != refined.effect || c.shape.variant != refined.shape.variant)
                 .map(|c| bench.refine(bench.model, readings, c.effect, &finer(&c.shape), &others));
             match swapped {
-                Some((other, other_t)) if other_t > t + 1e-6 => {
+                Some((other, other_t)) if other_t > t + BETTER => {
                     causes[k] = other;
                     changed = true;
                 }
@@ -339,41 +341,49 @@ fn alternatives<M: FittedModel>(
         if others.iter().any(|c| c.effect == effect) {
             continue;
         }
-        let cause = if effect == best[k].effect {
-            best[k].clone()
+        let trials = if effect == best[k].effect {
+            let turned = turned(bench, &best[k]);
+            let other = turned.map(|shape| {
+                bench
+                    .refine(bench.model, readings, effect, &shape, &others)
+                    .0
+            });
+            vec![Some(best[k].clone()), other]
         } else {
             if bench.p_value(&remainder, effect) > EARNED {
                 continue;
             }
-            let Some(start) = bench.start(&remainder, effect) else {
-                continue;
+            let start = bench.start(&remainder, effect);
+            vec![start.map(|start| {
+                bench
+                    .refine(bench.model, readings, effect, start, &others)
+                    .0
+            })]
+        };
+        let judged = trials.into_iter().flatten().filter_map(|cause| {
+            if strength(&cause) < own - HOPELESS - 0.1 * own
+                || !possible(bench, readings, &others, &cause)
+            {
+                return None;
+            }
+            let known = cause.shape == best[k].shape && effect == best[k].effect;
+            let mut trial = others.clone();
+            trial.insert(k, cause);
+            let trial = if known {
+                trial
+            } else {
+                bench.relinearised(readings, &trial, least)
             };
-            bench
-                .refine(bench.model, readings, effect, start, &others)
-                .0
-        };
-        if strength(&cause) < own - HOPELESS - 0.1 * own
-            || !possible(bench, readings, &others, &cause)
-        {
-            continue;
-        }
-        let mut trial = others.clone();
-        trial.insert(k, cause);
-        let trial = if effect == best[k].effect {
-            trial
-        } else {
-            bench.relinearised(readings, &trial, least)
-        };
-        let left = bench.judged(readings, &trial);
-        if adequate(&trial, &left) {
-            members.push(Member {
+            let left = bench.judged(readings, &trial);
+            adequate(&trial, &left).then(|| Member {
                 effect,
                 size: part_of_plausible(bench, readings, &trial, k),
                 causes: trial,
                 misfit: left.residual.norm_squared(),
                 left,
-            });
-        }
+            })
+        });
+        members.extend(judged.min_by(|a, b| a.misfit.total_cmp(&b.misfit)));
     }
     let least = members
         .iter()
@@ -390,6 +400,22 @@ fn alternatives<M: FittedModel>(
         })
     });
     members
+}
+
+/// The shape of a cause in the other of two variants, which a state bent by the first may hide.
+fn turned<M: FittedModel>(bench: &Bench<'_, M>, cause: &Cause) -> Option<Shape> {
+    let effect = &bench.catalogue[cause.effect];
+    let grid = effect.grid(bench.model);
+    if grid.iter().any(|shape| shape.variant > 1) {
+        return None;
+    }
+    let other = 1 - cause.shape.variant;
+    let start = grid.into_iter().find(|shape| shape.variant == other)?;
+    let same = Shape {
+        values: cause.shape.values.clone(),
+        ..start
+    };
+    (same.values.len() == same.steps.len() && effect.allowed(bench.model, &same)).then_some(same)
 }
 
 /// The greatest amplitude of a cause as a part of the plausible one.

@@ -202,6 +202,13 @@ fn pairs(text: &mut String, outcomes: &[&Outcome]) {
         &count(outcomes, Outcome::right),
         "≥ 95 %",
     );
+    let told_apart: Vec<&Outcome> = outcomes.iter().copied().filter(|o| !o.alike()).collect();
+    line(
+        text,
+        "exactly both, of those that the readings tell apart at 99 %",
+        &count(&told_apart, Outcome::right),
+        "",
+    );
     line(
         text,
         "both, one of them in a group",

@@ -233,6 +233,7 @@ fn opened(
         p_value: verdict.p_value,
         adequacy: verdict.adequacy,
         alias: false,
+        apart: diagnosis.detail.apart.clone(),
         gap_true: made.gap,
         gap: diagnosis.gap.before.rms,
         held_after: held.map(|h| h.after),

@@ -30,6 +30,9 @@ pub struct Outcome {
     /// Withheld: what was named is one that the whole catalogue cannot tell from the truth.
     #[serde(default)]
     pub alias: bool,
+    /// Standard deviations between the members of each group.
+    #[serde(default)]
+    pub apart: Vec<f64>,
     pub gap_true: f64,
     pub gap: f64,
     pub held_after: Option<f64>,
@@ -76,6 +79,12 @@ impl Outcome {
                 .truth
                 .iter()
                 .all(|t| self.said.contains(t) || self.groups.iter().any(|group| group.contains(t)))
+    }
+
+    /// A group of which one who knew everything but the member would take the wrong one more often
+    /// than once in a hundred times: less than twice the 99 % quantile apart.
+    pub fn alike(&self) -> bool {
+        self.in_group() && self.apart.iter().any(|apart| *apart < 4.65)
     }
 
     /// Something was named, no group, and it was not the truth.

@@ -133,6 +133,7 @@ pub(super) fn compose<M: FittedModel>(
             after: meter.residuals(&(readings - &change)),
             profiles,
             change: change.as_slice().to_vec(),
+            apart: splits.iter().flatten().map(|split| split.now).collect(),
         },
     }
 }

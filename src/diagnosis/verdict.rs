@@ -280,6 +280,9 @@ pub struct Detail {
     pub profiles: Vec<(String, Vec<f64>, Vec<f64>)>,
     /// What the effects change in every reading.
     pub change: Vec<f64>,
+    /// For each group, where the model knows of further measurements: standard deviations between
+    /// the effect named first and the member nearest to it, in these readings.
+    pub apart: Vec<f64>,
 }
 
 impl Detail {

@@ -403,9 +403,14 @@ impl FirstOrder {
         self.span
     }
 
-    /// A profile over the positions, smoothed, with its slopes.
-    pub(super) fn smoothed(&self, profile: &DVector<f64>) -> SmoothProfile {
-        self.smoother.smooth(profile)
+    /// The mean of repeated profiles over the positions, smoothed, with its slopes.
+    pub(super) fn smoothed(&self, repeats: &[DVector<f64>]) -> SmoothProfile {
+        let sum = repeats
+            .iter()
+            .fold(DVector::zeros(self.positions.len()), |sum, own| sum + own);
+        let own: Vec<&DVector<f64>> = repeats.iter().collect();
+        self.smoother
+            .smooth_repeated(&(sum / repeats.len().max(1) as f64), &own)
     }
 
     /// Greatest smooth reading off the indicator's zero, µm.

@@ -130,12 +130,12 @@ impl Effect<FirstOrder> for Hysteresis {
                 traces(direction).for_each(|t| sum += values.rows(t.start, n));
                 (count > 0).then(|| sum / count as f64)
             };
-            let forward = mean(1.0, readings)?;
-            let backward = mean(-1.0, readings)?;
-            let slopes = [
-                model.smoothed(&forward).slopes,
-                model.smoothed(&backward).slopes,
-            ];
+            let slopes = [1.0, -1.0].map(|direction| {
+                let repeats: Vec<DVector<f64>> = traces(direction)
+                    .map(|t| readings.rows(t.start, n).clone_owned())
+                    .collect();
+                model.smoothed(&repeats).slopes
+            });
             let clean = [mean(1.0, clean)?, mean(-1.0, clean)?];
             for k in 0..n {
                 let steepest = slopes[0][k].abs().max(slopes[1][k].abs());

@@ -252,3 +252,50 @@ fn a_plan_names_only_sizes_and_rivals_that_are_plausible() {
     let text = run(&folder, &["plan", "p.toml"]).stdout;
     assert!(!text.contains(" um") && !text.contains("urad"), "{text}");
 }
+
+/// An effect of the user's own, as a formula: a dent of 0.01 over a calibration line is unknown to the
+/// catalogue, is named with it, at its size, and a slip in the formula is shown at its place.
+#[test]
+fn an_effect_of_the_users_own_is_named_by_its_formula() {
+    let folder = Folder::with(&[
+        (
+            "e.toml",
+            "[[effect]]\nname = \"dent\"\nformula = \"exp(-((x - 6) / 0.8)^2)\"\n",
+        ),
+        (
+            "slip.toml",
+            "[[effect]]\nname = \"dent\"\nformula = \"exp(-((x - 6) / 0.8)^2\"\n",
+        ),
+    ]);
+    let made = run(&folder, &["simulate", "calibration-line", "--sets", "4"]);
+    let dented: Vec<String> = made
+        .stdout
+        .lines()
+        .map(|line| {
+            let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if let Ok(x) = fields[0].parse::<f64>() {
+                let y: f64 = fields[1].parse().unwrap();
+                fields[1] = (y + 0.01 * (-((x - 6.0) / 0.8).powi(2)).exp()).to_string();
+            }
+            fields.join(",")
+        })
+        .collect();
+    folder.write("d.csv", &dented.join("\n"));
+    let line = ["diagnose", "d.csv", "--model", "calibration-line"];
+    let answer = |more: &[&str]| -> Value {
+        let out = run(&folder, &[&line, &["--format", "json"], more].concat());
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        serde_json::from_str(&out.stdout).unwrap()
+    };
+    assert_eq!(answer(&[])["verdict"]["kind"], "unknown");
+    let named = answer(&["--effects", "e.toml"]);
+    assert_eq!(effects(&named), ["dent"], "{}", named["verdict"]["statement"]);
+    let candidates = named["candidates"].as_array().unwrap();
+    let dent = candidates.iter().find(|c| c["effect"] == "dent").unwrap();
+    let size = &dent["parameters"][0];
+    let (value, std) = (size["value"].as_f64().unwrap(), size["std"].as_f64().unwrap());
+    // k·u: three standard uncertainties of the size.
+    assert!((value - 0.01).abs() < 3.0 * std && std < 1e-3, "{size}");
+    let slip = [&line, &["--effects", "slip.toml"][..]].concat();
+    bad_input(&folder, &slip, &["slip.toml:3:11", "a `)` is missing"]);
+}

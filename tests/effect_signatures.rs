@@ -275,3 +275,38 @@ fn readings_are_counted_from_mid_travel() {
     }
     assert!(form > 0.5, "{form}");
 }
+
+/// What is told relative to the state stays the same function of the reading, in micrometres, in a
+/// measurement with another reach and span.
+#[test]
+fn effects_told_relative_to_the_state_are_carried() {
+    let mut random = ChaCha8Rng::seed_from_u64(6);
+    let scene = Scene::random(61, 2, 3e-5, 2.0, SceneNoise::default(), &mut random);
+    let model = FirstOrder::new(&scene.exact(), Assumptions::default()).unwrap();
+    let further = model.further();
+    let (_, tilted) = further.iter().find(|(name, _)| name.contains("tilted")).unwrap();
+    assert!(tilted.reading_reach() > 3.0 * model.reading_reach());
+    let effects = model.effects();
+    for (name, values) in [
+        ("indicator-nonlinearity", vec![]),
+        ("cyclic-error", vec![5.0]),
+    ] {
+        let effect = effects.iter().find(|e| e.name() == name).unwrap();
+        let shape = at(0, &values);
+        let ones = vec![1.0; effect.amplitudes().len()];
+        let (there, amplitudes) = effect.carried(&model, tilted, &shape, &ones);
+        let columns = effect.columns(tilted, &there);
+        let first = columns[0].dense(tilted.observed().len()) * amplitudes[0];
+        for k in 0..first.len() {
+            let reading = tilted.smooth_reading(k);
+            let told = match name {
+                "cyclic-error" => {
+                    (std::f64::consts::TAU * 5.0 * reading / model.reading_span()).cos()
+                }
+                _ => (reading / model.reading_reach()).powi(2),
+            };
+            // Rounding of a phase of some hundred turns, or of a square of some hundred.
+            assert!((first[k] - told).abs() < 1e-9 * (1.0 + told), "{name} {k}");
+        }
+    }
+}

@@ -15,8 +15,8 @@ use super::space::{Space, orthonormal};
 
 /// A further cause must stand out beside the others at this level.
 const EARNED: f64 = 0.002;
-/// Part of the strongest cause's statistic that a further one must reach. What is less may be the
-/// remainder of a cause taken for another whose signature is off by a seventh of its size.
+/// Part of the strongest cause's change, squared, that a further one must reach. What is less may be
+/// the remainder of a cause taken for another whose signature is off by a seventh of its size.
 const WEIGHTY: f64 = 0.02;
 /// A swap must raise the statistic by more than what searches leave open.
 const BETTER: f64 = 0.01;
@@ -275,9 +275,10 @@ fn confidence_set<M: FittedModel>(
     }
 }
 
-/// Whether each of several causes changes the readings by more than may be left of the strongest of
-/// them because its signature is not quite that of the true cause. Counted in the readings' own
-/// unit, as signatures differ, and not by the noise, under which a slow change shows less.
+/// Whether each of several causes, beside the others, changes the readings by more than may be left
+/// of the strongest of them because its signature is not quite that of the true cause. Counted in
+/// the readings' own unit, as signatures differ, and not by the noise, under which a slow change
+/// shows less; of the strongest all that shows, as that is what a wrong signature errs by.
 fn weighty<M: FittedModel>(
     bench: &Bench<'_, M>,
     readings: &DVector<f64>,
@@ -298,7 +299,7 @@ fn weighty<M: FittedModel>(
             (change - &basis * basis.tr_mul(&change)).norm_squared()
         })
         .collect();
-    let most = own.iter().copied().fold(0.0, f64::max);
+    let most = sizes.iter().map(|size| size * size).fold(0.0, f64::max);
     own.iter().all(|square| *square > WEIGHTY * most)
 }
 

@@ -10,6 +10,7 @@ use errsep_models::model::{Estimate, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::bench::{Bench, Cause, stack};
+use super::doubt::ROUNDS;
 
 /// What the noise of the state may take away of a variance, at most: it is known from draws.
 const LEAST: f64 = -0.5;
@@ -170,18 +171,23 @@ fn predicted<M: FittedModel>(
     causes: &[Cause],
     amplitudes: &DVector<f64>,
 ) -> DVector<f64> {
-    let changes = bench.changes_at(causes, amplitudes);
-    let state = bench.model.refit_as_smooth(bench.without(readings, causes, &changes));
-    let mut at = 0;
-    let mut moved = Vec::new();
-    for (k, cause) in causes.iter().enumerate() {
-        let own = &amplitudes.as_slice()[at..at + cause.columns.len()];
-        at += own.len();
-        let shape = bench.catalogue[cause.effect]
-            .settled(&cause.shape, own)
-            .unwrap_or_else(|| cause.shape.clone());
-        let state = bench.seen_by(k, &state, causes, &changes);
-        moved.push(bench.cause(&state, cause.effect, shape));
+    let mut changes = bench.changes_at(causes, amplitudes);
+    let mut moved: Vec<Cause> = Vec::new();
+    for _ in 0..ROUNDS {
+        let clean = bench.without(readings, causes, &changes);
+        let state = bench.model.refit_as_smooth(clean);
+        let mut at = 0;
+        moved.clear();
+        for (k, cause) in causes.iter().enumerate() {
+            let own = &amplitudes.as_slice()[at..at + cause.columns.len()];
+            at += own.len();
+            let shape = bench.catalogue[cause.effect]
+                .settled(&cause.shape, own)
+                .unwrap_or_else(|| cause.shape.clone());
+            let state = bench.seen_by(k, &state, causes, &changes);
+            moved.push(bench.cause(&state, cause.effect, shape));
+        }
+        changes = bench.changes_at(&moved, amplitudes);
     }
     stack(&moved, readings.len()) * amplitudes
 }

@@ -45,7 +45,9 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
 
     fn possible(&self, model: &FirstOrder, shape: &Shape, amplitudes: &[f64]) -> bool {
         let steepest = f64::from(power(shape)) / model.reading_reach();
-        amplitudes.iter().all(|a| a.abs() * steepest < 1.0)
+        // A cube of the reading makes the slope smaller with one sign only, a square with either.
+        let falls = |a: f64| if shape.variant == 0 { a.abs() } else { -a };
+        amplitudes.iter().all(|a| falls(*a) * steepest < 1.0)
     }
 
     /// The deviation is told at the greatest reading.

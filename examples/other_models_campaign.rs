@@ -125,7 +125,10 @@ fn pairs(maker: &Maker, seen: &[(&str, f64)], cases: u64, first: u64) {
     let missed = outcomes.iter().filter(|o| o.0 == "another among them");
     let names: Vec<String> = missed.map(|o| o.1.join(" + ")).collect();
     if !names.is_empty() {
-        println!("Another among them: {}.", counted(names.iter().map(String::as_str)));
+        println!(
+            "Another among them: {}.",
+            counted(names.iter().map(String::as_str))
+        );
     }
 }
 

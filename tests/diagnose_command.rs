@@ -283,19 +283,27 @@ fn an_effect_of_the_users_own_is_named_by_its_formula() {
     folder.write("d.csv", &dented.join("\n"));
     let line = ["diagnose", "d.csv", "--model", "calibration-line"];
     let answer = |more: &[&str]| -> Value {
-        let out = run(&folder, &[&line, &["--format", "json"], more].concat());
+        let out = run(&folder, &[&line[..], &["--format", "json"], more].concat());
         assert_eq!(out.status, 0, "{}", out.stderr);
         serde_json::from_str(&out.stdout).unwrap()
     };
     assert_eq!(answer(&[])["verdict"]["kind"], "unknown");
     let named = answer(&["--effects", "e.toml"]);
-    assert_eq!(effects(&named), ["dent"], "{}", named["verdict"]["statement"]);
+    assert_eq!(
+        effects(&named),
+        ["dent"],
+        "{}",
+        named["verdict"]["statement"]
+    );
     let candidates = named["candidates"].as_array().unwrap();
     let dent = candidates.iter().find(|c| c["effect"] == "dent").unwrap();
     let size = &dent["parameters"][0];
-    let (value, std) = (size["value"].as_f64().unwrap(), size["std"].as_f64().unwrap());
+    let (value, std) = (
+        size["value"].as_f64().unwrap(),
+        size["std"].as_f64().unwrap(),
+    );
     // k·u: three standard uncertainties of the size.
     assert!((value - 0.01).abs() < 3.0 * std && std < 1e-3, "{size}");
-    let slip = [&line, &["--effects", "slip.toml"][..]].concat();
+    let slip = [&line[..], &["--effects", "slip.toml"]].concat();
     bad_input(&folder, &slip, &["slip.toml:3:11", "a `)` is missing"]);
 }

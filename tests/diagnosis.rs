@@ -1,34 +1,18 @@
 //! The diagnosis of a reversal against known truth: every effect of the catalogue put in by code
 //! that shares nothing with the signatures, none at all, and effects withheld.
 
+mod scene;
+
 use std::path::PathBuf;
 
-use errsep::diagnosis::{Diagnosis, Kind, Options, diagnose, prove};
+use errsep::diagnosis::{Kind, Options, prove};
 use errsep_models::model::FittedModel;
 use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
 use errsep_models::reversal::exact_readings::{Injection, Scene, SceneNoise};
 use errsep_models::reversal::{Channel, Direction, Observations, Reading};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-
-fn scene(seed: u64, tilt: f64) -> Scene {
-    let noise = SceneNoise {
-        white: 0.05,
-        ..SceneNoise::default()
-    };
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    Scene::random(60, 4, tilt, 2.0, noise, &mut random)
-}
-
-fn diagnosed(observations: &Observations, without: &[&str]) -> Diagnosis {
-    let model = FirstOrder::new(observations, Assumptions::default()).unwrap();
-    let options = Options {
-        draws: 200,
-        without: without.iter().map(|s| (*s).to_owned()).collect(),
-        ..Options::default()
-    };
-    diagnose(&model, &options)
-}
+use scene::{diagnosed, scene};
 
 /// Every effect of the catalogue at a size that shows well, and the tilt that it needs.
 fn injected(name: &str, scene: &Scene) -> Option<Injection> {
@@ -249,114 +233,6 @@ fn what_shows_only_once_the_noise_is_clean_is_not_named() {
     }
 }
 
-/// Two effects of which one acts on what the other moves: the play of the pointer on a shifted
-/// form, the backlash of the slide under a speck of dirt.
-#[test]
-fn effects_that_act_on_each_other_are_both_named() {
-    let pairs = [
-        (Injection::Hysteresis(0.2), Injection::ReversalShift(1.0)),
-        (
-            Injection::AxisBacklash(1.0),
-            Injection::LocalContamination {
-                height: 1.5,
-                channel: Channel::C1B,
-                repeat: None,
-                position: 100.0,
-                width: 8.0,
-            },
-        ),
-    ];
-    for (k, (first, second)) in pairs.into_iter().enumerate() {
-        let noise = SceneNoise {
-            white: 0.05,
-            ..SceneNoise::default()
-        };
-        let mut random = ChaCha8Rng::seed_from_u64(20 + k as u64);
-        let mut scene = Scene::random(150, 4, 3e-5, 2.0, noise, &mut random);
-        let names = [
-            ["hysteresis", "reversal-shift"],
-            ["axis-backlash", "local-contamination"],
-        ][k];
-        scene.effects.extend([first, second]);
-        let mut said = diagnosed(&scene.measured(7), &[]).verdict.effects;
-        said.sort();
-        assert_eq!(said, names);
-    }
-}
-
-/// The order of the readings, and a common change of all units of time, change nothing.
-/// Deviation of the curved indicator below at its greatest reading, µm.
-const BEND: f64 = 0.06;
-
-/// A curved indicator and a cone differ by little where readings are small: the group comes with the
-/// measurement that splits it, and that measurement, made, does.
-#[test]
-fn a_group_comes_with_the_measurement_that_splits_it() {
-    let mut groups = 0;
-    for seed in 60..80 {
-        let mut first = scene(seed, 3e-5);
-        first.effects.push(Injection::IndicatorNonlinearity {
-            deviation: BEND,
-            cubic: false,
-        });
-        let verdict = diagnosed(&first.measured(seed), &[]).verdict;
-        let [group] = &verdict.indistinguishable[..] else {
-            continue;
-        };
-        if !group.contains(&"indicator-nonlinearity".to_owned())
-            || !verdict.separate[0].contains("tilted by a further 1 mrad")
-        {
-            continue;
-        }
-        groups += 1;
-        assert!(verdict.statement.contains("standard deviations apart"));
-        // The curve of a greater reading is that of the same indicator.
-        let mut further = scene(seed, 3e-5);
-        further.tilts[2] += 1e-3;
-        let reach = |scene: &Scene| {
-            let readings = scene.exact().readings;
-            readings.iter().map(|r| r.value.abs()).fold(0.0, f64::max)
-        };
-        let grown = (reach(&further) / reach(&scene(seed, 3e-5))).powi(2);
-        further.effects.push(Injection::IndicatorNonlinearity {
-            deviation: BEND * grown,
-            cubic: false,
-        });
-        let verdict = diagnosed(&further.measured(seed + 100), &[]).verdict;
-        assert_eq!(verdict.effects, ["indicator-nonlinearity"], "{seed}");
-        assert!(verdict.indistinguishable.is_empty(), "{seed}");
-    }
-    assert!(groups >= 2, "{groups}");
-}
-
-/// Two effects of like size are both named. Beside a cone ten times as large the same period may as
-/// well be what the cone's signature leaves, and the answer is that both would leave nothing.
-#[test]
-fn a_small_cause_beside_a_strong_one_is_partial() {
-    let verdict = |half_angle: f64| {
-        let mut truth = scene(14, 3e-5);
-        let period = Injection::CyclicError {
-            amplitude: 0.15,
-            period: truth.travel() / 9.3,
-            phase: 0.4,
-            of_reading: false,
-        };
-        truth.effects = vec![Injection::Taper(half_angle), period];
-        let mut verdict = diagnosed(&truth.measured(14), &[]).verdict;
-        verdict.effects.sort();
-        verdict.partial.sort();
-        verdict
-    };
-    let both = ["cyclic-error", "taper"];
-    assert_eq!(verdict(2e-6).effects, both);
-    let beside = verdict(2e-5);
-    assert_eq!(beside.kind, Kind::Unknown, "{}", beside.statement);
-    assert!(
-        both.iter()
-            .all(|name| beside.partial.contains(&(*name).to_owned()))
-    );
-}
-
 /// A cone is a straight line in S_A + S_B: everywhere and nowhere. A speck of dirt has a place.
 #[test]
 fn a_place_is_told_only_where_there_is_one() {
@@ -403,6 +279,7 @@ fn sealed_effects_are_found_again() {
     assert!(trials.wrong <= 3, "{trials:?}");
 }
 
+/// The order of the readings changes nothing.
 #[test]
 fn the_order_of_the_readings_does_not_matter() {
     let mut truth = scene(8, 3e-5);

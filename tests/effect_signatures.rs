@@ -284,7 +284,10 @@ fn effects_told_relative_to_the_state_are_carried() {
     let scene = Scene::random(61, 2, 3e-5, 2.0, SceneNoise::default(), &mut random);
     let model = FirstOrder::new(&scene.exact(), Assumptions::default()).unwrap();
     let further = model.further();
-    let (_, tilted) = further.iter().find(|(name, _)| name.contains("tilted")).unwrap();
+    let (_, tilted) = further
+        .iter()
+        .find(|(name, _)| name.contains("tilted"))
+        .unwrap();
     assert!(tilted.reading_reach() > 3.0 * model.reading_reach());
     let effects = model.effects();
     for (name, values) in [

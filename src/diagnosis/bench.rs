@@ -329,8 +329,14 @@ impl<'a, M: FittedModel> Bench<'a, M> {
     }
 
     /// Whether amplitudes and shapes lie where the effect is physically possible.
-    pub fn plausible(&self, cause: &Cause, amplitudes: &[f64], stds: &[f64]) -> bool {
-        let effect = &self.catalogue[cause.effect];
+    pub fn plausible(
+        &self,
+        effect: usize,
+        shape: &Shape,
+        amplitudes: &[f64],
+        stds: &[f64],
+    ) -> bool {
+        let effect = &self.catalogue[effect];
         let inside = effect
             .amplitudes()
             .iter()
@@ -338,11 +344,11 @@ impl<'a, M: FittedModel> Bench<'a, M> {
             .zip(stds)
             .all(|((p, a), u)| *a > p.low - 2.0 * u && *a < p.high + 2.0 * u);
         inside
-            && effect.possible(self.model, &cause.shape, amplitudes)
+            && effect.possible(self.model, shape, amplitudes)
             && effect
                 .shape_parameters()
                 .iter()
-                .zip(&cause.shape.values)
+                .zip(&shape.values)
                 .all(|(p, v)| *v >= p.low && *v <= p.high)
     }
 }

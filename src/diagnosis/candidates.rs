@@ -3,8 +3,8 @@
 use errsep_models::model::FittedModel;
 use nalgebra::DVector;
 
-use super::attribute::Answer;
 use super::bench::{Bench, Cause, Remainder};
+use super::confidence::Answer;
 use super::dictionary::statistic;
 use super::sizes::Sizes;
 use super::verdict::Candidate;

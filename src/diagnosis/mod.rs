@@ -7,6 +7,7 @@
 mod attribute;
 mod bench;
 mod candidates;
+mod confidence;
 mod contrasts;
 mod dictionary;
 mod doubt;
@@ -38,8 +39,9 @@ mod whitening;
 use errsep_models::model::{Effect, FittedModel};
 use nalgebra::DVector;
 
-use attribute::{Answer, attribute, roughly};
+use attribute::{attribute, roughly};
 use bench::{Bench, Remainder};
+use confidence::Answer;
 pub use formula::{Circumstances, Formula};
 pub use geometry::{Diagnosability, certificate};
 pub use noise::{NoiseLaw, NoiseSource};

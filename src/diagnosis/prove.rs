@@ -179,12 +179,8 @@ fn sealed_change<M: FittedModel>(
             }
             let left = plain.forward_vector(&change).norm() / (n as f64).sqrt();
             let scale = size / left;
-            let plausible = description
-                .amplitudes()
-                .iter()
-                .zip(&amplitudes)
-                .all(|(p, a)| (p.low..=p.high).contains(a))
-                && description.possible(bench.model, &shape, &amplitudes);
+            let exact = vec![0.0; amplitudes.len()];
+            let plausible = bench.plausible(effect, &shape, &amplitudes, &exact);
             if !scale.is_finite() {
                 break;
             }

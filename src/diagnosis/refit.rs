@@ -36,7 +36,9 @@ impl<M: FittedModel> Bench<'_, M> {
         };
         let mut mixing = Mixing::default();
         for round in 0..ROUNDS {
-            let state = self.model.refit_as_smooth(self.without(readings, &causes, &changes));
+            let state = self
+                .model
+                .refit_as_smooth(self.without(readings, &causes, &changes));
             for k in 0..causes.len() {
                 let mut others = causes.clone();
                 let own = others.remove(k);

@@ -8,8 +8,8 @@
 use errsep_models::model::FittedModel;
 use nalgebra::{DMatrix, DVector};
 
-use super::attribute::Answer;
 use super::bench::{Bench, Cause};
+use super::confidence::Answer;
 use super::space::{Space, orthonormal};
 
 /// Standard deviations apart at which the wrong one of two is taken once in a hundred times:

@@ -233,7 +233,13 @@ pub fn judged(diagnosis: &Diagnosis, truth: Option<&str>) -> &'static str {
 pub fn judged_pair(diagnosis: &Diagnosis, truth: [&str; 2]) -> &'static str {
     let verdict = &diagnosis.verdict;
     let named = |effect: &str| verdict.effects.iter().any(|e| e == effect);
-    let grouped = |effect: &str| verdict.indistinguishable.iter().flatten().any(|e| e == effect);
+    let grouped = |effect: &str| {
+        verdict
+            .indistinguishable
+            .iter()
+            .flatten()
+            .any(|e| e == effect)
+    };
     let found = |effect: &&str| named(effect) || grouped(effect);
     let stranger = verdict.effects.iter().any(|said| {
         let alike = verdict

@@ -264,7 +264,8 @@ mod tests {
 
     /// Forms of the law that a weight stands for (Gaussian, variance of a component one over weight
     /// and roughness), noise of one: what smoothing misses of the slopes is as great as what the
-    /// draws miss, and four times as great as what the noise that is kept moves them.
+    /// draws miss, and far greater than what the noise that is kept moves them (four times on a line
+    /// without end; a spacing cuts the shortest waves off).
     #[test]
     fn draws_are_as_far_off_as_the_smoothing() {
         let n = 120;
@@ -292,7 +293,7 @@ mod tests {
         }
         // k·u: 400 forms of some twenty components each, √(2/8000) = 1.6 % a sum.
         assert!((drawn / missed - 1.0).abs() < 0.1, "{drawn} {missed}");
-        assert!((missed / kept / 4.0 - 1.0).abs() < 0.2, "{missed} {kept}");
+        assert!(missed > 2.5 * kept && missed < 4.5 * kept, "{missed} {kept}");
     }
 
     #[test]

@@ -1,0 +1,277 @@
+//! Which effect: a confidence set, not a winner.
+//!
+//! A cause is accepted when, refitted with everything else free, it leaves nothing that stands out
+//! of the noise: no other effect, no place. All causes that pass are the confidence set (the
+//! inversion of the test); significance alone names nothing. Of several each must earn its place.
+
+use errsep_models::model::{FittedModel, Shape};
+use nalgebra::DVector;
+
+use super::bench::{Bench, Cause, Remainder, adequate, raw_signatures};
+use super::noise::{NoiseLaw, NoiseSource};
+use super::quantify::held_out_square;
+use super::space::{Space, orthonormal};
+
+/// A further cause must stand out beside the others at this level.
+pub(super) const EARNED: f64 = 0.002;
+/// A cause whose statistic is this much below the best cannot be adequate.
+pub(super) const HOPELESS: f64 = 80.0;
+/// Part of the strongest cause's change, squared, that a further one must reach. What is less may be
+/// the remainder of a cause taken for another whose signature is off by a seventh of its size.
+const WEIGHTY: f64 = 0.02;
+/// Causes whose misfits differ by less fit equally well: the one of more usual size goes first.
+const TIED: f64 = 9.2;
+
+/// Causes that together explain the gap, and those that do it as well.
+pub(super) struct Answer {
+    /// The causes, by what each adds.
+    pub causes: Vec<Cause>,
+    /// For each cause the effects that these data cannot tell from it, itself first.
+    pub groups: Vec<Vec<usize>>,
+    /// What remains beside them.
+    pub remainder: Remainder,
+    /// Whether the remainder is adequate.
+    pub complete: bool,
+}
+
+/// One way to explain the gap: causes with one of them varied.
+struct Member {
+    effect: usize,
+    causes: Vec<Cause>,
+    misfit: f64,
+    left: Remainder,
+    /// Size as a part of what is physically plausible.
+    size: f64,
+}
+
+/// All effects that could stand in place of each cause, the others kept.
+pub(super) fn confidence_set<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> Answer {
+    let mut best = bench.relinearised(readings, causes, f64::INFINITY);
+    let mut remainder = bench.judged(readings, &best);
+    let mut groups = Vec::new();
+    for k in 0..causes.len() {
+        let members = alternatives(bench, readings, &best, k);
+        let group = if members.is_empty() {
+            vec![best[k].effect]
+        } else {
+            members.iter().map(|m| m.effect).collect()
+        };
+        groups.push(group);
+        if let Some(first) = members.into_iter().next() {
+            best = first.causes;
+            remainder = first.left;
+        }
+    }
+    let needed = best.len() == 1
+        || weighty(bench, readings, &best)
+            && (0..best.len()).all(|k| {
+                let beside = bench.remainder(readings, &without(&best, k));
+                bench.p_value(&beside, best[k].effect) < EARNED
+            })
+            && predicts(bench, readings, &best);
+    Answer {
+        complete: needed && adequate(&best, &remainder),
+        causes: best,
+        groups,
+        remainder,
+    }
+}
+
+/// Whether each of several causes, beside the others, changes the readings by more than may be left
+/// of the strongest of them because its signature is not quite that of the true cause. Counted in
+/// the readings' own unit, as signatures differ, and not by the noise, under which a slow change
+/// shows less; of the strongest all that shows, as that is what a wrong signature errs by.
+fn weighty<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> bool {
+    let Some(changes) = bench.changes(readings, causes) else {
+        return false;
+    };
+    let unit = NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated);
+    let shown = Space::new(bench.model, &unit).forward(changes).0;
+    let sizes: Vec<f64> = shown.column_iter().map(|c| c.norm()).collect();
+    let own: Vec<f64> = (0..causes.len())
+        .map(|k| {
+            let mut others = sizes.clone();
+            others.remove(k);
+            let basis = orthonormal(&shown.clone().remove_column(k), &others);
+            let change = shown.column(k);
+            (change - &basis * basis.tr_mul(&change)).norm_squared()
+        })
+        .collect();
+    let most = sizes.iter().map(|size| size * size).fold(0.0, f64::max);
+    own.iter().all(|square| *square > WEIGHTY * most)
+}
+
+/// Whether each of several causes makes the prediction of held-out repeats better; a cause that
+/// happened once cannot be judged so.
+fn predicts<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> bool {
+    let noise = bench.law.sigma().powi(2);
+    let square = |causes: &[Cause]| {
+        let signatures = raw_signatures(bench, causes);
+        held_out_square(bench.model, readings, &signatures, noise)
+    };
+    let Some(with) = square(causes) else {
+        return true;
+    };
+    (0..causes.len()).all(|k| square(&without(causes, k)).is_none_or(|s| s > with))
+}
+
+/// The effects that are adequate in the place of cause `k`, the best fit first.
+fn alternatives<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    best: &[Cause],
+    k: usize,
+) -> Vec<Member> {
+    let others = without(best, k);
+    let remainder = bench.remainder(readings, &others);
+    let strength = |cause: &Cause| {
+        let mut all = others.clone();
+        all.push(cause.clone());
+        remainder.residual.norm_squared() - bench.misfit(readings, &all)
+    };
+    let own = strength(&best[k]);
+    let least = bench.misfit(readings, best) + HOPELESS + 0.1 * own;
+    let mut members = Vec::new();
+    for effect in 0..bench.catalogue.len() {
+        if others.iter().any(|c| c.effect == effect) {
+            continue;
+        }
+        let trials = if effect == best[k].effect {
+            let turned = turned(bench, &best[k]);
+            let other = turned.map(|shape| {
+                bench
+                    .refine(bench.model, readings, effect, &shape, &others)
+                    .0
+            });
+            vec![Some(best[k].clone()), other]
+        } else {
+            if bench.p_value(&remainder, effect) > EARNED {
+                continue;
+            }
+            let start = bench.start(&remainder, effect);
+            vec![start.map(|start| {
+                bench
+                    .refine(bench.model, readings, effect, start, &others)
+                    .0
+            })]
+        };
+        let judged = trials.into_iter().flatten().filter_map(|cause| {
+            if strength(&cause) < own - HOPELESS - 0.1 * own
+                || !possible(bench, readings, &others, &cause)
+            {
+                return None;
+            }
+            let known = cause.shape == best[k].shape && effect == best[k].effect;
+            let mut trial = others.clone();
+            trial.insert(k, cause);
+            let trial = if known {
+                trial
+            } else {
+                bench.relinearised(readings, &trial, least)
+            };
+            let left = bench.judged(readings, &trial);
+            adequate(&trial, &left).then(|| Member {
+                effect,
+                size: part_of_plausible(bench, readings, &trial, k),
+                causes: trial,
+                misfit: left.residual.norm_squared(),
+                left,
+            })
+        });
+        members.extend(judged.min_by(|a, b| a.misfit.total_cmp(&b.misfit)));
+    }
+    let least = members
+        .iter()
+        .map(|m| m.misfit)
+        .fold(f64::INFINITY, f64::min);
+    members.sort_by(|a, b| {
+        let behind = |m: &Member| m.misfit > least + TIED;
+        let by_fit = a.misfit.total_cmp(&b.misfit);
+        let by_size = a.size.total_cmp(&b.size);
+        behind(a).cmp(&behind(b)).then(if behind(a) {
+            by_fit
+        } else {
+            by_size.then(by_fit)
+        })
+    });
+    members
+}
+
+/// The shape of a cause in the other of two variants, which a state bent by the first may hide.
+fn turned<M: FittedModel>(bench: &Bench<'_, M>, cause: &Cause) -> Option<Shape> {
+    let effect = &bench.catalogue[cause.effect];
+    let grid = effect.grid(bench.model);
+    if grid.iter().any(|shape| shape.variant > 1) {
+        return None;
+    }
+    let other = 1 - cause.shape.variant;
+    let start = grid.into_iter().find(|shape| shape.variant == other)?;
+    let same = Shape {
+        values: cause.shape.values.clone(),
+        ..start
+    };
+    (same.values.len() == same.steps.len() && effect.allowed(bench.model, &same)).then_some(same)
+}
+
+/// The greatest amplitude of a cause as a part of the plausible one.
+fn part_of_plausible<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    k: usize,
+) -> f64 {
+    let Some((amplitudes, _)) = bench.amplitudes(readings, causes) else {
+        return f64::INFINITY;
+    };
+    let from: usize = causes[..k].iter().map(|c| c.projected.ncols()).sum();
+    bench.catalogue[causes[k].effect]
+        .amplitudes()
+        .iter()
+        .zip(amplitudes.iter().skip(from))
+        .map(|(p, a)| a.abs() / p.low.abs().max(p.high.abs()))
+        .fold(0.0, f64::max)
+}
+
+/// Whether a cause beside others has a physically possible size.
+pub(super) fn possible<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    others: &[Cause],
+    cause: &Cause,
+) -> bool {
+    let mut all = others.to_vec();
+    all.push(cause.clone());
+    let Some((amplitudes, covariance)) = bench.amplitudes(readings, &all) else {
+        return false;
+    };
+    let own = cause.projected.ncols();
+    let from = amplitudes.len() - own;
+    let stds: Vec<f64> = (from..amplitudes.len())
+        .map(|k| covariance[(k, k)].max(0.0).sqrt())
+        .collect();
+    bench.plausible(
+        cause.effect,
+        &cause.shape,
+        &amplitudes.as_slice()[from..],
+        &stds,
+    )
+}
+
+/// The causes but one.
+pub(super) fn without(causes: &[Cause], k: usize) -> Vec<Cause> {
+    let mut others = causes.to_vec();
+    others.remove(k);
+    others
+}

@@ -10,8 +10,9 @@ use rand_chacha::ChaCha8Rng;
 use scene::{diagnosed, scene};
 
 /// Two effects of which one acts on what the other moves: the play of the pointer on a shifted
-/// form, the backlash of the slide under a speck of dirt; lost motion along a form that is shifted by
-/// more than its readings lie apart; a period of the reading beside a gain, which count from one zero.
+/// form, also where it is shifted by more than its readings lie apart and noise is correlated; the
+/// backlash of the slide under a speck of dirt; a period of the reading beside a gain, which count
+/// from one zero.
 #[test]
 fn effects_that_act_on_each_other_are_both_named() {
     let white = SceneNoise {
@@ -53,10 +54,10 @@ fn effects_that_act_on_each_other_are_both_named() {
             ["axis-backlash", "local-contamination"],
         ),
         (
-            22,
+            26,
             all,
-            [lost, shift(2.8)],
-            ["axis-backlash", "reversal-shift"],
+            [Injection::Hysteresis(0.3), shift(2.7)],
+            ["hysteresis", "reversal-shift"],
         ),
         (
             23,

@@ -293,7 +293,10 @@ mod tests {
         }
         // k·u: 400 forms of some twenty components each, √(2/8000) = 1.6 % a sum.
         assert!((drawn / missed - 1.0).abs() < 0.1, "{drawn} {missed}");
-        assert!(missed > 2.5 * kept && missed < 4.5 * kept, "{missed} {kept}");
+        assert!(
+            missed > 2.5 * kept && missed < 4.5 * kept,
+            "{missed} {kept}"
+        );
     }
 
     #[test]

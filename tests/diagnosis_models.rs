@@ -133,6 +133,34 @@ fn a_slide_position_hides() {
     assert!(hidden.visible < 0.02, "{}", hidden.visible);
 }
 
+/// Even drifts of sensors at 0, p, p', p'' span four directions of which a surface of third order and
+/// the slide take three: whose drift it is cannot be told, and is not said.
+#[test]
+fn whose_drift_it_is_stays_open() {
+    let four = maker("four-sensor");
+    let size = 4.0 * seen_from(four, "drift", &options(&[]));
+    for seed in [7, 8] {
+        let diagnosis = (four.diagnosed)(&[("drift", size)], seed, &options(&[]));
+        let drift = diagnosis.candidates.iter().find(|c| c.effect == "drift");
+        let drift = drift.unwrap();
+        let own = drift.variant.as_deref().zip(drift.parameters.first());
+        let others = drift
+            .elsewhere
+            .iter()
+            .filter_map(|other| Some((other.variant.as_str(), other.parameters.first()?)));
+        let sensors: Vec<_> = own.into_iter().chain(others).collect();
+        assert_eq!(sensors.len(), 4, "{sensors:?}");
+        let (_, third) = sensors.iter().find(|s| s.0 == "sensor 3").unwrap();
+        // k·u.
+        assert!(
+            (third.value - size).abs() < 3.0 * third.std,
+            "{third:?}, {size}"
+        );
+        let said = &diagnosis.verdict.statement;
+        assert!(said.contains("as likely sensor"), "{said}");
+    }
+}
+
 /// A dead path that changes evenly looks like positions that are all too long: it must be listed
 /// as hidden, not guessed.
 #[test]

@@ -1,13 +1,19 @@
 //! What each effect of the catalogue says of the gap.
 
-use errsep_models::model::FittedModel;
+use std::collections::BTreeMap;
+
+use errsep_models::model::{FittedModel, Shape};
 use nalgebra::DVector;
 
 use super::bench::{Bench, Cause, Remainder};
-use super::confidence::Answer;
+use super::confidence::{Answer, possible, without};
 use super::dictionary::statistic;
 use super::sizes::Sizes;
-use super::verdict::Candidate;
+use super::verdict::{Candidate, Elsewhere};
+
+/// Variants of a cause whose misfits are above the best by less are as likely: χ² of two unknowns,
+/// 95 %.
+const AS_LIKELY: f64 = 5.99;
 
 /// What each effect explains, by that.
 pub(super) fn candidates<M: FittedModel>(
@@ -63,6 +69,8 @@ pub(super) fn candidates<M: FittedModel>(
                     .as_ref()
                     .and_then(|c| description.variant_name(bench.model, &c.shape)),
                 parameters: parameters.into_iter().flatten().map(Into::into).collect(),
+                elsewhere: named
+                    .map_or_else(Vec::new, |which| elsewhere(bench, readings, causes, which)),
                 physics: about.physics.to_owned(),
                 confirm: about.confirm.to_owned(),
             },
@@ -74,4 +82,48 @@ pub(super) fn candidates<M: FittedModel>(
             .unwrap_or(std::cmp::Ordering::Equal)
     });
     list.into_iter().map(|(_, c)| c).collect()
+}
+
+/// The variants of a named cause that fit as well: which sensor, which channel may be open where
+/// the effect is not.
+fn elsewhere<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    which: usize,
+) -> Vec<Elsewhere> {
+    let cause = &causes[which];
+    let effect = &bench.catalogue[cause.effect];
+    let others = without(causes, which);
+    let least = bench.misfit(readings, causes);
+    let mut starts: BTreeMap<usize, Shape> = BTreeMap::new();
+    for shape in effect.grid(bench.model) {
+        starts.entry(shape.variant).or_insert(shape);
+    }
+    starts.remove(&cause.shape.variant);
+    let alike = |start: Shape| {
+        let near = Shape {
+            values: cause.shape.values.clone(),
+            ..start.clone()
+        };
+        let fits = near.values.len() == near.steps.len() && effect.allowed(bench.model, &near);
+        let start = if fits { near } else { start };
+        let (other, _) = bench.refine(bench.model, readings, cause.effect, &start, &others);
+        let variant = effect.variant_name(bench.model, &other.shape)?;
+        if !possible(bench, readings, &others, &other) {
+            return None;
+        }
+        let mut trial = others.clone();
+        trial.push(other);
+        if bench.misfit(readings, &trial) > least + AS_LIKELY {
+            return None;
+        }
+        let sizes = Sizes::fitted_with_state(bench, readings, &trial)?;
+        let own = sizes.of(bench, &trial, others.len());
+        Some(Elsewhere {
+            variant,
+            parameters: own.into_iter().map(Into::into).collect(),
+        })
+    };
+    starts.into_values().filter_map(alike).collect()
 }

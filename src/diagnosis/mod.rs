@@ -50,8 +50,8 @@ use spikes::Spikes;
 pub use statement::for_people;
 pub use tabulated::{Tabulated, TabulatedEffects};
 pub use verdict::{
-    Bias, Candidate, Detail, Diagnosis, Fingerprint, Gap, Harm, HeldOut, Hidden, Kind, Nearest,
-    NoiseOut, ParameterOut, Size, Verdict, Where,
+    Bias, Candidate, Detail, Diagnosis, Elsewhere, Fingerprint, Gap, Harm, HeldOut, Hidden, Kind,
+    Nearest, NoiseOut, ParameterOut, Size, Verdict, Where,
 };
 
 /// How a diagnosis is made.

@@ -1,7 +1,7 @@
 //! The verdict in a sentence that a person can act on.
 
 use super::splitting::Split;
-use super::verdict::{Candidate, Fingerprint, Gap, Hidden, Kind, Verdict, Where};
+use super::verdict::{Candidate, Fingerprint, Gap, Hidden, Kind, ParameterOut, Verdict, Where};
 use crate::report::number::{measured, plain};
 
 /// The sentence.
@@ -97,8 +97,17 @@ pub(super) fn statement(
 }
 
 fn describe(candidate: &Candidate) -> String {
-    let mut parts: Vec<String> = candidate.variant.iter().cloned().collect();
-    parts.extend(candidate.parameters.iter().map(|p| {
+    let own = detail(candidate.variant.as_deref(), &candidate.parameters);
+    let others = candidate.elsewhere.iter().map(|other| {
+        let there = detail(Some(&other.variant), &other.parameters);
+        format!("; as likely {there}")
+    });
+    format!(" ({own}{})", others.collect::<String>())
+}
+
+fn detail(variant: Option<&str>, parameters: &[ParameterOut]) -> String {
+    let mut parts: Vec<String> = variant.iter().map(|v| (*v).to_owned()).collect();
+    parts.extend(parameters.iter().map(|p| {
         let (scale, unit) = if p.unit == "rad" {
             (1e6, "µrad")
         } else {
@@ -107,7 +116,7 @@ fn describe(candidate: &Candidate) -> String {
         let value = measured(scale * p.value, Some(scale * p.std));
         format!("{} {value} {unit}", p.name).trim_end().to_owned()
     }));
-    format!(" ({})", parts.join(", "))
+    parts.join(", ")
 }
 
 /// For each group what would split it: a further measurement where one suffices, and else the

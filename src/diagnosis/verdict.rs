@@ -167,10 +167,22 @@ pub struct Candidate {
     pub variant: Option<String>,
     /// Its parameters.
     pub parameters: Vec<ParameterOut>,
+    /// Of a named effect its other variants that fit as well.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub elsewhere: Vec<Elsewhere>,
     /// What happens physically.
     pub physics: String,
     /// What would confirm it.
     pub confirm: String,
+}
+
+/// Another variant of an effect, which these readings cannot tell from the one named.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Elsewhere {
+    /// Variant in words.
+    pub variant: String,
+    /// Its parameters there.
+    pub parameters: Vec<ParameterOut>,
 }
 
 /// A parameter of an effect.

@@ -198,6 +198,29 @@ fn machine(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
     diagnose(&MeasuredParts::new(&machine, readings).unwrap(), options)
 }
 
+/// Whether the size that was found is within two standard uncertainties of the true one, and of the
+/// sensor that was disturbed; none where the diagnosis leaves another variant open, and for parts
+/// whose own zeros and turns were drawn with that size as their standard deviation.
+pub fn within(diagnosis: &Diagnosis, effect: &str, size: f64) -> Option<bool> {
+    if ["part-zero", "part-rotation"].contains(&effect) {
+        return None;
+    }
+    // A yaw is put in by the amplitude of a wave and told by its root mean square.
+    let size = if effect == "yaw" {
+        size / 2f64.sqrt()
+    } else {
+        size
+    };
+    let candidate = diagnosis.candidates.iter().find(|c| c.effect == effect)?;
+    if !candidate.elsewhere.is_empty() {
+        return None;
+    }
+    let sensor = candidate.variant.as_deref();
+    let right = sensor.is_none_or(|v| !v.starts_with("sensor") || v == "sensor 3");
+    let found = candidate.parameters.first()?;
+    Some(right && (found.value.abs() - size).abs() <= 2.0 * found.std)
+}
+
 /// The smallest size of an effect that data without it would have shown with 80 % probability.
 pub fn seen_from(maker: &Maker, effect: &str, options: &Options) -> f64 {
     let bare = (maker.diagnosed)(&[], 1, options);

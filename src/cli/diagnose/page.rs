@@ -119,6 +119,12 @@ fn place(place: &crate::diagnosis::Where) -> sheet::Place {
 fn candidate(candidate: &crate::diagnosis::Candidate) -> sheet::Candidate {
     sheet::Candidate {
         effect: candidate.effect.clone(),
+        variant: candidate.variant.as_ref().map(|own| {
+            let others = candidate.elsewhere.iter();
+            others.fold(own.clone(), |text, other| {
+                format!("{text}; as likely {}", other.variant)
+            })
+        }),
         explained: candidate.explained,
         p_value: candidate.p_value,
         evidence: candidate.evidence,

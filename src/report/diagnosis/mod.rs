@@ -147,9 +147,13 @@ fn causes(view: &View) -> Section {
         return section;
     }
     for candidate in view.candidates.iter().filter(|c| c.named) {
+        let variant = candidate.variant.as_deref();
         section = section.paragraph(format!(
-            "{}: {}. To confirm: {}.",
-            candidate.effect, candidate.physics, candidate.confirm
+            "{}{}: {}. To confirm: {}.",
+            candidate.effect,
+            variant.map_or(String::new(), |variant| format!(" ({variant})")),
+            candidate.physics,
+            candidate.confirm
         ));
         if !candidate.parameters.is_empty() {
             section =

@@ -90,6 +90,8 @@ pub struct Place {
 pub struct Candidate {
     /// Its name.
     pub effect: String,
+    /// Its variant in words, with those that fit as well.
+    pub variant: Option<String>,
     /// Part of the gap that it alone explains.
     pub explained: f64,
     /// Corrected for every effect tried.

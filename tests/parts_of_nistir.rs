@@ -21,11 +21,16 @@ fn told(found: f64, told: f64, within: f64) {
     assert!((found - told).abs() <= within, "{found}, told {told}");
 }
 
+/// x and y in mm, and whether the direction measured is y.
+type Point = (f64, f64, bool);
+
+/// How a point moves with its part.
+type Motion = fn(&Point) -> f64;
+
 /// Mean residual of each point of each part with what was predicted for it, µm.
 struct Process {
     parts: usize,
-    /// Place of each point and direction: x, y in mm and whether it is y.
-    points: Vec<(f64, f64, bool)>,
+    points: Vec<Point>,
     /// Parts × points.
     residuals: DMatrix<f64>,
     predicted: DVector<f64>,
@@ -69,7 +74,7 @@ impl Process {
 
     /// Standard deviation between parts once `own` functions of the points are fitted to each part,
     /// by the degrees of freedom left, over the predicted standard uncertainty.
-    fn beyond(&self, own: &[fn(&(f64, f64, bool)) -> f64]) -> (f64, f64) {
+    fn beyond(&self, own: &[Motion]) -> (f64, f64) {
         let n = self.points.len();
         let mut centred = self.residuals.clone();
         for mut column in centred.column_iter_mut() {
@@ -89,10 +94,8 @@ impl Process {
     }
 }
 
-const ZERO: [fn(&(f64, f64, bool)) -> f64; 2] =
-    [|p| f64::from(u8::from(!p.2)), |p| f64::from(u8::from(p.2))];
-const ZERO_AND_ANGLE: [fn(&(f64, f64, bool)) -> f64; 3] =
-    [ZERO[0], ZERO[1], |p| if p.2 { p.0 } else { -p.1 }];
+const ZERO: [Motion; 2] = [|p| f64::from(u8::from(!p.2)), |p| f64::from(u8::from(p.2))];
+const ZERO_AND_ANGLE: [Motion; 3] = [ZERO[0], ZERO[1], |p| if p.2 { p.0 } else { -p.1 }];
 
 /// Certified digits: half of the last digit that the page tells.
 #[test]

@@ -1,10 +1,8 @@
 //! What must not change a diagnosis: the basis in which the model's freedom is written, columns that
 //! add nothing to it, the order of the readings' units, an effect that is listed twice.
 
-use std::ops::Range;
-
 use errsep::diagnosis::{Diagnosis, Kind, Options, Tabulated, diagnose_with};
-use errsep_models::model::{Effect, FittedModel, Freedom, Place};
+use errsep_models::model::{Effect, FittedModel, Freedom, Record};
 use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
 use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
 use nalgebra::{DMatrix, DVector};
@@ -16,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 #[derive(Clone)]
 struct Lines {
     reversal: FirstOrder,
-    observed: DVector<f64>,
+    record: Record,
     freedom: DMatrix<f64>,
 }
 
@@ -28,7 +26,7 @@ impl Lines {
             here * places[k].x.powi((column % 2) as i32)
         });
         Self {
-            observed: reversal.observed().clone(),
+            record: reversal.record().clone(),
             reversal: reversal.clone(),
             freedom,
         }
@@ -42,14 +40,8 @@ impl FittedModel for Lines {
     fn reading_unit(&self) -> &'static str {
         "um"
     }
-    fn places(&self) -> &[Place] {
-        self.reversal.places()
-    }
-    fn traces(&self) -> &[Range<usize>] {
-        self.reversal.traces()
-    }
-    fn observed(&self) -> &DVector<f64> {
-        &self.observed
+    fn record(&self) -> &Record {
+        &self.record
     }
     fn freedom(&self) -> Freedom {
         Freedom {
@@ -62,7 +54,7 @@ impl FittedModel for Lines {
     }
     fn refit(&self, observed: DVector<f64>) -> Self {
         Self {
-            observed,
+            record: self.record.with(observed),
             ..self.clone()
         }
     }
@@ -95,7 +87,7 @@ fn readings(seed: u64) -> Lines {
         &lines,
         &errsep_models::model::Shape::only(),
     );
-    lines.observed += change[0].dense(lines.observed.len()) * 0.12;
+    lines.record.observed += change[0].dense(lines.observed().len()) * 0.12;
     lines
 }
 
@@ -186,7 +178,7 @@ fn single_spikes_neither_make_an_effect_nor_hide_one() {
         let range = lines.traces()[trace].clone();
         let k = random.random_range(range.start + 2..range.end - 2);
         // Forty standard deviations of the noise.
-        lines.observed[k] += 2.0;
+        lines.record.observed[k] += 2.0;
     }
     let diagnosis = diagnosed(&lines, &TWO);
     assert_eq!(

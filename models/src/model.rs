@@ -5,6 +5,7 @@
 //! that the model leaves out.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -23,6 +24,38 @@ pub struct Place {
     pub direction: f64,
     /// Readings in the same cell have the same expectation under the model.
     pub cell: usize,
+}
+
+/// Readings with their circumstances.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// The circumstances of every reading; the readings of one trace stand together.
+    pub places: Arc<[Place]>,
+    /// The traces: readings taken in one go, along which noise may be correlated.
+    pub traces: Arc<[Range<usize>]>,
+    /// The readings.
+    pub observed: DVector<f64>,
+}
+
+impl Record {
+    /// Readings in their traces.
+    pub fn new(places: Vec<Place>, traces: Vec<Range<usize>>, observed: DVector<f64>) -> Self {
+        Self {
+            places: places.into(),
+            traces: traces.into(),
+            observed,
+        }
+    }
+
+    /// Other values under the same circumstances.
+    #[must_use]
+    pub fn with(&self, observed: DVector<f64>) -> Self {
+        Self {
+            places: Arc::clone(&self.places),
+            traces: Arc::clone(&self.traces),
+            observed,
+        }
+    }
 }
 
 /// A sparse signature: the change of each reading per unit of an amplitude.
@@ -353,14 +386,23 @@ pub trait FittedModel: Clone + Send + Sync {
         "mm"
     }
 
-    /// The circumstances of all readings; the readings of one trace stand together.
-    fn places(&self) -> &[Place];
+    /// The readings with their circumstances.
+    fn record(&self) -> &Record;
 
-    /// The traces: readings taken in one go, along which noise may be correlated.
-    fn traces(&self) -> &[Range<usize>];
+    /// The circumstances of all readings.
+    fn places(&self) -> &[Place] {
+        &self.record().places
+    }
+
+    /// The traces.
+    fn traces(&self) -> &[Range<usize>] {
+        &self.record().traces
+    }
 
     /// The readings.
-    fn observed(&self) -> &DVector<f64>;
+    fn observed(&self) -> &DVector<f64> {
+        &self.record().observed
+    }
 
     /// What the fitted state makes every reading, where that is smoother than the least-squares
     /// fit: a state to put known effects into, without the noise that the fit has taken up.

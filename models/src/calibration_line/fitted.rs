@@ -1,14 +1,13 @@
 //! The fitted line, laid open to the diagnosis.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
 use super::effects;
 use super::lack_of_fit::{LackOfFit, lack_of_fit};
-use crate::model::{Effect, FittedModel, Freedom, Place, Quantity};
+use crate::model::{Effect, FittedModel, Freedom, Place, Quantity, Record};
 
 /// One reading of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,9 +44,7 @@ pub enum NotALine {
 /// The line of least squares through the readings.
 #[derive(Debug, Clone)]
 pub struct CalibrationLine {
-    observed: DVector<f64>,
-    places: Vec<Place>,
-    traces: Vec<Range<usize>>,
+    record: Record,
     noise: Option<f64>,
     reach: f64,
     duration: f64,
@@ -107,9 +104,7 @@ impl CalibrationLine {
         }
         let duration = places.iter().map(|p| p.time).fold(0.0, f64::max);
         Ok(Self {
-            observed: DVector::from_vec(observed),
-            places,
-            traces,
+            record: Record::new(places, traces, DVector::from_vec(observed)),
             noise,
             reach: values.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs())),
             duration: duration.max(f64::MIN_POSITIVE),
@@ -129,7 +124,7 @@ impl CalibrationLine {
 
     /// Whether all x are greater than zero.
     pub fn positive(&self) -> bool {
-        self.places.iter().all(|p| p.x > 0.0)
+        self.record.places.iter().all(|p| p.x > 0.0)
     }
 
     /// The classical test of the line, with further columns fitted beside it, against the scatter
@@ -141,14 +136,14 @@ impl CalibrationLine {
             columns = columns.insert_column(at, 0.0);
             columns.set_column(at, column);
         }
-        let cells: Vec<usize> = self.places.iter().map(|p| p.cell).collect();
-        lack_of_fit(&self.observed, &columns, &cells)
+        let cells: Vec<usize> = self.record.places.iter().map(|p| p.cell).collect();
+        lack_of_fit(&self.record.observed, &columns, &cells)
     }
 
     /// 1 and x of every reading, x in units of full scale.
     fn line(&self) -> DMatrix<f64> {
-        DMatrix::from_fn(self.places.len(), 2, |row, column| {
-            [1.0, self.places[row].x / self.reach][column]
+        DMatrix::from_fn(self.record.places.len(), 2, |row, column| {
+            [1.0, self.record.places[row].x / self.reach][column]
         })
     }
 }
@@ -166,16 +161,8 @@ impl FittedModel for CalibrationLine {
         "x"
     }
 
-    fn places(&self) -> &[Place] {
-        &self.places
-    }
-
-    fn traces(&self) -> &[Range<usize>] {
-        &self.traces
-    }
-
-    fn observed(&self) -> &DVector<f64> {
-        &self.observed
+    fn record(&self) -> &Record {
+        &self.record
     }
 
     fn freedom(&self) -> Freedom {
@@ -190,11 +177,19 @@ impl FittedModel for CalibrationLine {
     }
 
     fn quantities(&self) -> Vec<Quantity> {
-        let count = self.places.len() as f64;
-        let mean = self.places.iter().map(|p| p.x).sum::<f64>() / count;
-        let sxx: f64 = self.places.iter().map(|p| (p.x - mean).powi(2)).sum();
+        let count = self.record.places.len() as f64;
+        let mean = self.record.places.iter().map(|p| p.x).sum::<f64>() / count;
+        let sxx: f64 = self
+            .record
+            .places
+            .iter()
+            .map(|p| (p.x - mean).powi(2))
+            .sum();
         let weights = |of: &dyn Fn(f64) -> f64| {
-            DVector::from_iterator(self.places.len(), self.places.iter().map(|p| of(p.x)))
+            DVector::from_iterator(
+                self.record.places.len(),
+                self.record.places.iter().map(|p| of(p.x)),
+            )
         };
         vec![
             Quantity {
@@ -221,7 +216,7 @@ impl FittedModel for CalibrationLine {
 
     fn refit(&self, observed: DVector<f64>) -> Self {
         Self {
-            observed,
+            record: self.record.with(observed),
             ..self.clone()
         }
     }

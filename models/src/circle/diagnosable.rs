@@ -11,18 +11,16 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use super::effects;
 use super::orthogonal::{CircleFit, orthogonal_fit};
 use super::points::{Circle, CircleError, Point};
-use crate::model::{Effect, FittedModel, Freedom, Place, Quantity};
+use crate::model::{Effect, FittedModel, Freedom, Place, Quantity, Record};
 use crate::units::UM_PER_MM;
 
 /// Points of one or several passes round a circle with the fitted circle.
 #[derive(Debug, Clone)]
 pub struct CirclePoints {
-    places: Vec<Place>,
-    traces: Vec<Range<usize>>,
+    record: Record,
     /// The circle from which readings are counted.
     fixed: Circle,
     directions: Vec<Point>,
-    observed: DVector<f64>,
     fitted: Circle,
     residuals: DVector<f64>,
     jacobian: DMatrix<f64>,
@@ -98,11 +96,9 @@ impl CirclePoints {
             .collect();
         let own = orthogonal_fit(&ordered, noise)?;
         Ok(Self {
-            places,
-            traces,
+            record: Record::new(places, traces, observed),
             fixed,
             directions,
-            observed,
             fitted: own.circle,
             residuals: DVector::zeros(0),
             jacobian: DMatrix::zeros(0, 0),
@@ -126,7 +122,7 @@ impl CirclePoints {
 
     /// Number of points of one pass.
     pub fn points_of_a_pass(&self) -> usize {
-        self.traces.first().map_or(0, Range::len)
+        self.record.traces.first().map_or(0, Range::len)
     }
 
     /// Angle of a place, rad.
@@ -167,16 +163,8 @@ impl FittedModel for CirclePoints {
         "deg"
     }
 
-    fn places(&self) -> &[Place] {
-        &self.places
-    }
-
-    fn traces(&self) -> &[Range<usize>] {
-        &self.traces
-    }
-
-    fn observed(&self) -> &DVector<f64> {
-        &self.observed
+    fn record(&self) -> &Record {
+        &self.record
     }
 
     fn freedom(&self) -> Freedom {
@@ -235,13 +223,13 @@ impl FittedModel for CirclePoints {
             })
             .collect();
         let mut fitted = self.clone();
-        fitted.observed = observed;
+        fitted.record.observed = observed;
         match orthogonal_fit(&points, self.noise) {
             Ok(fit) => fitted.with(fit),
             // Readings that are no circle any more: counted from the circle as it was.
             Err(_) => {
                 let before = self.linearised() - &self.residuals;
-                fitted.residuals = &fitted.observed - before;
+                fitted.residuals = &fitted.record.observed - before;
                 fitted
             }
         }

@@ -1,7 +1,6 @@
 //! The regression of step-diagonal readings, laid open to the diagnosis.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
@@ -11,7 +10,7 @@ use super::effects;
 use super::prediction::{Parameter, sensitivities};
 use super::readings::{DiagonalError, DiagonalReading, check};
 use super::{Component, Diagonal, Sequence, Target, Travel, WorkZone};
-use crate::model::{Effect, FittedModel, Freedom, Place};
+use crate::model::{Effect, FittedModel, Freedom, Place, Record};
 
 /// Readings whose laser was on one diagonal with one target, in one order of motions.
 type Channel = (Diagonal, Target, Sequence);
@@ -24,11 +23,9 @@ type Terms = Vec<(Parameter, f64)>;
 pub struct DiagonalRuns {
     zone: WorkZone,
     channels: Vec<Channel>,
-    places: Vec<Place>,
-    traces: Vec<Range<usize>>,
+    record: Record,
     columns: Arc<DMatrix<f64>>,
     terms: Arc<Vec<Terms>>,
-    observed: DVector<f64>,
     duration: f64,
     noise: Option<f64>,
 }
@@ -108,10 +105,12 @@ impl DiagonalRuns {
                     .map(|r| sensitivities(zone, r.diagonal, r.target, r.at, r.travel))
                     .collect(),
             ),
-            observed: DVector::from_iterator(ordered.len(), ordered.iter().map(|r| r.value)),
             duration: (places.len().max(2) - 1) as f64,
-            places,
-            traces,
+            record: Record::new(
+                places,
+                traces,
+                DVector::from_iterator(ordered.len(), ordered.iter().map(|r| r.value)),
+            ),
             noise,
         })
     }
@@ -146,16 +145,8 @@ impl FittedModel for DiagonalRuns {
         "um"
     }
 
-    fn places(&self) -> &[Place] {
-        &self.places
-    }
-
-    fn traces(&self) -> &[Range<usize>] {
-        &self.traces
-    }
-
-    fn observed(&self) -> &DVector<f64> {
-        &self.observed
+    fn record(&self) -> &Record {
+        &self.record
     }
 
     fn freedom(&self) -> Freedom {
@@ -186,7 +177,7 @@ impl FittedModel for DiagonalRuns {
 
     fn refit(&self, observed: DVector<f64>) -> Self {
         Self {
-            observed,
+            record: self.record.with(observed),
             ..self.clone()
         }
     }

@@ -13,7 +13,7 @@ use super::effects;
 use super::{
     Choice, FourSensorError, Geometry, Line, Outputs, Penalised, Separation, Separator, Settings,
 };
-use crate::model::{Effect, FittedModel, Freedom, Pattern, Place, Profile};
+use crate::model::{Effect, FittedModel, Freedom, Pattern, Place, Profile, Record};
 use crate::units::UM_PER_MM;
 
 /// Outputs of four sensors, in one or several repeats, with the fitted state.
@@ -23,9 +23,7 @@ pub struct FourSensors {
     start: f64,
     separator: Arc<Separator>,
     settings: Settings,
-    places: Vec<Place>,
-    traces: Vec<Range<usize>>,
-    observed: DVector<f64>,
+    record: Record,
     state: Separation,
     noise: Option<f64>,
 }
@@ -80,9 +78,7 @@ impl FourSensors {
             start,
             separator: Arc::new(separator),
             settings,
-            places,
-            traces,
-            observed,
+            record: Record::new(places, traces, observed),
             state,
             noise,
         })
@@ -164,23 +160,15 @@ impl FittedModel for FourSensors {
         "um"
     }
 
-    fn places(&self) -> &[Place] {
-        &self.places
-    }
-
-    fn traces(&self) -> &[Range<usize>] {
-        &self.traces
-    }
-
-    fn observed(&self) -> &DVector<f64> {
-        &self.observed
+    fn record(&self) -> &Record {
+        &self.record
     }
 
     fn freedom(&self) -> Freedom {
         let (points, count) = (self.geometry.point_count(), self.geometry.output_count());
         let longest = self.arm(3);
-        let mut columns = DMatrix::zeros(self.places.len(), points + 2 * count + 4);
-        for (row, place) in self.places.iter().enumerate() {
+        let mut columns = DMatrix::zeros(self.record.places.len(), points + 2 * count + 4);
+        for (row, place) in self.record.places.iter().enumerate() {
             let n = self.at(place);
             columns[(row, n + self.geometry.offsets()[place.channel])] = 1.0;
             columns[(row, points + n)] = 1.0;
@@ -240,14 +228,14 @@ impl FittedModel for FourSensors {
             &self.settings,
             &self.geometry,
             self.start,
-            &self.traces,
+            &self.record.traces,
             &observed,
         );
         // Where the penalty finds no corner the state before is the better one to take slopes from.
         if let Ok(state) = state {
             fitted.state = state;
         }
-        fitted.observed = observed;
+        fitted.record.observed = observed;
         fitted
     }
 

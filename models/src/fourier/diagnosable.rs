@@ -5,7 +5,6 @@
 //! step at the joint for the slope of the workpiece, common to all scans.
 
 use std::f64::consts::TAU;
-use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
@@ -13,19 +12,17 @@ use nalgebra::{DMatrix, DVector};
 use super::effects;
 use super::separation::spacings;
 use super::{Compensation, FourierError, Scan, Section, join};
-use crate::model::{Effect, FittedModel, Freedom, Place, Profile};
+use crate::model::{Effect, FittedModel, Freedom, Place, Profile, Record};
 
 /// Scans of one or several probe spacings with the fitted workpiece.
 #[derive(Debug, Clone)]
 pub struct FourierScans {
     section: Section,
     spacings: Vec<f64>,
-    places: Vec<Place>,
-    traces: Vec<Range<usize>>,
+    record: Record,
     columns: Arc<DMatrix<f64>>,
     /// Maps readings to the coefficients of the columns.
     solver: Arc<DMatrix<f64>>,
-    observed: DVector<f64>,
     coefficients: DVector<f64>,
     noise: Option<f64>,
 }
@@ -64,11 +61,9 @@ impl FourierScans {
         let mut model = Self {
             section,
             spacings,
-            places,
-            traces,
+            record: Record::new(places, traces, DVector::zeros(0)),
             columns: Arc::new(DMatrix::zeros(0, 0)),
             solver: Arc::new(DMatrix::zeros(0, 0)),
-            observed: DVector::zeros(0),
             coefficients: DVector::zeros(0),
             // A difference of two readings.
             noise: noise.map(|sigma| sigma * 2f64.sqrt()),
@@ -88,8 +83,11 @@ impl FourierScans {
 
     fn design(&self) -> DMatrix<f64> {
         let orders = self.section.orders;
-        let mut columns = DMatrix::zeros(self.places.len(), 2 * orders + self.traces.len() + 1);
-        for (row, place) in self.places.iter().enumerate() {
+        let mut columns = DMatrix::zeros(
+            self.record.places.len(),
+            2 * orders + self.record.traces.len() + 1,
+        );
+        for (row, place) in self.record.places.iter().enumerate() {
             let (here, there) = (self.angle(place.x), self.angle(self.second(place)));
             for order in 1..=orders {
                 let w = order as f64;
@@ -98,7 +96,7 @@ impl FourierScans {
             }
             columns[(row, 2 * orders)] = f64::from(u8::from(self.beyond(place)));
         }
-        for (k, trace) in self.traces.iter().enumerate() {
+        for (k, trace) in self.record.traces.iter().enumerate() {
             for row in trace.clone() {
                 columns[(row, 2 * orders + 1 + k)] = 1.0;
             }
@@ -167,16 +165,8 @@ impl FittedModel for FourierScans {
         "um"
     }
 
-    fn places(&self) -> &[Place] {
-        &self.places
-    }
-
-    fn traces(&self) -> &[Range<usize>] {
-        &self.traces
-    }
-
-    fn observed(&self) -> &DVector<f64> {
-        &self.observed
+    fn record(&self) -> &Record {
+        &self.record
     }
 
     fn freedom(&self) -> Freedom {
@@ -224,7 +214,7 @@ impl FittedModel for FourierScans {
     fn refit(&self, observed: DVector<f64>) -> Self {
         let mut fitted = self.clone();
         fitted.coefficients = self.solver.as_ref() * &observed;
-        fitted.observed = observed;
+        fitted.record.observed = observed;
         fitted
     }
 

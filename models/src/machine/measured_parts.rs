@@ -6,16 +6,14 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::{Axis, Machine, MachineError, PartReading, effects, part_residuals};
-use crate::model::{Column, Effect, FittedModel, Freedom, Place, Quantity};
+use crate::model::{Column, Effect, FittedModel, Freedom, Place, Quantity, Record};
 
 /// Parts measured at points whose deviations a machine model predicts.
 #[derive(Debug, Clone)]
 pub struct MeasuredParts {
     readings: Vec<PartReading>,
     predicted: DVector<f64>,
-    observed: DVector<f64>,
-    places: Vec<Place>,
-    traces: Vec<Range<usize>>,
+    record: Record,
     parts: Vec<String>,
 }
 
@@ -60,9 +58,11 @@ impl MeasuredParts {
                 readings.len(),
                 residuals.iter().map(|r| r.predicted),
             ),
-            observed: DVector::from_iterator(readings.len(), readings.iter().map(|r| r.value)),
-            places,
-            traces,
+            record: Record::new(
+                places,
+                traces,
+                DVector::from_iterator(readings.len(), readings.iter().map(|r| r.value)),
+            ),
             parts: {
                 let mut names: Vec<(usize, String)> =
                     parts.into_iter().map(|(name, k)| (k, name)).collect();
@@ -87,7 +87,7 @@ impl MeasuredParts {
 
     /// The signature with a value for each reading of some parts.
     pub(super) fn column(&self, value: impl Fn(&PartReading) -> f64) -> Column {
-        Column::from_places(&self.places, |k, _| value(&self.readings[k]))
+        Column::from_places(&self.record.places, |k, _| value(&self.readings[k]))
     }
 }
 
@@ -110,27 +110,19 @@ impl FittedModel for MeasuredParts {
         "um"
     }
 
-    fn places(&self) -> &[Place] {
-        &self.places
-    }
-
-    fn traces(&self) -> &[Range<usize>] {
-        &self.traces
-    }
-
-    fn observed(&self) -> &DVector<f64> {
-        &self.observed
+    fn record(&self) -> &Record {
+        &self.record
     }
 
     fn freedom(&self) -> Freedom {
         Freedom {
-            columns: DMatrix::zeros(self.observed.len(), 0),
+            columns: DMatrix::zeros(self.record.observed.len(), 0),
             profiles: None,
         }
     }
 
     fn linearised(&self) -> DVector<f64> {
-        &self.observed - &self.predicted
+        &self.record.observed - &self.predicted
     }
 
     fn channel_names(&self) -> Vec<String> {
@@ -167,7 +159,7 @@ impl FittedModel for MeasuredParts {
 
     fn refit(&self, observed: DVector<f64>) -> Self {
         Self {
-            observed,
+            record: self.record.with(observed),
             ..self.clone()
         }
     }

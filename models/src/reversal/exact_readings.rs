@@ -6,18 +6,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 pub use super::exact_form::Form;
+use super::injection::Zero;
 pub use super::injection::{Frame, Injection};
 use super::{Channel, Direction, Observations, Reading};
-
-/// What the indicators' readings are counted from.
-struct Zero {
-    /// Reading of every channel at mid travel, µm.
-    middle: [f64; 4],
-    /// Greatest reading off the indicators' zero, µm.
-    reach: f64,
-    /// Play of the indicators, µm.
-    width: f64,
-}
 
 /// The noise of a scene, standard deviations in µm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -168,15 +159,13 @@ impl Scene {
         let mut angle = channel.indicator_sign() * alpha
             + channel.spindle_sign() * beta
             + channel.side_sign() * gamma;
-        let (mut slide, mut axial, mut half) = (commanded, 0.0, 0.0);
-        let (mut sag, mut radius) = (0.0, 0.0);
+        let (mut slide, mut axial, mut half, mut radius) = (commanded, 0.0, 0.0, 0.0);
         for effect in active {
             match *effect {
                 Injection::Taper(cone) => angle += cone,
                 Injection::AxisBacklash(lost) => slide -= 0.5 * direction * lost,
                 Injection::ReversalShift(shift) if channel.spindle_sign() < 0.0 => axial += shift,
                 Injection::ThicknessShift(thickness) => half += 0.5 * thickness,
-                Injection::GravitySag(end) => sag += end,
                 Injection::TipRadius(r) => radius += r,
                 _ => {}
             }
@@ -186,23 +175,7 @@ impl Scene {
         } else {
             &self.s_b
         };
-        let dirt = |u: f64| -> f64 {
-            active
-                .iter()
-                .map(|effect| match *effect {
-                    Injection::LocalContamination {
-                        height,
-                        channel: where_it_lies,
-                        repeat: when,
-                        position,
-                        width,
-                    } if where_it_lies == channel && when.is_none_or(|r| r == repeat) => {
-                        height * (-0.5 * ((u - position) / width).powi(2)).exp()
-                    }
-                    _ => 0.0,
-                })
-                .sum()
-        };
+        let dirt = |u: f64| -> f64 { active.iter().map(|e| e.dirt(channel, repeat, u)).sum() };
         let surface = |u: f64| {
             let here = side.at(u - axial);
             let slope = (side.at(u - axial + 0.01) - side.at(u - axial - 0.01)) / 0.02e3;
@@ -226,7 +199,7 @@ impl Scene {
         } else {
             0.0
         };
-        let bend = sag * part * part * (6.0 - 4.0 * part + part * part) / 3.0;
+        let bend: f64 = active.iter().map(|e| e.sag(part)).sum();
         reading * 1e3
             + channel.indicator_sign() * (self.m.at(slide) + bend)
             + self.offsets[channel.index()]
@@ -241,48 +214,11 @@ impl Scene {
         time: f64,
         displacement: f64,
     ) -> f64 {
-        let mut shown = displacement;
-        for effect in &self.effects {
-            let about = displacement - zero.middle[channel.index()];
-            shown += match *effect {
-                Injection::GainMismatch(gain) => 0.5 * channel.indicator_sign() * gain * about,
-                Injection::CommonGain(gain) => gain * about,
-                Injection::IndicatorNonlinearity { deviation, cubic } => {
-                    deviation * (displacement / zero.reach).powi(if cubic { 3 } else { 2 })
-                }
-                Injection::ThermalDrift {
-                    drift,
-                    constant,
-                    alike,
-                } => {
-                    let sign = if alike { 1.0 } else { channel.indicator_sign() };
-                    let whole = 1.0 - (-self.duration() / constant).exp();
-                    sign * drift * (1.0 - (-time / constant).exp()) / whole
-                }
-                Injection::ZeroJump {
-                    jump,
-                    channel: which,
-                    time: when,
-                } if which == channel && time > when => jump,
-                Injection::CyclicError {
-                    amplitude,
-                    period,
-                    phase,
-                    of_reading,
-                } => {
-                    let turn = std::f64::consts::TAU / period;
-                    if of_reading {
-                        amplitude * (turn * displacement + phase).sin()
-                    } else if channel.spindle_sign() > 0.0 {
-                        amplitude * (turn * x + phase).sin()
-                    } else {
-                        0.0
-                    }
-                }
-                _ => 0.0,
-            };
-        }
-        shown
+        let beyond = self
+            .effects
+            .iter()
+            .map(|effect| effect.shown_beyond(zero, channel, x, time, displacement));
+        displacement + beyond.sum::<f64>()
     }
 
     /// Readings without noise.
@@ -297,19 +233,11 @@ impl Scene {
 
     fn readings(&self, mut random: Option<ChaCha8Rng>) -> Observations {
         let mut readings = Vec::new();
-        let width: f64 = self
-            .effects
-            .iter()
-            .map(|e| match e {
-                Injection::Hysteresis(width) => *width,
-                _ => 0.0,
-            })
-            .sum();
         let middle = 0.5 * self.travel();
         let zero = Zero {
             middle: Channel::ALL.map(|c| self.geometry(c, middle, 1.0, 1, false)),
             reach: self.reading_reach(),
-            width,
+            duration: self.duration(),
         };
         let mut pass = 0;
         for spindle in [1.0, -1.0] {
@@ -352,7 +280,16 @@ impl Scene {
         random: &mut Option<ChaCha8Rng>,
         readings: &mut Vec<Reading>,
     ) {
-        let (n, width) = (self.positions.len(), zero.width);
+        let n = self.positions.len();
+        // Play of the indicators, µm.
+        let width: f64 = self
+            .effects
+            .iter()
+            .map(|e| match e {
+                Injection::Hysteresis(width) => *width,
+                _ => 0.0,
+            })
+            .sum();
         let sign = if direction == Direction::Forward {
             1.0
         } else {

@@ -3,17 +3,15 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use super::exact_readings::{Frame, Injection};
+use super::injection::{Frame, Injection, Zero};
 use super::simulate::{Disturbance, GaugedForm, Plan, PlanError, Situation, simulate};
 use super::{Channel, Direction};
 
 /// An effect in its place: what its exact form needs to know of the plan.
 pub struct Injected {
     effect: Injection,
-    middle: [f64; 4],
-    reach: f64,
+    zero: Zero,
     travel: (f64, f64),
-    duration: f64,
     sides: [GaugedForm; 2],
     /// Where the indicator's pointer stands, by channel, repeat and direction.
     pointer: RefCell<BTreeMap<(Channel, u32, bool), f64>>,
@@ -22,9 +20,7 @@ pub struct Injected {
 /// What a plan gives without noise and effects.
 #[derive(Debug, Clone)]
 pub struct Undisturbed {
-    middle: [f64; 4],
-    /// Greatest reading off the indicators' zero, µm.
-    reach: f64,
+    zero: Zero,
     /// What the secondary parameters of an effect are drawn from.
     pub frame: Frame,
     sides: [GaugedForm; 2],
@@ -69,17 +65,22 @@ impl Undisturbed {
         }
         let low = ends.iter().map(|e| e.0).fold(f64::INFINITY, f64::min);
         let high = ends.iter().map(|e| e.1).fold(f64::NEG_INFINITY, f64::max);
+        let duration = times.iter().map(|t| t.1).fold(0.0, f64::max);
+        let reach = observations
+            .readings
+            .iter()
+            .map(|r| r.value.abs())
+            .fold(f64::MIN_POSITIVE, f64::max);
         Ok(Self {
-            middle,
-            reach: observations
-                .readings
-                .iter()
-                .map(|r| r.value.abs())
-                .fold(f64::MIN_POSITIVE, f64::max),
+            zero: Zero {
+                middle,
+                reach,
+                duration,
+            },
             frame: Frame {
                 travel,
                 span: (high - low).max(f64::MIN_POSITIVE),
-                duration: times.iter().map(|t| t.1).fold(0.0, f64::max),
+                duration,
                 times,
                 repeats: plan.repeats,
             },
@@ -93,10 +94,8 @@ impl Injected {
     pub fn new(effect: Injection, undisturbed: &Undisturbed) -> Self {
         Self {
             effect,
-            middle: undisturbed.middle,
-            reach: undisturbed.reach,
+            zero: undisturbed.zero,
             travel: undisturbed.frame.travel,
-            duration: undisturbed.frame.duration,
             sides: undisturbed.sides.clone(),
             pointer: RefCell::default(),
         }
@@ -146,62 +145,20 @@ impl Disturbance for Injected {
     }
 
     fn after(&self, situation: &Situation, reading: f64) -> f64 {
-        let channel = situation.channel;
-        let about = reading - self.middle[channel.index()];
-        let length = self.travel.1 - self.travel.0;
+        let (channel, slide) = (situation.channel, situation.slide);
+        let beyond = self
+            .effect
+            .shown_beyond(&self.zero, channel, slide, situation.time, reading);
+        let part = (slide - self.travel.0) / (self.travel.1 - self.travel.0);
         reading
+            + beyond
+            + self.effect.dirt(channel, situation.repeat, slide)
+            + channel.indicator_sign() * self.effect.sag(part)
             + match self.effect {
-                Injection::GainMismatch(gain) => 0.5 * channel.indicator_sign() * gain * about,
-                Injection::CommonGain(gain) => gain * about,
-                Injection::IndicatorNonlinearity { deviation, cubic } => {
-                    deviation * (reading / self.reach).powi(if cubic { 3 } else { 2 })
-                }
-                Injection::ThermalDrift {
-                    drift,
-                    constant,
-                    alike,
-                } => {
-                    let sign = if alike { 1.0 } else { channel.indicator_sign() };
-                    sign * drift * (-situation.time / constant).exp_m1()
-                        / (-self.duration / constant).exp_m1()
-                }
                 Injection::Hysteresis(width) => self.play(situation, reading, width) - reading,
-                Injection::ZeroJump {
-                    jump,
-                    channel: which,
-                    time,
-                } if which == channel && situation.time > time => jump,
-                Injection::LocalContamination {
-                    height,
-                    channel: which,
-                    repeat,
-                    position,
-                    width,
-                } if which == channel && repeat.is_none_or(|r| r == situation.repeat) => {
-                    height * (-0.5 * ((situation.slide - position) / width).powi(2)).exp()
-                }
-                Injection::CyclicError {
-                    amplitude,
-                    period,
-                    phase,
-                    of_reading,
-                } => {
-                    let turn = std::f64::consts::TAU / period;
-                    if of_reading {
-                        amplitude * (turn * reading + phase).sin()
-                    } else if channel.spindle_sign() > 0.0 {
-                        amplitude * (turn * situation.slide + phase).sin()
-                    } else {
-                        0.0
-                    }
-                }
-                Injection::GravitySag(end) => {
-                    let u = (situation.slide - self.travel.0) / length;
-                    channel.indicator_sign() * end * u * u * (6.0 - 4.0 * u + u * u) / 3.0
-                }
                 Injection::TipRadius(radius) => {
                     let side = &self.sides[usize::from(!channel.is_side_a())];
-                    let at = situation.slide - situation.artefact_shift;
+                    let at = slide - situation.artefact_shift;
                     let slope = (side.at(at + 0.01) - side.at(at - 0.01)) / 0.02e3;
                     0.5e3 * radius * slope * slope
                 }

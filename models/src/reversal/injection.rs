@@ -134,6 +134,92 @@ impl Injection {
     }
 }
 
+/// What an indicator's errors are counted from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Zero {
+    /// Reading of every channel at mid travel, µm.
+    pub middle: [f64; 4],
+    /// Greatest reading off the indicators' zero, µm.
+    pub reach: f64,
+    /// Duration of the whole test, s.
+    pub duration: f64,
+}
+
+impl Injection {
+    /// What an indicator shows beyond what it sees, µm, with the slide at x, mm, after a time, s. Its
+    /// play, which remembers, is not among it.
+    pub(super) fn shown_beyond(
+        self,
+        zero: &Zero,
+        channel: Channel,
+        x: f64,
+        time: f64,
+        seen: f64,
+    ) -> f64 {
+        let about = seen - zero.middle[channel.index()];
+        match self {
+            Self::GainMismatch(gain) => 0.5 * channel.indicator_sign() * gain * about,
+            Self::CommonGain(gain) => gain * about,
+            Self::IndicatorNonlinearity { deviation, cubic } => {
+                deviation * (seen / zero.reach).powi(if cubic { 3 } else { 2 })
+            }
+            Self::ThermalDrift {
+                drift,
+                constant,
+                alike,
+            } => {
+                let sign = if alike { 1.0 } else { channel.indicator_sign() };
+                sign * drift * (-time / constant).exp_m1() / (-zero.duration / constant).exp_m1()
+            }
+            Self::ZeroJump {
+                jump,
+                channel: which,
+                time: when,
+            } if which == channel && time > when => jump,
+            Self::CyclicError {
+                amplitude,
+                period,
+                phase,
+                of_reading,
+            } => {
+                let turn = std::f64::consts::TAU / period;
+                if of_reading {
+                    amplitude * (turn * seen + phase).sin()
+                } else if channel.spindle_sign() > 0.0 {
+                    amplitude * (turn * x + phase).sin()
+                } else {
+                    0.0
+                }
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Height of dirt under the stylus at a place of the artefact, mm, in µm.
+    pub(super) fn dirt(self, channel: Channel, repeat: u32, place: f64) -> f64 {
+        match self {
+            Self::LocalContamination {
+                height,
+                channel: which,
+                repeat: when,
+                position,
+                width,
+            } if which == channel && when.is_none_or(|r| r == repeat) => {
+                height * (-0.5 * ((place - position) / width).powi(2)).exp()
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Sag at a part of the travel, 0 to 1, µm: a beam held at one end under its own weight.
+    pub(super) fn sag(self, part: f64) -> f64 {
+        match self {
+            Self::GravitySag(end) => end * part * part * (6.0 - 4.0 * part + part * part) / 3.0,
+            _ => 0.0,
+        }
+    }
+}
+
 /// What the secondary parameters of an effect are drawn from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {

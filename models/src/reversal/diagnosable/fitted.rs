@@ -1,11 +1,9 @@
 //! What the diagnosis asks of the fitted model.
 
-use std::ops::Range;
-
 use nalgebra::{DMatrix, DVector};
 
 use super::{FirstOrder, forms};
-use crate::model::{Effect, FittedModel, Freedom, Pattern, Place, Profile, Profiles, Quantity};
+use crate::model::{Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record};
 use crate::reversal::smooth_profile::SmoothProfile;
 use crate::reversal::{Channel, effects};
 
@@ -18,28 +16,20 @@ impl FittedModel for FirstOrder {
         "um"
     }
 
-    fn places(&self) -> &[Place] {
-        &self.places
-    }
-
-    fn traces(&self) -> &[Range<usize>] {
-        &self.traces
-    }
-
-    fn observed(&self) -> &DVector<f64> {
-        &self.observed
+    fn record(&self) -> &Record {
+        &self.record
     }
 
     fn smooth(&self) -> Option<DVector<f64>> {
-        let readings = 0..self.places.len();
+        let readings = 0..self.record.places.len();
         Some(DVector::from_iterator(
-            self.places.len(),
+            self.record.places.len(),
             readings.map(|k| self.smooth_reading(k)),
         ))
     }
 
     fn freedom(&self) -> Freedom {
-        let traces = self.traces.len();
+        let traces = self.record.traces.len();
         let n = self.positions.len();
         let mean_x = self.positions.iter().sum::<f64>() / n as f64;
         let mut patterns = DMatrix::zeros(traces, 3);
@@ -50,8 +40,11 @@ impl FittedModel for FirstOrder {
         }
         let line = DVector::from_iterator(n, self.positions.iter().map(|x| x - mean_x));
         let offsets = self.present.len();
-        let mut columns = DMatrix::zeros(self.places.len(), offsets + usize::from(!self.rigid()));
-        for (k, place) in self.places.iter().enumerate() {
+        let mut columns = DMatrix::zeros(
+            self.record.places.len(),
+            offsets + usize::from(!self.rigid()),
+        );
+        for (k, place) in self.record.places.iter().enumerate() {
             columns[(k, place.channel)] = 1.0;
             if !self.rigid() {
                 columns[(k, offsets)] = self.channel(place).spindle_sign() * (place.x - mean_x);
@@ -73,10 +66,11 @@ impl FittedModel for FirstOrder {
     fn linearised(&self) -> DVector<f64> {
         let half = self.assumptions.thickness.map_or(0.0, |d| d / 2.0);
         DVector::from_iterator(
-            self.places.len(),
-            self.places
+            self.record.places.len(),
+            self.record
+                .places
                 .iter()
-                .zip(self.observed.iter())
+                .zip(self.record.observed.iter())
                 .map(|(place, value)| {
                     let slope = self.tilt(self.channel(place));
                     // A channel tilted by ψ climbs tan ψ per length, and its probe point lies h·ψ
@@ -115,8 +109,8 @@ impl FittedModel for FirstOrder {
             name: name.to_owned(),
             unit: "rad",
             weights: DVector::from_iterator(
-                self.places.len(),
-                self.places.iter().map(|place| {
+                self.record.places.len(),
+                self.record.places.iter().map(|place| {
                     let channel = self.channel(place);
                     let traces = self
                         .trace_channels
@@ -144,7 +138,7 @@ impl FittedModel for FirstOrder {
     }
 
     fn profiles(&self) -> Vec<Profile> {
-        let per_channel = self.traces.len() as f64 / self.present.len() as f64;
+        let per_channel = self.record.traces.len() as f64 / self.present.len() as f64;
         let profile = |name: &str, form: &SmoothProfile, gain: f64| Profile {
             name: name.to_owned(),
             unit: "um",
@@ -165,14 +159,14 @@ impl FittedModel for FirstOrder {
 
     fn refit(&self, observed: DVector<f64>) -> Self {
         let mut fitted = self.clone();
-        fitted.observed = observed;
+        fitted.record.observed = observed;
         fitted.fit(true);
         fitted
     }
 
     fn refit_as_smooth(&self, observed: DVector<f64>) -> Self {
         let mut fitted = self.clone();
-        fitted.observed = observed;
+        fitted.record.observed = observed;
         fitted.fit(false);
         fitted
     }

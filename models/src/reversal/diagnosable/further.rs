@@ -11,8 +11,8 @@ impl FirstOrder {
     /// predicts it; nothing where that cannot be fitted.
     fn predicted(&self, change: impl Fn(usize, &mut Vec<Reading>)) -> Option<Self> {
         let mut readings = Vec::new();
-        for k in 0..self.places.len() {
-            let place = &self.places[k];
+        for k in 0..self.record.places.len() {
+            let place = &self.record.places[k];
             readings.push(Reading {
                 channel: self.channel(place),
                 repeat: place.repeat,
@@ -32,7 +32,7 @@ impl FirstOrder {
 
     /// Further measurements that a shop can make, in words and as the model fitted to each.
     pub(super) fn further_measurements(&self) -> Vec<(String, Self)> {
-        let turned = self.places.iter().any(|p| p.direction < 0.0);
+        let turned = self.record.places.iter().any(|p| p.direction < 0.0);
         let backward = |_: usize, readings: &mut Vec<Reading>| {
             if let Some(last) = readings.last().copied() {
                 readings.push(Reading {
@@ -44,7 +44,7 @@ impl FirstOrder {
         };
         let tilted = |k: usize, readings: &mut Vec<Reading>| {
             if let Some(last) = readings.last_mut() {
-                let side = self.channel(&self.places[k]).side_sign();
+                let side = self.channel(&self.record.places[k]).side_sign();
                 last.value += side * TILT * (last.x - self.middle);
             }
         };

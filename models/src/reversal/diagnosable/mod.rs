@@ -10,14 +10,13 @@ mod further;
 mod sorting;
 
 use std::collections::BTreeSet;
-use std::ops::Range;
 
 use nalgebra::DVector;
 use thiserror::Error;
 
 use super::smooth_profile::{SmoothProfile, Smoother};
 use super::{Channel, Convention, Observations};
-use crate::model::{Column, FittedModel, Place};
+use crate::model::{Column, FittedModel, Place, Record};
 use sorting::Sorted;
 
 /// What the set-up says of the measurement.
@@ -65,9 +64,7 @@ struct ChannelLine {
 #[derive(Debug, Clone)]
 pub struct FirstOrder {
     assumptions: Assumptions,
-    observed: DVector<f64>,
-    places: Vec<Place>,
-    traces: Vec<Range<usize>>,
+    record: Record,
     trace_channels: Vec<Channel>,
     positions: Vec<f64>,
     smoother: Smoother,
@@ -132,9 +129,7 @@ impl FirstOrder {
             middle: sorted.positions.iter().sum::<f64>() / n as f64,
             mid_readings: [0.0; 4],
             assumptions,
-            observed: DVector::zeros(0),
-            places: sorted.places,
-            traces: sorted.traces,
+            record: Record::new(sorted.places, sorted.traces, DVector::zeros(0)),
             trace_channels: sorted.trace_channels,
             positions: sorted.positions,
             smoother,
@@ -163,11 +158,12 @@ impl FirstOrder {
             let mut sum = DVector::zeros(n);
             let mut count = 0.0;
             for (trace, _) in self
+                .record
                 .traces
                 .iter()
                 .zip(&self.trace_channels)
                 .filter(|(_, c)| *c == channel)
-                .filter(|(t, _)| repeat.is_none_or(|r| self.places[t.start].repeat == r))
+                .filter(|(t, _)| repeat.is_none_or(|r| self.record.places[t.start].repeat == r))
             {
                 sum += values.rows(trace.start, n);
                 count += 1.0;
@@ -179,7 +175,7 @@ impl FirstOrder {
 
     /// Fits the readings; `anew`: with the weight of the smoothing chosen by them.
     fn fit(&mut self, anew: bool) {
-        let means = self.channel_means(&self.observed, None);
+        let means = self.channel_means(&self.record.observed, None);
         let n = self.positions.len();
         let mean_x = self.positions.iter().sum::<f64>() / n as f64;
         let sxx: f64 = self.positions.iter().map(|x| (x - mean_x).powi(2)).sum();
@@ -208,7 +204,7 @@ impl FirstOrder {
             let singles: Vec<[DVector<f64>; 3]> = self
                 .repeats
                 .iter()
-                .map(|repeat| forms(&self.channel_means(&self.observed, Some(*repeat)), n))
+                .map(|repeat| forms(&self.channel_means(&self.record.observed, Some(*repeat)), n))
                 .collect();
             let smooth = |k: usize| {
                 let own: Vec<&DVector<f64>> = singles.iter().map(|forms| &forms[k]).collect();
@@ -284,7 +280,7 @@ impl FirstOrder {
     /// The smooth value of a reading, µm.
     pub fn smooth_reading(&self, reading: usize) -> f64 {
         let added = self.beneath.as_ref().map_or(0.0, |b| b[reading]);
-        self.smooth[self.places[reading].cell] + added
+        self.smooth[self.record.places[reading].cell] + added
     }
 
     /// Whether effects add to the smooth reading before it is seen.
@@ -295,20 +291,22 @@ impl FirstOrder {
     /// A function of the smooth reading, for every reading.
     pub(super) fn of_reading(&self, value: impl Fn(f64) -> f64) -> Column {
         if self.beneath.is_some() {
-            return Column::from_places(&self.places, |k, _| value(self.smooth_reading(k)));
+            return Column::from_places(&self.record.places, |k, _| value(self.smooth_reading(k)));
         }
         let values: Vec<f64> = self.smooth.iter().map(|reading| value(*reading)).collect();
-        Column::from_places(&self.places, |_, place| values[place.cell])
+        Column::from_places(&self.record.places, |_, place| values[place.cell])
     }
 
     /// A function that is the same for all readings of a cell in one direction, for every reading.
     pub(super) fn of_cell(&self, value: impl Fn(usize, &Place) -> f64) -> Column {
         let slot = |place: &Place| 2 * place.cell + usize::from(place.direction < 0.0);
         let mut values = vec![None; 2 * self.smooth.len()];
-        for (k, place) in self.places.iter().enumerate() {
+        for (k, place) in self.record.places.iter().enumerate() {
             values[slot(place)].get_or_insert_with(|| value(k, place));
         }
-        Column::from_places(&self.places, |_, place| values[slot(place)].unwrap_or(0.0))
+        Column::from_places(&self.record.places, |_, place| {
+            values[slot(place)].unwrap_or(0.0)
+        })
     }
 
     fn smooth_at(&self, channel: Channel, k: usize) -> f64 {
@@ -345,7 +343,7 @@ impl FirstOrder {
 
     /// Change of the smooth value of a reading when the slide stands `shift` mm further, per mm.
     pub fn reading_chord(&self, reading: usize, shift: f64) -> f64 {
-        let place = &self.places[reading];
+        let place = &self.record.places[reading];
         let shift = self.chord_length(shift);
         let (channel, k) = (self.channel(place), self.at(place));
         let moved = self.m.at(&self.positions, place.x + shift) - self.m.values[k];
@@ -357,7 +355,7 @@ impl FirstOrder {
     /// Change of a reading when the probed point moves `shift` mm along the artefact, per mm.
     pub fn probed_chord(&self, reading: usize, shift: f64) -> f64 {
         let shift = self.chord_length(shift);
-        self.side_chord(&self.places[reading], shift) + self.beneath_chord(reading, shift)
+        self.side_chord(&self.record.places[reading], shift) + self.beneath_chord(reading, shift)
     }
 
     /// A slope is a chord too short to matter.
@@ -372,7 +370,7 @@ impl FirstOrder {
             return 0.0;
         };
         let n = self.positions.len();
-        let k = self.at(&self.places[reading]);
+        let k = self.at(&self.record.places[reading]);
         let start = reading - k;
         let x = self.positions[k] + shift;
         let nearest = self.positions.partition_point(|p| *p < x);
@@ -430,7 +428,7 @@ impl FirstOrder {
 
     fn find_span(&self) -> f64 {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for place in &self.places {
+        for place in self.record.places.iter() {
             let value = self.smooth[place.cell] - self.mid_reading(place);
             low = low.min(value);
             high = high.max(value);

@@ -386,6 +386,11 @@ pub trait FittedModel: Clone + Send + Sync {
         "mm"
     }
 
+    /// Unit of the times: numbers of readings where none are known.
+    fn time_unit(&self) -> &'static str {
+        "s"
+    }
+
     /// The readings with their circumstances.
     fn record(&self) -> &Record;
 

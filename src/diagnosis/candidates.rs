@@ -60,7 +60,8 @@ pub(super) fn candidates<M: FittedModel>(
             t,
             Candidate {
                 effect: description.name().to_owned(),
-                explained: ((t - unknowns as f64) / excess).clamp(0.0, 1.0),
+                // No negative zero.
+                explained: ((t - unknowns as f64) / excess).clamp(0.0, 1.0) + 0.0,
                 p_value: bench.p_value(first, effect),
                 evidence: 0.5 * (t - unknowns as f64 * readings_count.ln()),
                 visible: bench.dictionary.families[family].visible,

@@ -10,6 +10,7 @@ use nalgebra::DVector;
 use super::bench::{Bench, Cause, Remainder, adequate, raw_signatures};
 use super::noise::{NoiseLaw, NoiseSource};
 use super::quantify::held_out_square;
+use super::sizes::Sizes;
 use super::space::{Space, orthonormal};
 
 /// A further cause must stand out beside the others at this level.
@@ -74,11 +75,26 @@ pub(super) fn confidence_set<M: FittedModel>(
             })
             && predicts(bench, readings, &best);
     Answer {
-        complete: needed && adequate(&best, &remainder),
+        complete: needed && adequate(&best, &remainder) && sized(bench, readings, &best),
         causes: best,
         groups,
         remainder,
     }
+}
+
+/// Whether the size of every cause is known to better than itself: one that may as well be nothing
+/// stands for something that it only imitates.
+fn sized<M: FittedModel>(bench: &Bench<'_, M>, readings: &DVector<f64>, causes: &[Cause]) -> bool {
+    let Some(sizes) = Sizes::fitted(bench, readings, causes) else {
+        return false;
+    };
+    (0..causes.len()).all(|k| {
+        let amplitudes = bench.catalogue[causes[k].effect].amplitudes().len();
+        let own = sizes.of(bench, causes, k);
+        own.iter()
+            .take(amplitudes)
+            .any(|estimate| estimate.value.abs() > estimate.std)
+    })
 }
 
 /// Whether each of several causes, beside the others, changes the readings by more than may be left

@@ -17,11 +17,15 @@ use super::dictionary::{Dictionary, Meaning, Places, statistic};
 use super::noise::NoiseLaw;
 use super::null::NullLaw;
 use super::space::Space;
+use super::verdict::INVISIBLE;
 
 /// Normal quantile of 80 % power.
 const POWER: f64 = 0.8416;
 /// Normal quantile of 99 %.
 const TELL: f64 = 2.3263;
+/// A plan promises nothing of an effect of which less than this part is visible: the model of the
+/// plan is not that exact.
+const PLANNED: f64 = 0.01;
 
 /// What a plan shows of one effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -103,7 +107,7 @@ pub fn certificate<M: FittedModel>(
             harm_per_visible: Vec::new(),
         };
         let entries = &dictionary.entries[dictionary.families[family].entries.clone()];
-        if visible >= 0.01 && !entries.is_empty() {
+        if visible >= PLANNED && !entries.is_empty() {
             // The middle of the grid stands for the family.
             let entry = &entries[entries.len() / 2];
             let (projected, _) = space.forward_columns(&dictionary.columns(entry));
@@ -119,7 +123,7 @@ pub fn certificate<M: FittedModel>(
                 let Some(rival) = dictionary
                     .families
                     .iter()
-                    .find(|f| f.is_effect && f.name == other.name())
+                    .find(|f| f.is_effect && f.name == other.name() && f.visible >= INVISIBLE)
                 else {
                     continue;
                 };

@@ -6,11 +6,8 @@ use super::Options;
 use super::bench::Bench;
 use super::geometry::greatest_plausible;
 use super::quantify::weighted_std;
-use super::verdict::{Harm, Hidden};
+use super::verdict::{Harm, Hidden, INVISIBLE};
 
-/// Effects of which less than this part is visible are called undetectable; so are those that would
-/// show only at a size that is not plausible.
-const UNDETECTABLE: f64 = 1e-4;
 /// Normal quantile of 80 % power.
 const POWER: f64 = 0.8416;
 
@@ -43,7 +40,7 @@ pub(super) fn hidden<M: FittedModel>(
         let gram = entries.iter().map(|e| e.gram[(0, 0)]).fold(0.0, f64::max);
         let threshold = bench.null.threshold(family, level);
         let most = greatest_plausible(description.as_ref());
-        let detectable = (visible >= UNDETECTABLE && gram > 0.0)
+        let detectable = (visible >= INVISIBLE && gram > 0.0)
             .then(|| (threshold.sqrt() + POWER) / gram.sqrt())
             .filter(|size| *size <= most);
         let shape = description.grid(bench.model).into_iter().next();

@@ -32,6 +32,7 @@ mod space;
 mod spikes;
 mod splitting;
 mod statement;
+mod steps;
 mod tabulated;
 mod verdict;
 mod whitening;
@@ -103,7 +104,7 @@ pub fn diagnose_with<M: FittedModel>(
     } else {
         (model, readings)
     };
-    let law = noise_of(model, &readings).with_tails(calm.tails);
+    let law = NoiseLaw::estimate(model, &readings).with_tails(calm.tails);
     let bench = Bench::new(model, &catalogue, law, options.draws, options.seed);
     examined(&bench, &readings, options.false_alarm, |examined| {
         report::compose(&examined, &calm, options)
@@ -158,7 +159,7 @@ fn examined<M: FittedModel, R>(
         .model
         .refit(bench.model.observed() - &change)
         .linearised();
-    let law = noise_of(&state, &clean);
+    let law = NoiseLaw::estimate(&state, &clean);
     let bench = bench.moved(&state, law);
     let readings = clean + change;
     let first = bench.remainder(&readings, &[]);
@@ -170,10 +171,4 @@ fn examined<M: FittedModel, R>(
         detected,
         found,
     })
-}
-
-fn noise_of<M: FittedModel>(model: &M, readings: &DVector<f64>) -> NoiseLaw {
-    let unit = NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated);
-    let residual = space::Space::new(model, &unit).forward_vector(readings);
-    NoiseLaw::estimate(model, readings, &residual)
 }

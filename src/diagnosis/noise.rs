@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use errsep_models::model::FittedModel;
 use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal, StudentT};
 
@@ -17,9 +18,17 @@ use super::contrasts::Contrasts;
 use super::posterior::possible_laws;
 use super::space::Space;
 use super::spikes::{Spikes, Tails};
+use super::steps::levelled;
 
 /// Seed of the laws drawn from the repeats: an estimate must not depend on the user's seed.
 const SEED: u64 = 0x6c61_7773;
+
+/// Contrasts of repeats from which noise can be estimated.
+const FEWEST: usize = 8;
+/// Draws behind what neighbours tell of the noise.
+const NEIGHBOUR_DRAWS: usize = 64;
+/// Noise below this part of half the digits of a number is rounding.
+const SMALLEST: f64 = 1e-4;
 
 /// How far the noise is known from the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -237,36 +246,66 @@ impl NoiseLaw {
         })
     }
 
-    /// The law that the repeats of a model's readings follow, or what stands in for it.
-    pub fn estimate<M: FittedModel>(
-        model: &M,
-        readings: &DVector<f64>,
-        residual: &DVector<f64>,
-    ) -> Self {
-        let contrasts = Contrasts::new(model.places(), model.traces(), readings);
-        if contrasts.count() >= 8 {
-            if model.correlated_noise() {
-                let laws = possible_laws(&contrasts, SEED);
-                if !laws.is_empty() {
-                    return Self::mean_of(laws);
-                }
+    /// The law that is stated, or that the repeats of a model's readings follow, or what stands in
+    /// for it.
+    pub fn estimate<M: FittedModel>(model: &M, readings: &DVector<f64>) -> Self {
+        if let Some(sigma) = model.stated_noise() {
+            return Self::white(sigma, f64::INFINITY, NoiseSource::Stated);
+        }
+        let floor = f64::EPSILON.sqrt() * SMALLEST * model.observed().amax();
+        let floor = floor.max(f64::MIN_POSITIVE.sqrt());
+        let level = levelled(model, readings);
+        let contrasts = Contrasts::new(model.places(), model.traces(), &level);
+        if contrasts.count() < FEWEST {
+            return neighbours(model, readings, floor);
+        }
+        let (variance, freedom) = contrasts.scatter();
+        if variance > floor * floor && model.correlated_noise() {
+            let laws = possible_laws(&contrasts, SEED);
+            if !laws.is_empty() {
+                return Self::mean_of(laws);
             }
-            let (variance, freedom) = contrasts.scatter();
-            let sigma = variance.sqrt().max(f64::MIN_POSITIVE.sqrt());
-            return Self::white(sigma, freedom, NoiseSource::Repeats);
         }
-        match model.stated_noise() {
-            Some(sigma) => Self::white(sigma, f64::INFINITY, NoiseSource::Stated),
-            None => neighbours(model.traces(), residual),
-        }
+        Self::white(variance.sqrt().max(floor), freedom, NoiseSource::Repeats)
     }
 }
 
-/// White noise from second differences of the residuals, (e₋ − 2e₀ + e₊)/√6, by their median.
-fn neighbours(traces: &[Range<usize>], residual: &DVector<f64>) -> NoiseLaw {
-    let (sigma, freedom) = second_differences(traces, residual);
-    let sigma = sigma.max(f64::MIN_POSITIVE.sqrt());
-    NoiseLaw::white(sigma, freedom, NoiseSource::Neighbours)
+/// What the repeats say of a single reading's noise where it is stated: standard deviation and
+/// degrees of freedom.
+pub(super) fn of_repeats<M: FittedModel>(model: &M, readings: &DVector<f64>) -> Option<(f64, f64)> {
+    let contrasts = Contrasts::new(model.places(), model.traces(), readings);
+    (contrasts.count() >= FEWEST).then(|| {
+        let (variance, freedom) = contrasts.scatter();
+        (variance.sqrt(), freedom)
+    })
+}
+
+/// White noise from second differences of the residuals, (e₋ − 2e₀ + e₊)/√6, by their median. What
+/// the fit leaves of white noise in them, and how well they tell it, is drawn.
+fn neighbours<M: FittedModel>(model: &M, readings: &DVector<f64>, floor: f64) -> NoiseLaw {
+    let space = Space::new(
+        model,
+        &NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated),
+    );
+    let seen =
+        |values: &DVector<f64>| second_differences(model.traces(), &space.forward_vector(values)).0;
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let squares: Vec<f64> = (0..NEIGHBOUR_DRAWS)
+        .map(|_| {
+            let noise = (0..readings.len()).map(|_| StandardNormal.sample(&mut random));
+            seen(&DVector::from_iterator(readings.len(), noise)).powi(2)
+        })
+        .collect();
+    let count = squares.len() as f64;
+    let kept = squares.iter().sum::<f64>() / count;
+    let variance = squares.iter().map(|s| (s - kept).powi(2)).sum::<f64>() / (count - 1.0);
+    let freedom = 2.0 * kept * kept / variance.max(f64::MIN_POSITIVE);
+    let sigma = if kept > 0.0 {
+        seen(readings) / kept.sqrt()
+    } else {
+        0.0
+    };
+    NoiseLaw::white(sigma.max(floor), freedom.max(1.0), NoiseSource::Neighbours)
 }
 
 /// Standard deviation of the residuals as neighbours tell it, and its degrees of freedom.

@@ -85,9 +85,9 @@ pub(super) fn place_of<M: FittedModel>(
     let reach = 1.96 * 2.0 * t.sqrt() / excess;
     let share = (t / excess).clamp(0.0, 1.0);
     let interval = [(share - reach).max(0.0), (share + reach).min(1.0)];
-    let mut place = Where::new(item, share, interval, p_value);
+    let mut place = Where::new(bench.model, item, share, interval, p_value);
     if likely.length() > EVERYWHERE * tried.length() {
-        (place.from, place.to) = (None, None);
+        (place.from, place.to, place.unit) = (None, None, None);
     }
     // A wavelength that is not known is no place.
     (item.axis != "wavelength" || place.from.is_some()).then_some(place)
@@ -143,6 +143,7 @@ pub(super) fn channel_shares<M: FittedModel>(
                 value: name,
                 from: None,
                 to: None,
+                unit: None,
                 share,
                 share_ci95: [(share - reach).max(0.0), (share + reach).min(1.0)],
                 p_value: p,

@@ -19,7 +19,7 @@ use super::bench::Bench;
 use super::noise::{NoiseLaw, NoiseSource};
 use super::space::Space;
 use super::spikes::Spikes;
-use super::{Examined, Options, examined, noise_of};
+use super::{Examined, Options, examined};
 
 /// Effects of which less than this part is visible are not put in.
 const SHOWN: f64 = 0.01;
@@ -59,7 +59,7 @@ pub fn prove<M: FittedModel>(
     let bench = Bench::new(
         model,
         catalogue,
-        noise_of(model, &readings).with_tails(tails),
+        NoiseLaw::estimate(model, &readings).with_tails(tails),
         options.draws,
         options.seed,
     );
@@ -202,7 +202,7 @@ fn answer<M: FittedModel>(
     let shift = bench.model.observed() - bench.model.linearised();
     let model = bench.model.refit(sealed + shift);
     let readings = model.linearised();
-    let law = noise_of(&model, &readings);
+    let law = NoiseLaw::estimate(&model, &readings);
     let bench = bench.moved(&model, law);
     examined(&bench, &readings, options.false_alarm, |examined| {
         said(&examined, options)

@@ -2,11 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{FittedModel, Profile};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::bench::{Bench, Cause, raw_signatures};
 use super::noise::{NoiseLaw, NoiseSource};
 use super::space::Space;
 use super::verdict::{Bias, HeldOut, Size};
@@ -99,7 +100,8 @@ impl GapMeter {
             }
             count += 1.0;
         }
-        if count == 0.0 {
+        // What happened once is not there to be predicted.
+        if before <= 0.0 {
             return None;
         }
         let gap = |sum: f64| (sum / count).max(0.0).sqrt();
@@ -347,14 +349,28 @@ fn draws<M: FittedModel>(model: &M, law: &NoiseLaw, seed: u64) -> DMatrix<f64> {
 /// A profile by name, before and after.
 type MovedProfile = (String, Vec<f64>, Vec<f64>);
 
-/// How the quantities move when `change` is taken out of readings, and the profiles with them.
+/// How the quantities move when causes of some amplitudes, with their covariance, are taken out of
+/// readings, and the profiles with them.
 pub(super) fn biases<M: FittedModel>(
-    model: &M,
-    law: &NoiseLaw,
+    bench: &Bench<'_, M>,
     observed: &DVector<f64>,
-    change: &DVector<f64>,
+    causes: &[Cause],
+    fit: Option<&(DVector<f64>, DMatrix<f64>)>,
 ) -> (Vec<Bias>, Vec<MovedProfile>) {
-    let corrected = observed - change;
+    let (model, law) = (bench.model, &bench.law);
+    let nothing = (DVector::zeros(0), DMatrix::zeros(0, 0));
+    let (amplitudes, covariance) = fit.unwrap_or(&nothing);
+    // The part of each amplitude, and how far it is in doubt.
+    let mut parts = raw_signatures(bench, causes);
+    for (mut part, amplitude) in parts.column_iter_mut().zip(amplitudes.iter()) {
+        part *= *amplitude;
+    }
+    let relative = covariance.map_with_location(|i, j, v| {
+        let product = amplitudes[i] * amplitudes[j];
+        if product == 0.0 { 0.0 } else { v / product }
+    });
+    let std_of = |gradient: DVector<f64>| gradient.dot(&(&relative * &gradient)).max(0.0).sqrt();
+    let corrected = observed - parts.column_sum();
     let mut profiles = Vec::new();
     let mut biases: Vec<Bias> = model
         .quantities()
@@ -368,25 +384,43 @@ pub(super) fn biases<M: FittedModel>(
                 after,
                 moved: after - before,
                 std: weighted_std(model, law, &quantity.weights),
+                moved_std: std_of(parts.tr_mul(&quantity.weights)),
                 unit: quantity.unit.to_owned(),
             }
         })
         .collect();
     let rms = |v: &DVector<f64>| v.norm() / (v.len().max(1) as f64).sqrt();
-    let before = model.refit(observed.clone()).profiles();
-    let after = model.refit(corrected).profiles();
-    for (b, a) in before.into_iter().zip(after) {
+    let profiles_of = |readings: DVector<f64>| model.refit(readings).profiles();
+    let before = profiles_of(observed.clone());
+    let after = profiles_of(corrected);
+    let without: Vec<Vec<Profile>> = parts
+        .column_iter()
+        .map(|part| profiles_of(observed - part))
+        .collect();
+    for (k, (b, a)) in before.into_iter().zip(after).enumerate() {
         profiles.push((
             b.name.clone(),
             b.values.as_slice().to_vec(),
             a.values.as_slice().to_vec(),
         ));
+        let moved = &a.values - &b.values;
+        // The derivative of a norm is the product with its direction.
+        let direction = &moved / (moved.norm() * (moved.len().max(1) as f64).sqrt());
+        let gradient = without
+            .iter()
+            .map(|own| direction.dot(&(&own[k].values - &b.values)));
+        let gradient = DVector::from_iterator(without.len(), gradient);
         biases.push(Bias {
             quantity: b.name,
             before: rms(&b.values),
             after: rms(&a.values),
-            moved: rms(&(a.values - &b.values)),
+            moved: rms(&moved),
             std: b.noise_gain * law.sigma(),
+            moved_std: if moved.norm() > 0.0 {
+                std_of(gradient)
+            } else {
+                0.0
+            },
             unit: b.unit.to_owned(),
         });
     }

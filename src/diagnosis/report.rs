@@ -6,16 +6,19 @@ use nalgebra::DVector;
 use super::bench::{Bench, Cause, raw_signatures};
 use super::candidates::candidates;
 use super::hidden::hidden;
-use super::noise::{NoiseSource, neighbour_scatter};
+use super::noise::{NoiseSource, neighbour_scatter, of_repeats};
 use super::places::places;
 use super::quantify::{GapMeter, biases, shrink};
 use super::shape::fingerprint;
 use super::spikes::Calmed;
 use super::splitting::splits;
-use super::statement::{separating, statement};
+use super::statement::{for_people, separating, statement};
 use super::verdict::{Detail, Diagnosis, Gap, Kind, NoiseOut, Verdict};
 use super::{Examined, Options};
 use crate::report::number::plain;
+
+/// Part of the predicted shrinking that a named cause must reach.
+const PROMISE: f64 = 0.5;
 
 pub(super) fn compose<M: FittedModel>(
     examined: &Examined<'_, M>,
@@ -30,14 +33,8 @@ pub(super) fn compose<M: FittedModel>(
         ref found,
     } = *examined;
     let alarmed = detected <= options.false_alarm;
-    let complete = alarmed && found.as_ref().is_some_and(|a| a.complete);
-    let kind = match (alarmed, complete) {
-        (false, _) => Kind::None,
-        (true, true) => Kind::Effect,
-        (true, false) => Kind::Unknown,
-    };
-    let causes: &[Cause] = match (found, kind) {
-        (Some(answer), Kind::Effect | Kind::Unknown) => &answer.causes,
+    let causes: &[Cause] = match found {
+        Some(answer) if alarmed => &answer.causes,
         _ => &[],
     };
     let fit = bench.amplitudes(readings, causes);
@@ -53,21 +50,38 @@ pub(super) fn compose<M: FittedModel>(
     let before = meter.size(readings, 0);
     let after = meter.size(&(readings - &change), unknowns);
     let signatures = raw_signatures(bench, causes);
-    let excess = (first.residual.norm_squared() - bench.space.degrees_of_freedom() as f64)
-        .max(f64::MIN_POSITIVE);
+    let square = first.residual.norm_squared() - bench.space.degrees_of_freedom() as f64;
+    let excess = square.max(f64::MIN_POSITIVE);
     let explained =
         first.residual.norm_squared() - bench.remainder(readings, causes).residual.norm_squared();
+    let predicted_shrink = if before.rms > 0.0 {
+        1.0 - (1.0 - explained / excess).max(0.0).sqrt()
+    } else {
+        0.0
+    };
+    let shrunk = shrink(before.rms, after.rms);
+    // A gap that stands clear and does not shrink as its score promised has another cause.
+    let kept_promise = before.ci95[0] == 0.0 || shrunk > PROMISE * predicted_shrink;
+    let kind = match found {
+        _ if !alarmed => Kind::None,
+        Some(answer) if answer.complete && kept_promise => Kind::Effect,
+        _ => Kind::Unknown,
+    };
     let gap = Gap {
         unit: bench.model.reading_unit(),
         noise: bench.law.sigma(),
         before,
         after,
-        shrink: shrink(before.rms, after.rms),
-        predicted_shrink: 1.0 - (1.0 - explained / excess).max(0.0).sqrt(),
+        shrink: shrunk,
+        predicted_shrink,
         held_out: meter.held_out(bench.model, readings, &signatures),
     };
     // Without a gap there is nothing to explain.
-    let whole = if alarmed { excess } else { f64::INFINITY };
+    let whole = if alarmed && square > 0.0 {
+        excess
+    } else {
+        f64::INFINITY
+    };
     let candidates = candidates(bench, readings, first, whole, found.as_ref(), causes);
     let names = |effects: &[usize]| -> Vec<String> {
         effects
@@ -116,7 +130,7 @@ pub(super) fn compose<M: FittedModel>(
     verdict.separate = separating(&verdict.indistinguishable, &candidates, &splits);
     let hidden = hidden(bench, &verdict.effects, options);
     verdict.statement = statement(&verdict, &gap, &places, &candidates, &hidden);
-    let (bias, profiles) = biases(bench.model, &bench.law, readings, &change);
+    let (bias, profiles) = biases(bench, readings, causes, fit.as_ref());
     Diagnosis {
         schema: "errsep.diagnosis/1",
         model: bench.model.name(),
@@ -159,9 +173,28 @@ fn notes<M: FittedModel>(bench: &Bench<'_, M>, clean: &DVector<f64>, calm: &Calm
                 .to_owned(),
         );
     } else if bench.law.source == NoiseSource::Stated {
-        notes.push("The noise is not measured but stated in the set-up.".to_owned());
+        notes.push(stated(bench, clean));
     }
     notes
+}
+
+/// What the repeats say of a noise that is stated.
+fn stated<M: FittedModel>(bench: &Bench<'_, M>, clean: &DVector<f64>) -> String {
+    let told = "The noise is not measured but stated in the set-up.";
+    let Some((seen, freedom)) = of_repeats(bench.model, clean) else {
+        return told.to_owned();
+    };
+    let ratio = seen / bench.law.sigma();
+    // Three standard deviations of a standard deviation, and by a part that matters.
+    let reach = 0.15 + 3.0 * (0.5 / freedom).sqrt();
+    if (ratio - 1.0).abs() < reach {
+        return told.to_owned();
+    }
+    format!(
+        "{told} The repeats differ by {} {} instead: leave `noise` out of the set-up if they are to be believed.",
+        plain(seen, 2),
+        for_people(bench.model.reading_unit())
+    )
 }
 
 /// What it means when neighbouring readings scatter otherwise than repeats do.

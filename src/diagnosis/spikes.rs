@@ -22,8 +22,10 @@ const EDGE: f64 = 4.0;
 const HEAVY: f64 = 0.01;
 /// Repeats without which a spike cannot be told from a form.
 const REPEATS: usize = 3;
-/// A spike has no neighbours: it keeps this part of its height over the nearer ones.
+/// A spike has no neighbours: over those of either side alone it keeps this part of its height.
 const ALONE: f64 = 0.6;
+/// Neighbours on one side.
+const SIDE: usize = 7;
 /// Degrees of freedom among which the tails are sought.
 const FREEDOMS: [f64; 10] = [2.1, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0];
 /// Seed of the noise with which tails are compared.
@@ -43,9 +45,28 @@ pub(super) struct Spikes {
     groups: Vec<Group>,
 }
 
-struct Group {
-    starts: Vec<usize>,
-    length: usize,
+pub(super) struct Group {
+    pub starts: Vec<usize>,
+    pub length: usize,
+}
+
+/// Traces on the same cells in the same direction.
+pub(super) fn groups<M: FittedModel>(model: &M) -> impl Iterator<Item = Group> {
+    let mut groups: BTreeMap<(Vec<usize>, bool), Group> = BTreeMap::new();
+    for trace in model.traces() {
+        let places = &model.places()[trace.clone()];
+        let cells = places.iter().map(|p| p.cell).collect();
+        let backward = places.first().is_some_and(|p| p.direction < 0.0);
+        groups
+            .entry((cells, backward))
+            .or_insert_with(|| Group {
+                starts: Vec::new(),
+                length: trace.len(),
+            })
+            .starts
+            .push(trace.start);
+    }
+    groups.into_values()
 }
 
 /// Readings with single spikes pulled in.
@@ -66,26 +87,11 @@ struct Weight {
 
 impl Spikes {
     pub fn new<M: FittedModel>(model: &M) -> Self {
-        let mut groups: BTreeMap<(Vec<usize>, bool), Group> = BTreeMap::new();
         if model.names_single_readings() {
             return Self { groups: Vec::new() };
         }
-        for trace in model.traces() {
-            let places = &model.places()[trace.clone()];
-            let cells = places.iter().map(|p| p.cell).collect();
-            let backward = places.first().is_some_and(|p| p.direction < 0.0);
-            groups
-                .entry((cells, backward))
-                .or_insert_with(|| Group {
-                    starts: Vec::new(),
-                    length: trace.len(),
-                })
-                .starts
-                .push(trace.start);
-        }
         Self {
-            groups: groups
-                .into_values()
+            groups: groups(model)
                 .filter(|g| g.starts.len() >= REPEATS)
                 .collect(),
         }
@@ -132,18 +138,22 @@ impl Spikes {
     }
 
     fn weight(&self, readings: &DVector<f64>) -> Option<Weight> {
-        let mut sizes: Vec<f64> = Vec::new();
+        let mut heights: Vec<(f64, bool)> = Vec::new();
         for group in &self.groups {
-            for (_, near) in group.heights(readings) {
-                sizes.extend(near.iter().map(|h| h.abs()));
+            for (away, near) in group.heights(readings) {
+                let own = near.iter().enumerate();
+                heights.extend(own.map(|(k, h)| (h.abs(), alone(&away, k, *h))));
             }
         }
-        if sizes.is_empty() {
+        if heights.is_empty() {
             return None;
         }
-        sizes.sort_by(f64::total_cmp);
+        heights.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let middle = heights[heights.len() / 2].0;
+        // Steps and bumps are no tails.
+        let usual = |(size, alone): &(f64, bool)| *alone || *size <= 3.0 * SIGMA * middle;
+        let sizes: Vec<f64> = heights.into_iter().filter(usual).map(|h| h.0).collect();
         let n = sizes.len();
-        let middle = sizes[n / 2];
         let far = sizes.partition_point(|s| *s <= 3.0 * SIGMA * middle);
         Some(Weight {
             beyond: (n - far) as f64 / n as f64,
@@ -154,8 +164,8 @@ impl Spikes {
     /// Pulls single spikes in, and counts them.
     ///
     /// The deviation of a reading from the median of its other repeats holds no form; less the
-    /// median of its four neighbours it holds no step, no drift and nothing wider than a reading or
-    /// two; a bump, of which the nearer neighbours have their part, is not alone.
+    /// median of its four neighbours it holds no drift and nothing wider than a reading or two. Beside
+    /// a step it stands out of one side only, and in a bump the nearer neighbours have their part.
     pub fn pull_in(&self, readings: &mut DVector<f64>) -> usize {
         let mut found: Vec<(&Group, usize, Vec<f64>, Vec<f64>)> = Vec::new();
         let mut sizes: Vec<f64> = Vec::new();
@@ -175,8 +185,10 @@ impl Spikes {
         for (group, own, away, near) in found {
             for (k, height) in near.iter().enumerate() {
                 let spike = || {
-                    let far = away[k] - around(&away, k, 7);
-                    height.abs() > ALONE * far.abs() && group.farthest(readings, own, k)
+                    let far = away[k] - around(&away, k, SIDE);
+                    height.abs() > ALONE * far.abs()
+                        && alone(&away, k, *height)
+                        && group.farthest(readings, own, k)
                 };
                 if height.abs() > edge && spike() {
                     pulled.push((group.starts[own] + k, height - edge.copysign(*height)));
@@ -191,22 +203,31 @@ impl Spikes {
 }
 
 /// The standard deviation of normal numbers over the median of their absolute values.
-const SIGMA: f64 = 1.4826;
+pub(super) const SIGMA: f64 = 1.4826;
 
 impl Group {
-    /// For each trace the deviations from the other repeats, and their heights over the neighbours.
-    fn heights(&self, readings: &DVector<f64>) -> Vec<(Vec<f64>, Vec<f64>)> {
+    /// For each trace the deviations from the median of the other repeats.
+    pub fn away(&self, readings: &DVector<f64>) -> Vec<Vec<f64>> {
         let mut others = Vec::with_capacity(self.starts.len());
         (0..self.starts.len())
             .map(|own| {
-                let away: Vec<f64> = (0..self.length)
+                (0..self.length)
                     .map(|k| {
                         others.clear();
                         let rest = self.starts.iter().enumerate().filter(|(j, _)| *j != own);
                         others.extend(rest.map(|(_, start)| readings[start + k]));
                         readings[self.starts[own] + k] - median(&mut others)
                     })
-                    .collect();
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// The same, and their heights over the neighbours.
+    fn heights(&self, readings: &DVector<f64>) -> Vec<(Vec<f64>, Vec<f64>)> {
+        self.away(readings)
+            .into_iter()
+            .map(|away| {
                 let near = (0..self.length)
                     .map(|k| away[k] - around(&away, k, 2))
                     .collect();
@@ -224,10 +245,25 @@ impl Group {
     }
 }
 
+/// Whether a value stands out of its neighbours on either side by a part of its height.
+fn alone(values: &[f64], k: usize, height: f64) -> bool {
+    let before = &values[k.saturating_sub(SIDE)..k];
+    let after = &values[k + 1..(k + 1 + SIDE).min(values.len())];
+    let stands_out = |side: &[f64]| {
+        let mut sorted = [0.0; SIDE];
+        let sorted = &mut sorted[..side.len()];
+        sorted.copy_from_slice(side);
+        (values[k] - median(sorted)) * height.signum() > ALONE * height.abs()
+    };
+    [before, after]
+        .into_iter()
+        .all(|side| side.is_empty() || stands_out(side))
+}
+
 /// The median of the neighbours up to a distance on either side.
 fn around(values: &[f64], k: usize, reach: usize) -> f64 {
     let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(values.len()));
-    let mut others = [0.0; 14];
+    let mut others = [0.0; 2 * SIDE];
     let left = k - from;
     let count = left + to - k - 1;
     others[..left].copy_from_slice(&values[from..k]);
@@ -235,7 +271,7 @@ fn around(values: &[f64], k: usize, reach: usize) -> f64 {
     median(&mut others[..count])
 }
 
-fn median(values: &mut [f64]) -> f64 {
+pub(super) fn median(values: &mut [f64]) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let n = values.len();
     if n == 0 {
@@ -278,6 +314,28 @@ mod tests {
             assert_eq!(calmed.tails, None);
             // 3200 normal readings hold 0.2 beyond four standard deviations.
             assert!(calmed.count < 5, "{}", calmed.count);
+        }
+    }
+
+    /// A step is no spike, of whatever size, and makes no tails.
+    #[test]
+    fn a_step_is_left() {
+        let model = model();
+        let spikes = Spikes::new(&model);
+        let mut random = ChaCha8Rng::seed_from_u64(6);
+        let n = model.observed().len();
+        let noise = DVector::from_fn(n, |_, _| StandardNormal.sample(&mut random));
+        for height in [3.0, 10.0, 30.0, 1000.0] {
+            let mut stepped = noise.clone();
+            for k in 40..100 {
+                stepped[k] += height;
+            }
+            let calmed = spikes.calmed(&model, &stepped);
+            assert!(
+                (0..100).all(|k| calmed.readings[k] == stepped[k]),
+                "{height}"
+            );
+            assert_eq!(calmed.tails, None, "{height}");
         }
     }
 

@@ -13,28 +13,32 @@ pub(super) fn statement(
     hidden: &[Hidden],
 ) -> String {
     let unit = for_people(gap.unit);
-    let undetectable: Vec<&str> = hidden
-        .iter()
-        .filter(|h| h.detectable.is_none())
-        .map(|h| h.effect.as_str())
-        .collect();
+    let unseen = |implausible: bool| -> Vec<&str> {
+        hidden
+            .iter()
+            .filter(|h| h.detectable.is_none() && h.implausible() == implausible)
+            .map(|h| h.effect.as_str())
+            .collect()
+    };
     let place = places.first().map_or(String::new(), |p| {
-        let range = match (p.from, p.to) {
-            (Some(from), Some(to)) => format!(" from {} to {}", plain(from, 4), plain(to, 4)),
-            _ => String::new(),
-        };
+        let range = p
+            .range()
+            .map_or(String::new(), |range| format!(" from {range}"));
         format!(", most of it in {} {}{range}", p.axis, p.value)
     });
     match verdict.kind {
         Kind::None => {
-            let blind = if undetectable.is_empty() {
-                String::new()
-            } else {
-                format!(
-                    "; {} would not show in such readings whatever their size",
-                    undetectable.join(", ")
-                )
+            let said = |names: Vec<&str>, what: &str| {
+                if names.is_empty() {
+                    String::new()
+                } else {
+                    format!("; {} would {what}", names.join(", "))
+                }
             };
+            let blind = said(
+                unseen(false),
+                "not show in such readings whatever their size",
+            ) + &said(unseen(true), "show only at sizes that are not plausible");
             format!(
                 "The model misses nothing that stands out of the noise of {} {unit}{blind}.",
                 plain(gap.noise, 3)
@@ -86,12 +90,19 @@ pub(super) fn statement(
                     verdict.separate.join("; ")
                 )
             };
-            format!(
-                "The model misses {} {unit} RMS because of {}; with it {} {unit} remain. {doubt}",
-                plain(gap.before.rms, 3),
-                named.join(" and "),
-                plain(gap.after.rms, 3)
-            )
+            let named = named.join(" and ");
+            if gap.before.rms > 0.0 {
+                format!(
+                    "The model misses {} {unit} RMS because of {named}; with it {} {unit} remain. {doubt}",
+                    plain(gap.before.rms, 3),
+                    plain(gap.after.rms, 3)
+                )
+            } else {
+                format!(
+                    "The model misses less than {} {unit} RMS, but {named} stands out of it. {doubt}",
+                    plain(gap.before.ci95[1], 3)
+                )
+            }
         }
     }
 }

@@ -68,6 +68,9 @@ impl Tabulated {
 
     /// What is wrong with the effect for some readings, if anything.
     pub fn fault(&self, channels: &[String], places: &[Place]) -> Option<String> {
+        if self.name.trim().is_empty() {
+            return Some("an effect has no name".to_owned());
+        }
         if self.formula.is_some() != self.signature.is_empty() {
             return Some(format!(
                 "`{}` needs either a signature or a formula",
@@ -92,11 +95,23 @@ impl Tabulated {
         if self.signature.iter().flatten().any(|v| !v.is_finite()) {
             return Some(format!("`{}` has a number that is not finite", self.name));
         }
-        let unknown = self.channels.keys().find(|c| !channels.contains(c))?;
-        Some(format!(
-            "`{}` names the channel `{unknown}`, which has no readings",
-            self.name
-        ))
+        let known = |repeat: &u32| places.iter().any(|p| p.repeat == *repeat);
+        if let Some(unknown) = self.repeats.iter().find(|r| !known(r)) {
+            return Some(format!(
+                "`{}` names the repeat {unknown}, which has no readings",
+                self.name
+            ));
+        }
+        if let Some(unknown) = self.channels.keys().find(|c| !channels.contains(c)) {
+            return Some(format!(
+                "`{}` names the channel `{unknown}`, which has no readings",
+                self.name
+            ));
+        }
+        places
+            .iter()
+            .all(|place| self.at(place) == 0.0)
+            .then(|| format!("`{}` changes no reading", self.name))
     }
 }
 

@@ -1,10 +1,12 @@
 //! What the diagnosis says.
 
-use errsep_models::model::Estimate;
+use errsep_models::model::{Estimate, FittedModel};
 use serde::Serialize;
 
 use super::localise::Item;
 use super::noise::NoiseLaw;
+use super::statement::for_people;
+use crate::report::number::plain;
 
 /// The kind of verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -125,6 +127,9 @@ pub struct Where {
     /// Where it ends.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub to: Option<f64>,
+    /// Unit of both.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<&'static str>,
     /// Part of the gap that it explains.
     pub share: f64,
     /// 95 % interval of the share.
@@ -134,16 +139,36 @@ pub struct Where {
 }
 
 impl Where {
-    pub(super) fn new(item: &Item, share: f64, share_ci95: [f64; 2], p_value: f64) -> Self {
+    pub(super) fn new<M: FittedModel>(
+        model: &M,
+        item: &Item,
+        share: f64,
+        share_ci95: [f64; 2],
+        p_value: f64,
+    ) -> Self {
+        let unit = if item.axis == "time" {
+            model.time_unit()
+        } else {
+            model.position_unit()
+        };
         Self {
             axis: item.axis,
             value: item.value.clone(),
             from: item.from,
             to: item.to,
+            unit: item.from.and(item.to).map(|_| unit),
             share,
             share_ci95,
             p_value,
         }
+    }
+
+    /// From where to where, in words.
+    #[must_use]
+    pub fn range(&self) -> Option<String> {
+        let (from, to) = (plain(self.from?, 4), plain(self.to?, 4));
+        let unit = self.unit.map_or("", for_people);
+        Some(format!("{from} to {to} {unit}").trim_end().to_owned())
     }
 }
 
@@ -222,9 +247,14 @@ pub struct Bias {
     pub moved: f64,
     /// Standard uncertainty of a value.
     pub std: f64,
+    /// Standard uncertainty of the move.
+    pub moved_std: f64,
     /// Unit.
     pub unit: String,
 }
+
+/// An effect of which less than this part is visible is called undetectable.
+pub(super) const INVISIBLE: f64 = 1e-4;
 
 /// An effect that these readings show badly or not at all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -233,12 +263,21 @@ pub struct Hidden {
     pub effect: String,
     /// Part of the effect that the fit cannot absorb.
     pub visible: f64,
-    /// Smallest amplitude that would be seen with 80 % probability.
+    /// Smallest amplitude that would be seen with 80 % probability; none where that is greater than
+    /// any plausible one or where nothing shows.
     pub detectable: Option<f64>,
     /// Unit of that amplitude.
     pub unit: String,
     /// The quantity it biases most, per unit of its amplitude.
     pub harm: Option<Harm>,
+}
+
+impl Hidden {
+    /// Whether the effect would show if only it could be so great.
+    #[must_use]
+    pub fn implausible(&self) -> bool {
+        self.detectable.is_none() && self.visible >= INVISIBLE
+    }
 }
 
 /// What an unseen effect does to a quantity.

@@ -161,6 +161,10 @@ impl FittedModel for CalibrationLine {
         "x"
     }
 
+    fn time_unit(&self) -> &'static str {
+        if self.timed { "s" } else { "readings" }
+    }
+
     fn record(&self) -> &Record {
         &self.record
     }

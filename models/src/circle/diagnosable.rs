@@ -163,6 +163,10 @@ impl FittedModel for CirclePoints {
         "deg"
     }
 
+    fn time_unit(&self) -> &'static str {
+        "readings"
+    }
+
     fn record(&self) -> &Record {
         &self.record
     }

@@ -145,6 +145,10 @@ impl FittedModel for DiagonalRuns {
         "um"
     }
 
+    fn time_unit(&self) -> &'static str {
+        "readings"
+    }
+
     fn record(&self) -> &Record {
         &self.record
     }

@@ -160,6 +160,10 @@ impl FittedModel for FourSensors {
         "um"
     }
 
+    fn time_unit(&self) -> &'static str {
+        "readings"
+    }
+
     fn record(&self) -> &Record {
         &self.record
     }

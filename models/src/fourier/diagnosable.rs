@@ -165,6 +165,10 @@ impl FittedModel for FourierScans {
         "um"
     }
 
+    fn time_unit(&self) -> &'static str {
+        "readings"
+    }
+
     fn record(&self) -> &Record {
         &self.record
     }

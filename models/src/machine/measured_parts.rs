@@ -110,6 +110,10 @@ impl FittedModel for MeasuredParts {
         "um"
     }
 
+    fn time_unit(&self) -> &'static str {
+        "parts"
+    }
+
     fn record(&self) -> &Record {
         &self.record
     }

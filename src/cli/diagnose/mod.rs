@@ -86,7 +86,19 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         ))
         .remedy("give a number between 0 and 0.5, such as 0.01"));
     }
-    (recognise::model(args)?.run)(args)
+    if args.prove == Some(0) {
+        return Err(Message::bad_input("--prove 0 proves nothing")
+            .remedy("give the number of sealed effects, such as --prove 200"));
+    }
+    let model = recognise::model(args)?;
+    if args.points.is_some() && model.name != "machine" {
+        return Err(Message::bad_input(format!(
+            "--points belongs to parts, not to {}",
+            model.name
+        ))
+        .remedy("leave it out, or say --model machine"));
+    }
+    (model.run)(args)
 }
 
 /// Refuses a standard deviation in the set-up that is not positive.

@@ -104,10 +104,9 @@ impl RowNames {
 }
 
 fn place(place: &crate::diagnosis::Where) -> sheet::Place {
-    let range = match (place.from, place.to) {
-        (Some(from), Some(to)) => format!(", {} to {}", plain(from, 4), plain(to, 4)),
-        _ => String::new(),
-    };
+    let range = place
+        .range()
+        .map_or(String::new(), |range| format!(", {range}"));
     sheet::Place {
         axis: place.axis.to_owned(),
         value: format!("{}{range}", place.value),

@@ -37,13 +37,13 @@ pub(super) const MODELS: &[Model] = &[
     Model {
         name: "calibration-line",
         tables: &["line"],
-        columns: &[&["x", "y"]],
+        columns: &[&["x", "y"], &["set", "x", "y"]],
         run: calibration_line::run,
     },
     Model {
         name: "circle",
         tables: &["circle"],
-        columns: &[&["x", "y"]],
+        columns: &[&["x", "y"], &["repeat", "x", "y"]],
         run: circle::run,
     },
     Model {

@@ -1,5 +1,6 @@
 //! A spindle and slideway reversal.
 
+use errsep_models::model::FittedModel;
 use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
 
 use super::Args;
@@ -27,6 +28,14 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     let mut notes = Vec::new();
     if !model.timed {
         notes.push("No times are given: the readings are taken to follow each other evenly, first spindle position first, each repeat forward and then backward.".to_owned());
+    }
+    let channels = model.channel_names();
+    if channels.len() < 4 {
+        notes.push(format!(
+            "Of the four channels only {} {} there, so nothing closes: only what differs between repeats and directions is diagnosed, and what comes back in all of them goes unnoticed.",
+            channels.join(", "),
+            if channels.len() == 1 { "is" } else { "are" }
+        ));
     }
     if model.left_out > 0 {
         notes.push(format!(

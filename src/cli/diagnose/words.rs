@@ -45,10 +45,9 @@ pub(super) fn in_words(diagnosis: &Diagnosis) -> String {
         );
     }
     for place in &diagnosis.places {
-        let range = match (place.from, place.to) {
-            (Some(from), Some(to)) => format!(" {} to {}", plain(from, 4), plain(to, 4)),
-            _ => String::new(),
-        };
+        let range = place
+            .range()
+            .map_or(String::new(), |range| format!(" {range}"));
         let _ = writeln!(
             text,
             "  {:<48} {:>5.1} %  {}",
@@ -102,14 +101,20 @@ pub(super) fn in_words(diagnosis: &Diagnosis) -> String {
                 number(before),
                 number(after),
                 number(moved),
-                number(shown(bias.std, &bias.unit).0)
+                number(shown(bias.moved_std, &bias.unit).0)
             );
         }
     }
     let _ = writeln!(text, "\nWhat could still hide");
     for hidden in &diagnosis.hidden {
         let detectable = hidden.detectable.map_or_else(
-            || "would not show whatever its size".to_owned(),
+            || {
+                if hidden.implausible() {
+                    "would show only at sizes that are not plausible".to_owned()
+                } else {
+                    "would not show whatever its size".to_owned()
+                }
+            },
             |d| {
                 let (value, unit) = shown(d, &hidden.unit);
                 format!("would show from {} {unit}", number(value))

@@ -115,7 +115,9 @@ impl Thinned {
                  every column of pixels are kept."
             ),
             Self::Averaged { cells, given } => {
-                format!("{given} readings in {cells} cells: a cell shows the mean of its readings.")
+                format!(
+                    "{given} values in {cells} cells of the picture: a cell shows the mean of its values."
+                )
             }
         }
     }

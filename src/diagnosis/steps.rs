@@ -1,0 +1,134 @@
+//! Steps of single repeats: a zero that jumps once makes the repeats differ over half a trace. It is
+//! an effect and no noise; from the readings of which the noise is learnt it is taken out.
+
+use std::ops::Range;
+
+use errsep_models::model::FittedModel;
+use nalgebra::DVector;
+
+use super::spikes::{Group, SIGMA, groups, median};
+
+/// Standard deviations of the difference of two neighbours that make a step.
+const EDGE: f64 = 5.0;
+/// Part of the step that must last.
+const LASTS: f64 = 0.6;
+/// Readings on either side that tell its height.
+const SIDE: usize = 8;
+/// Steps of one group of repeats.
+const MOST: usize = 8;
+
+/// A part of a trace beyond a step.
+struct Lifted {
+    rows: Range<usize>,
+    height: f64,
+}
+
+/// Readings without steps of single repeats.
+pub(super) fn levelled<M: FittedModel>(model: &M, readings: &DVector<f64>) -> DVector<f64> {
+    let mut level = readings.clone();
+    for group in groups(model).filter(|g| g.starts.len() > 1) {
+        for _ in 0..MOST {
+            let Some(Lifted { rows, height }) = greatest(&group, &level) else {
+                break;
+            };
+            level
+                .rows_mut(rows.start, rows.len())
+                .add_scalar_mut(-height);
+        }
+    }
+    level
+}
+
+/// The greatest step; the side that is further from the other repeats is the lifted one.
+fn greatest(group: &Group, readings: &DVector<f64>) -> Option<Lifted> {
+    let away = group.away(readings);
+    let steps: Vec<(usize, usize, f64)> = away
+        .iter()
+        .enumerate()
+        .flat_map(|(own, a)| (1..a.len()).map(move |k| (own, k, a[k] - a[k - 1])))
+        .collect();
+    let mut sizes: Vec<f64> = steps.iter().map(|s| s.2.abs()).collect();
+    let edge = EDGE * SIGMA * median(&mut sizes);
+    let lasting = |own: usize, k: usize, step: f64| {
+        let a = &away[own];
+        let height = middle(&a[k..(k + SIDE).min(a.len())]) - middle(&a[k.saturating_sub(SIDE)..k]);
+        (height * step.signum() > LASTS * step.abs()).then_some(height)
+    };
+    let (own, k, height) = steps
+        .into_iter()
+        .filter(|(_, _, step)| step.abs() > edge)
+        .filter_map(|(own, k, step)| Some((own, k, lasting(own, k, step)?)))
+        .max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
+    let (before, after) = away[own].split_at(k);
+    let start = group.starts[own];
+    Some(if middle(before).abs() > middle(after).abs() {
+        Lifted {
+            rows: start..start + k,
+            height: -height,
+        }
+    } else {
+        Lifted {
+            rows: start + k..start + group.length,
+            height,
+        }
+    })
+}
+
+fn middle(values: &[f64]) -> f64 {
+    median(&mut values.to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+    use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    fn readings(repeats: u32, correlated: f64, seed: u64) -> FirstOrder {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let noise = SceneNoise {
+            white: 0.1,
+            correlated,
+            length: 20.0,
+            shift: correlated,
+        };
+        let scene = Scene::random(80, repeats, 1e-5, 2.0, noise, &mut random);
+        FirstOrder::new(&scene.measured(seed), Assumptions::default()).unwrap()
+    }
+
+    /// k·u: two medians of eight of differences know a step to 0.1 √(2 · 2 · π/2/8) = 0.09 µm.
+    #[test]
+    fn a_step_is_taken_out_and_nothing_else() {
+        for repeats in [2, 3, 5] {
+            for seed in 0..5 {
+                let model = readings(repeats, 0.0, seed);
+                let plain = model.observed().clone();
+                assert_eq!(levelled(&model, &plain), plain);
+                let mut stepped = plain.clone();
+                stepped.rows_mut(30, 50).add_scalar_mut(3.0);
+                let level = levelled(&model, &stepped) - &plain;
+                let left: f64 = level.rows(30, 50).mean() - level.rows(0, 30).mean();
+                // Of two repeats either may be brought to the other.
+                let others = level.rows(80, level.len() - 80).amax();
+                let off = if repeats == 2 && others > 1.0 {
+                    0.0
+                } else {
+                    left.abs()
+                };
+                assert!(off < 0.4, "{repeats} {seed}: {left}");
+            }
+        }
+    }
+
+    /// Correlated noise and shifts have no steps.
+    #[test]
+    fn noise_is_left() {
+        for seed in 0..20 {
+            let model = readings(4, 0.2, seed);
+            let plain = model.observed().clone();
+            assert_eq!(levelled(&model, &plain), plain, "{seed}");
+        }
+    }
+}

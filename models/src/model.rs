@@ -459,6 +459,12 @@ pub trait FittedModel: Clone + Send + Sync {
         false
     }
 
+    /// What the model itself expects readings to be off by beside their noise, the same in every
+    /// repeat: readings × independent causes, each column one standard deviation. It is no gap.
+    fn expected_scatter(&self) -> Option<&DMatrix<f64>> {
+        None
+    }
+
     /// Standard deviation of one reading where the user states it.
     fn stated_noise(&self) -> Option<f64> {
         None

@@ -66,7 +66,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         seed: u64,
     ) -> Self {
         let places = Arc::new(Places::new(model));
-        let space = Space::new(model, &law);
+        let space = Space::expecting(model, &law);
         let dictionary = Dictionary::new(model, catalogue, places, &space);
         let null = Arc::new(NullLaw::simulate(
             model,
@@ -93,7 +93,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
     where
         'a: 'b,
     {
-        let space = Space::new(model, &law);
+        let space = Space::expecting(model, &law);
         let places = Arc::clone(&self.dictionary.places);
         let dictionary = Dictionary::new(model, self.catalogue, places, &space);
         Bench {

@@ -61,7 +61,7 @@ pub fn certificate<M: FittedModel>(
     law: &NoiseLaw,
     options: &Options,
 ) -> Vec<Diagnosability> {
-    let space = Space::new(model, law);
+    let space = Space::expecting(model, law);
     let places = Arc::new(Places::new(model));
     let dictionary = Dictionary::new(model, catalogue, places, &space);
     let null = NullLaw::simulate(model, &dictionary, &space, law, options.draws, options.seed);

@@ -25,6 +25,7 @@ mod prove;
 mod quantify;
 mod refit;
 mod report;
+mod scatter;
 mod search;
 mod shape;
 mod sizes;

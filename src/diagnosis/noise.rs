@@ -270,6 +270,17 @@ impl NoiseLaw {
     }
 }
 
+/// A draw of the scatter that the model expects beside the noise.
+pub(super) fn expected_scatter<M: FittedModel>(model: &M, random: &mut ChaCha8Rng) -> DVector<f64> {
+    match model.expected_scatter() {
+        Some(columns) => {
+            let draw = (0..columns.ncols()).map(|_| StandardNormal.sample(random));
+            columns * DVector::from_iterator(columns.ncols(), draw)
+        }
+        None => DVector::zeros(model.places().len()),
+    }
+}
+
 /// What the repeats say of a single reading's noise where it is stated: standard deviation and
 /// degrees of freedom.
 pub(super) fn of_repeats<M: FittedModel>(model: &M, readings: &DVector<f64>) -> Option<(f64, f64)> {

@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::dictionary::{Dictionary, inverse, surprise};
-use super::noise::NoiseLaw;
+use super::noise::{NoiseLaw, expected_scatter};
 use super::space::Space;
 use super::spikes::Spikes;
 
@@ -160,7 +160,8 @@ fn greatest<M: FittedModel>(
     random.set_stream(batch as u64 + 1);
     let mut draws = DMatrix::zeros(space.readings(), BATCH);
     for (k, mut column) in draws.column_iter_mut().enumerate() {
-        column.copy_from(&law.draw_possible(model, spikes, batch * BATCH + k, &mut random));
+        let noise = law.draw_possible(model, spikes, batch * BATCH + k, &mut random);
+        column.copy_from(&(noise + expected_scatter(model, &mut random)));
     }
     space.whiten(&mut draws);
     let adjoint = dictionary.places.batch_sums::<BATCH>(&space.adjoint(draws));

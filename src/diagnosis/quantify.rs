@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::bench::{Bench, Cause, raw_signatures};
-use super::noise::{NoiseLaw, NoiseSource};
+use super::noise::{NoiseLaw, NoiseSource, expected_scatter};
 use super::space::Space;
 use super::verdict::{Bias, HeldOut, Size};
 
@@ -23,6 +23,8 @@ const SPLITS: usize = 6;
 pub(super) struct GapMeter {
     space: Space,
     noise: DMatrix<f64>,
+    /// Draws of the scatter that the model expects.
+    scatter: DMatrix<f64>,
     expected: f64,
     spread: f64,
     noise_freedom: f64,
@@ -33,8 +35,13 @@ impl GapMeter {
     pub fn new<M: FittedModel>(model: &M, law: &NoiseLaw, seed: u64) -> Self {
         let space = Space::new(model, &unit_noise());
         let noise = draws(model, law, seed);
+        let scatter = scatter_draws(model, seed);
         let freedom = space.degrees_of_freedom().max(1) as f64;
-        let (projected, _) = space.forward(noise.clone());
+        let mut all = noise.clone();
+        if scatter.ncols() > 0 {
+            all += &scatter;
+        }
+        let (projected, _) = space.forward(all);
         let sums: Vec<f64> = projected
             .column_iter()
             .map(|c| c.norm_squared() / freedom)
@@ -45,6 +52,7 @@ impl GapMeter {
         Self {
             space,
             noise,
+            scatter,
             expected,
             spread: variance,
             noise_freedom: law.freedom.max(1.0),
@@ -93,10 +101,17 @@ impl GapMeter {
             };
             before += split.square(readings, &split.fit(&none)?.predict(readings), noise);
             after += split.square(readings, &fit.predict(readings), noise);
-            // What a perfect model would still show: the prediction made of noise alone.
+            // What a perfect model would still show: the prediction made of noise alone, and the
+            // scatter that it expects.
             for draw in 0..FLOOR_DRAWS {
-                let predicted = fit.predict(&self.noise.column(draw).clone_owned());
-                floor += split.mean(&predicted, |v| v * v) / FLOOR_DRAWS as f64;
+                let noise = self.noise.column(draw).clone_owned();
+                let square = if self.scatter.ncols() > 0 {
+                    let scatter = self.scatter.column(draw).clone_owned();
+                    split.square(&scatter, &fit.predict(&(noise + &scatter)), 0.0)
+                } else {
+                    split.mean(&fit.predict(&noise), |v| v * v)
+                };
+                floor += square / FLOOR_DRAWS as f64;
             }
             count += 1.0;
         }
@@ -346,6 +361,17 @@ fn draws<M: FittedModel>(model: &M, law: &NoiseLaw, seed: u64) -> DMatrix<f64> {
     DMatrix::from_columns(&columns)
 }
 
+/// The scatter that the model expects, readings × draws; no columns where it expects none.
+fn scatter_draws<M: FittedModel>(model: &M, seed: u64) -> DMatrix<f64> {
+    let count = model.expected_scatter().map_or(0, |_| DRAWS);
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0073_6361_7474);
+    let mut draws = DMatrix::zeros(model.places().len(), count);
+    for mut column in draws.column_iter_mut() {
+        column.copy_from(&expected_scatter(model, &mut random));
+    }
+    draws
+}
+
 /// A profile by name, before and after.
 type MovedProfile = (String, Vec<f64>, Vec<f64>);
 
@@ -449,6 +475,9 @@ pub(super) fn weighted_std<M: FittedModel>(
                 behind += w[k];
             }
         }
+    }
+    if let Some(scatter) = model.expected_scatter() {
+        variance += scatter.tr_mul(weights).norm_squared();
     }
     variance.max(0.0).sqrt()
 }

@@ -12,6 +12,7 @@ use errsep_models::model::{Column, FittedModel, Profiles};
 use nalgebra::{DMatrix, DVector};
 
 use super::noise::NoiseLaw;
+use super::scatter::ScatterRoot;
 use super::whitening::Whitening;
 
 /// Columns that project to less than this part of their length lie in the span of the others.
@@ -26,6 +27,8 @@ pub struct Space {
     trace_of: Vec<u32>,
     /// L⁻¹ of each trace.
     whitening: Vec<Arc<Whitening>>,
+    /// What makes the scatter that the model expects one with the noise.
+    scatter: Option<ScatterRoot>,
     /// Orthonormal patterns over the traces, traces × functions.
     patterns: Option<DMatrix<f64>>,
     /// Directions inside the patterns that the model does not have, given back; orthonormal.
@@ -43,8 +46,24 @@ impl Space {
         Self::of_traces(model, law, &all)
     }
 
+    /// The space of all readings, in units of the noise and of the scatter that the model expects.
+    /// (Profiles that are free at every position and such scatter do not go together.)
+    pub fn expecting<M: FittedModel>(model: &M, law: &NoiseLaw) -> Self {
+        let all: Vec<usize> = (0..model.traces().len()).collect();
+        Self::made(model, law, &all, model.expected_scatter())
+    }
+
     /// The space of the readings of some traces, in the order of those traces.
     pub fn of_traces<M: FittedModel>(model: &M, law: &NoiseLaw, chosen: &[usize]) -> Self {
+        Self::made(model, law, chosen, None)
+    }
+
+    fn made<M: FittedModel>(
+        model: &M,
+        law: &NoiseLaw,
+        chosen: &[usize],
+        scatter: Option<&DMatrix<f64>>,
+    ) -> Self {
         let mut traces = Vec::new();
         let mut whitening: Vec<Arc<Whitening>> = Vec::new();
         let mut cache: Vec<(Vec<f64>, Arc<Whitening>)> = Vec::new();
@@ -77,11 +96,17 @@ impl Space {
             traces,
             trace_of,
             whitening,
+            scatter: None,
             patterns: None,
             returned: DMatrix::zeros(start, 0),
             absorbed: DMatrix::zeros(start, 0),
             rank: 0,
         };
+        if let Some(scatter) = scatter {
+            let mut whitened = scatter.select_rows(&rows);
+            space.whiten(&mut whitened);
+            space.scatter = Some(ScatterRoot::new(whitened));
+        }
         let columns = freedom.columns.select_rows(&rows);
         let mut whitened = columns;
         space.whiten(&mut whitened);
@@ -154,6 +179,9 @@ impl Space {
             for (trace, whitening) in self.traces.iter().zip(&self.whitening) {
                 whitening.whiten(&mut column[trace.clone()]);
             }
+            if let Some(root) = &self.scatter {
+                root.apply(column);
+            }
         }
     }
 
@@ -222,6 +250,9 @@ impl Space {
         self.project(&mut columns);
         let n = self.readings.max(1);
         for column in columns.as_mut_slice().chunks_mut(n) {
+            if let Some(root) = &self.scatter {
+                root.apply_transposed(column);
+            }
             for (trace, whitening) in self.traces.iter().zip(&self.whitening) {
                 whitening.adjoint(&mut column[trace.clone()]);
             }
@@ -253,7 +284,7 @@ impl Space {
             whitened[row] += value;
             seen[self.trace_of[row] as usize] = true;
         }
-        let touched: Vec<usize> = (0..seen.len()).filter(|t| seen[*t]).collect();
+        let mut touched: Vec<usize> = (0..seen.len()).filter(|t| seen[*t]).collect();
         // Many signatures are one profile times a sign in each trace: such a profile is whitened
         // once.
         let mut model: Option<(usize, Vec<f64>)> = None;
@@ -281,6 +312,11 @@ impl Space {
                 model = Some((t, values.to_vec()));
                 self.whitening[t].whiten(&mut whitened.as_mut_slice()[trace]);
             }
+        }
+        if let Some(root) = &self.scatter {
+            // It joins readings of different traces.
+            root.apply(whitened.as_mut_slice());
+            touched = (0..self.traces.len()).collect();
         }
         let sums = self.patterns.as_ref().map_or_else(
             || DMatrix::zeros(0, 0),

@@ -22,6 +22,8 @@ const EDGE: f64 = 4.0;
 const HEAVY: f64 = 0.01;
 /// Repeats without which a spike cannot be told from a form.
 const REPEATS: usize = 3;
+/// Readings of a trace without which a spike has no neighbours to stand out of.
+const SHORTEST: usize = 5;
 /// A spike has no neighbours: over those of either side alone it keeps this part of its height.
 const ALONE: f64 = 0.6;
 /// Neighbours on one side.
@@ -92,7 +94,7 @@ impl Spikes {
         }
         Self {
             groups: groups(model)
-                .filter(|g| g.starts.len() >= REPEATS)
+                .filter(|g| g.starts.len() >= REPEATS && g.length >= SHORTEST)
                 .collect(),
         }
     }

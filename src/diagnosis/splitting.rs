@@ -50,7 +50,7 @@ pub(super) fn splits<M: FittedModel>(
         .further()
         .into_iter()
         .map(|(name, model)| {
-            let space = Space::new(&model, &bench.law);
+            let space = Space::expecting(&model, &bench.law);
             (name, model, space)
         })
         .collect();

@@ -1,10 +1,13 @@
 //! A fixed machine model against measured parts, as the diagnosis sees it: nothing is fitted, so
-//! all that parts show beyond the prediction is gap.
+//! all that parts show beyond the prediction and its own uncertainty is gap.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3};
 
+use super::model::coordinate;
 use super::{Axis, Machine, MachineError, PartReading, effects, part_residuals};
 use crate::model::{Column, Effect, FittedModel, Freedom, Place, Quantity, Record};
 
@@ -15,10 +18,11 @@ pub struct MeasuredParts {
     predicted: DVector<f64>,
     record: Record,
     parts: Vec<String>,
+    expected: Option<Arc<DMatrix<f64>>>,
 }
 
 impl MeasuredParts {
-    /// Predicts every reading and puts them into traces: one direction of one replicate of one part.
+    /// Predicts every reading, with what the machine's own spreads let it be off, and puts them into traces: one direction of one replicate of one part.
     /// The position of a reading is the coordinate of its point along its direction; parts follow
     /// one another in time, in the order in which they first occur. Replicates of one part repeat
     /// each other; parts do not, so that their scatter is gap and not noise.
@@ -69,6 +73,7 @@ impl MeasuredParts {
                 names.sort_unstable();
                 names.into_iter().map(|(_, name)| name).collect()
             },
+            expected: expected_scatter(machine, &readings).map(Arc::new),
             readings,
         })
     }
@@ -89,6 +94,60 @@ impl MeasuredParts {
     pub(super) fn column(&self, value: impl Fn(&PartReading) -> f64) -> Column {
         Column::from_places(&self.record.places, |k, _| value(&self.readings[k]))
     }
+}
+
+/// What the machine's spreads let readings be off, um: its coefficients, common to all parts, and its
+/// scatter, drawn anew for every point of every part.
+fn expected_scatter(machine: &Machine, readings: &[PartReading]) -> Option<DMatrix<f64>> {
+    let mut columns: Vec<DVector<f64>> = Vec::new();
+    for error in machine.errors() {
+        let motion =
+            |r: &PartReading| machine.sensitivity(error.component, &r.position)[r.axis.index()];
+        let Some(root) = error.spread.covariance.clone().cholesky() else {
+            continue;
+        };
+        for coefficient in root.l().column_iter() {
+            let off = |r: &PartReading| {
+                let at = coordinate(error.component, &r.position);
+                let powers = error.spread.basis.powers(at);
+                motion(r)
+                    * powers
+                        .zip(coefficient.iter())
+                        .map(|(p, c)| p * c)
+                        .sum::<f64>()
+            };
+            columns.push(DVector::from_iterator(
+                readings.len(),
+                readings.iter().map(off),
+            ));
+        }
+    }
+    let mut points: BTreeMap<(&str, &str), Vec<usize>> = BTreeMap::new();
+    for (k, r) in readings.iter().enumerate() {
+        points.entry((&r.part, &r.feature)).or_default().push(k);
+    }
+    for rows in points.values() {
+        let position = &readings[rows[0]].position;
+        let mut covariance = Matrix3::zeros();
+        for error in machine.errors() {
+            let motion = machine.sensitivity(error.component, position);
+            covariance += motion * motion.transpose() * error.spread.scatter;
+        }
+        let eigen = covariance.symmetric_eigen();
+        for (value, direction) in eigen
+            .eigenvalues
+            .iter()
+            .zip(eigen.eigenvectors.column_iter())
+        {
+            let mut column = DVector::zeros(readings.len());
+            for &k in rows {
+                column[k] = value.max(0.0).sqrt() * direction[readings[k].axis.index()];
+            }
+            columns.push(column);
+        }
+    }
+    columns.retain(|column| column.amax() > 0.0);
+    (!columns.is_empty()).then(|| DMatrix::from_columns(&columns))
 }
 
 /// Number of each name by its first occurrence.
@@ -127,6 +186,10 @@ impl FittedModel for MeasuredParts {
 
     fn linearised(&self) -> DVector<f64> {
         &self.record.observed - &self.predicted
+    }
+
+    fn expected_scatter(&self) -> Option<&DMatrix<f64>> {
+        self.expected.as_deref()
     }
 
     fn channel_names(&self) -> Vec<String> {

@@ -307,3 +307,54 @@ fn an_effect_of_the_users_own_is_named_by_its_formula() {
     let slip = [&line[..], &["--effects", "slip.toml"]].concat();
     bad_input(&folder, &slip, &["slip.toml:3:11", "a `)` is missing"]);
 }
+
+/// What an option asks for in vain is said, and a channel that is missing is told.
+#[test]
+fn options_in_vain_are_refused_and_missing_channels_told() {
+    let mut readings = "channel,repeat,x,reading\n".to_owned();
+    for channel in ["1A", "1B", "2A"] {
+        for repeat in 1..=2 {
+            for k in 0..20 {
+                let wave = (f64::from(k * 7 + repeat * 3) * 1.7).sin();
+                readings += &format!("{channel},{repeat},{},{}\n", 10 * k, 5.0 + 0.02 * wave);
+            }
+        }
+    }
+    let own = "[[effect]]\nname = \"\"\nformula = \"x\"\n";
+    let never = "[[effect]]\nname = \"nothing\"\nformula = \"0 * x\"\n";
+    let folder = Folder::with(&[("d.csv", &readings), ("e.toml", own), ("n.toml", never)]);
+    bad_input(
+        &folder,
+        &["diagnose", "d.csv", "--prove", "0"],
+        &["--prove"],
+    );
+    bad_input(
+        &folder,
+        &["diagnose", "d.csv", "--points", "p.csv"],
+        &["--points"],
+    );
+    bad_input(
+        &folder,
+        &["diagnose", "d.csv", "--effects", "e.toml"],
+        &["no name"],
+    );
+    bad_input(
+        &folder,
+        &["diagnose", "d.csv", "--effects", "n.toml"],
+        &["changes no reading"],
+    );
+    let out = run(&folder, &["diagnose", "d.csv"]);
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    assert!(
+        out.stdout.contains("only 1A, 1B, 2A are there"),
+        "{}",
+        out.stdout
+    );
+}
+
+/// A line with sets is no circle.
+#[test]
+fn a_calibration_with_sets_is_recognised() {
+    let answer = diagnosed(&["calibration-line"], "# nothing stated\n", &[]);
+    assert_eq!(answer["model"], "calibration line");
+}

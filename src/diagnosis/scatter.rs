@@ -86,6 +86,9 @@ impl Direction {
 
 /// Principal directions of some columns, which stand in the given rows.
 fn directions(columns: &DMatrix<f64>, rows: &[usize]) -> Vec<Direction> {
+    if columns.is_empty() {
+        return Vec::new();
+    }
     let eigen = SymmetricEigen::new(columns.tr_mul(columns));
     eigen
         .eigenvalues

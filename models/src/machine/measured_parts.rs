@@ -103,10 +103,15 @@ fn expected_scatter(machine: &Machine, readings: &[PartReading]) -> Option<DMatr
     for error in machine.errors() {
         let motion =
             |r: &PartReading| machine.sensitivity(error.component, &r.position)[r.axis.index()];
-        let Some(root) = error.spread.covariance.clone().cholesky() else {
+        if error.spread.covariance.is_empty() {
             continue;
-        };
-        for coefficient in root.l().column_iter() {
+        }
+        let eigen = error.spread.covariance.clone().symmetric_eigen();
+        let pairs = eigen
+            .eigenvalues
+            .iter()
+            .zip(eigen.eigenvectors.column_iter());
+        for coefficient in pairs.map(|(value, direction)| value.max(0.0).sqrt() * direction) {
             let off = |r: &PartReading| {
                 let at = coordinate(error.component, &r.position);
                 let powers = error.spread.basis.powers(at);

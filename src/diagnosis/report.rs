@@ -13,7 +13,7 @@ use super::shape::fingerprint;
 use super::spikes::Calmed;
 use super::splitting::splits;
 use super::statement::{for_people, separating, statement};
-use super::verdict::{Detail, Diagnosis, Gap, Kind, NoiseOut, Verdict};
+use super::verdict::{Candidate, Detail, Diagnosis, Gap, Kind, NoiseOut, Verdict};
 use super::{Examined, Options};
 use crate::report::number::plain;
 
@@ -138,10 +138,14 @@ pub(super) fn compose<M: FittedModel>(
         gap,
         noise: NoiseOut::from(&bench.law),
         places,
-        candidates,
         bias,
         hidden,
-        notes: notes(bench, &(readings - &change), calm),
+        notes: [
+            notes(bench, &(readings - &change), calm),
+            elsewhere(&candidates),
+        ]
+        .concat(),
+        candidates,
         detail: Detail {
             before: meter.residuals(readings),
             after: meter.residuals(&(readings - &change)),
@@ -150,6 +154,25 @@ pub(super) fn compose<M: FittedModel>(
             apart: splits.iter().flatten().map(|split| split.now).collect(),
         },
     }
+}
+
+/// Of which variant bias and remainder are, where another fits as well.
+fn elsewhere(candidates: &[Candidate]) -> Vec<String> {
+    let open = candidates.iter().filter(|c| !c.elsewhere.is_empty());
+    open.map(|candidate| {
+        let others: Vec<&str> = candidate
+            .elsewhere
+            .iter()
+            .map(|other| other.variant.as_str())
+            .collect();
+        format!(
+            "The bias of the answer is that of `{}` in {}; in {}, which fits as well, it would be another.",
+            candidate.effect,
+            candidate.variant.as_deref().unwrap_or("its place"),
+            others.join(" or ")
+        )
+    })
+    .collect()
 }
 
 fn notes<M: FittedModel>(bench: &Bench<'_, M>, clean: &DVector<f64>, calm: &Calmed) -> Vec<String> {

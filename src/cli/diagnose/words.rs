@@ -96,12 +96,11 @@ pub(super) fn in_words(diagnosis: &Diagnosis) -> String {
             let (moved, _) = shown(bias.moved, &bias.unit);
             let _ = writeln!(
                 text,
-                "  {:<12} {:>14} {:>14} {unit}   moved {} ± {}",
+                "  {:<12} {:>14} {:>14} {unit}   moved {}",
                 bias.quantity,
                 number(before),
                 number(after),
-                number(moved),
-                number(shown(bias.moved_std, &bias.unit).0)
+                measured(moved, Some(shown(bias.moved_std, &bias.unit).0)).replace('\u{2212}', "-")
             );
         }
     }

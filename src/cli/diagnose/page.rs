@@ -134,8 +134,13 @@ fn candidate(candidate: &crate::diagnosis::Candidate) -> sheet::Candidate {
             .iter()
             .map(|p| {
                 let (value, unit) = shown(p.value, &p.unit);
+                // Of several variants that fit as well the figure is that of one.
+                let name = match &candidate.variant {
+                    Some(own) if !candidate.elsewhere.is_empty() => format!("{}, {own}", p.name),
+                    _ => p.name.clone(),
+                };
                 (
-                    p.name.clone(),
+                    name,
                     value,
                     shown(p.std, &p.unit).0,
                     unit.to_owned(),

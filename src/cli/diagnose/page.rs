@@ -139,12 +139,7 @@ fn candidate(candidate: &crate::diagnosis::Candidate) -> sheet::Candidate {
                     Some(own) if !candidate.elsewhere.is_empty() => format!("{}, {own}", p.name),
                     _ => p.name.clone(),
                 };
-                (
-                    name,
-                    value,
-                    shown(p.std, &p.unit).0,
-                    unit.to_owned(),
-                )
+                (name, value, shown(p.std, &p.unit).0, unit.to_owned())
             })
             .collect(),
         physics: candidate.physics.clone(),

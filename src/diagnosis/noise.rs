@@ -27,8 +27,8 @@ const SEED: u64 = 0x6c61_7773;
 const FEWEST: usize = 8;
 /// Draws behind what neighbours tell of the noise.
 const NEIGHBOUR_DRAWS: usize = 64;
-/// Noise below this part of half the digits of a number is rounding.
-const SMALLEST: f64 = 1e-4;
+/// Noise below this part of the greatest reading is rounding.
+const ROUNDING: f64 = 1e-12;
 
 /// How far the noise is known from the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -252,8 +252,7 @@ impl NoiseLaw {
         if let Some(sigma) = model.stated_noise() {
             return Self::white(sigma, f64::INFINITY, NoiseSource::Stated);
         }
-        let floor = f64::EPSILON.sqrt() * SMALLEST * model.observed().amax();
-        let floor = floor.max(f64::MIN_POSITIVE.sqrt());
+        let floor = (ROUNDING * model.observed().amax()).max(f64::MIN_POSITIVE.sqrt());
         let level = levelled(model, readings);
         let contrasts = Contrasts::new(model.places(), model.traces(), &level);
         if contrasts.count() < FEWEST {
@@ -271,14 +270,15 @@ impl NoiseLaw {
 }
 
 /// A draw of the scatter that the model expects beside the noise.
-pub(super) fn expected_scatter<M: FittedModel>(model: &M, random: &mut ChaCha8Rng) -> DVector<f64> {
-    match model.expected_scatter() {
-        Some(columns) => {
-            let draw = (0..columns.ncols()).map(|_| StandardNormal.sample(random));
-            columns * DVector::from_iterator(columns.ncols(), draw)
+pub(super) fn draw_scatter<M: FittedModel>(model: &M, random: &mut ChaCha8Rng) -> DVector<f64> {
+    let mut scatter = DVector::zeros(model.places().len());
+    for column in model.expected_scatter() {
+        let size: f64 = StandardNormal.sample(random);
+        for (&row, value) in column.rows.iter().zip(&column.values) {
+            scatter[row] += size * value;
         }
-        None => DVector::zeros(model.places().len()),
     }
+    scatter
 }
 
 /// What the repeats say of a single reading's noise where it is stated: standard deviation and

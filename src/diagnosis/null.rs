@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::dictionary::{Dictionary, inverse, surprise};
-use super::noise::{NoiseLaw, expected_scatter};
+use super::noise::{NoiseLaw, draw_scatter};
 use super::space::Space;
 use super::spikes::Spikes;
 
@@ -161,7 +161,7 @@ fn greatest<M: FittedModel>(
     let mut draws = DMatrix::zeros(space.readings(), BATCH);
     for (k, mut column) in draws.column_iter_mut().enumerate() {
         let noise = law.draw_possible(model, spikes, batch * BATCH + k, &mut random);
-        column.copy_from(&(noise + expected_scatter(model, &mut random)));
+        column.copy_from(&(noise + draw_scatter(model, &mut random)));
     }
     space.whiten(&mut draws);
     let adjoint = dictionary.places.batch_sums::<BATCH>(&space.adjoint(draws));

@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::bench::{Bench, Cause, raw_signatures};
-use super::noise::{NoiseLaw, NoiseSource, expected_scatter};
+use super::noise::{NoiseLaw, NoiseSource, draw_scatter};
 use super::space::Space;
 use super::verdict::{Bias, HeldOut, Size};
 
@@ -363,11 +363,15 @@ fn draws<M: FittedModel>(model: &M, law: &NoiseLaw, seed: u64) -> DMatrix<f64> {
 
 /// The scatter that the model expects, readings × draws; no columns where it expects none.
 fn scatter_draws<M: FittedModel>(model: &M, seed: u64) -> DMatrix<f64> {
-    let count = model.expected_scatter().map_or(0, |_| DRAWS);
+    let count = if model.expected_scatter().is_empty() {
+        0
+    } else {
+        DRAWS
+    };
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0073_6361_7474);
     let mut draws = DMatrix::zeros(model.places().len(), count);
     for mut column in draws.column_iter_mut() {
-        column.copy_from(&expected_scatter(model, &mut random));
+        column.copy_from(&draw_scatter(model, &mut random));
     }
     draws
 }
@@ -476,8 +480,9 @@ pub(super) fn weighted_std<M: FittedModel>(
             }
         }
     }
-    if let Some(scatter) = model.expected_scatter() {
-        variance += scatter.tr_mul(weights).norm_squared();
+    for column in model.expected_scatter() {
+        let pairs = column.rows.iter().zip(&column.values);
+        variance += pairs.map(|(&k, v)| weights[k] * v).sum::<f64>().powi(2);
     }
     variance.max(0.0).sqrt()
 }

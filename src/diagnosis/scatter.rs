@@ -28,36 +28,43 @@ pub(super) struct ScatterRoot {
 
 impl ScatterRoot {
     /// The root of whitened columns, one standard deviation each.
-    pub fn new(mut columns: DMatrix<f64>) -> Self {
-        let mut groups: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
-        for (k, column) in columns.column_iter().enumerate() {
-            let rows = (0..columns.nrows()).filter(|i| column[*i] != 0.0).collect();
-            groups.entry(rows).or_default().push(k);
+    pub fn new(columns: impl Iterator<Item = DVector<f64>>) -> Self {
+        let mut groups: BTreeMap<Vec<usize>, Vec<DVector<f64>>> = BTreeMap::new();
+        let mut readings = 0;
+        for column in columns {
+            readings = column.len();
+            let rows: Vec<usize> = (0..readings).filter(|i| column[*i] != 0.0).collect();
+            let own = column.select_rows(&rows);
+            groups.entry(rows).or_default().push(own);
         }
-        // Those that share no reading with any other group can be taken by themselves.
-        let mut uses = vec![0usize; columns.nrows()];
-        let mut by_size: Vec<(Vec<usize>, Vec<usize>)> = groups.into_iter().collect();
+        // Those that share no reading with a smaller group can be taken by themselves.
+        let mut used = vec![false; readings];
+        let mut by_size: Vec<(Vec<usize>, Vec<DVector<f64>>)> = groups.into_iter().collect();
         by_size.sort_by_key(|(rows, _)| rows.len());
         let (mut own, mut rest) = (Vec::new(), Vec::new());
         for (rows, members) in by_size {
-            if rows.iter().any(|i| uses[*i] > 0) {
-                rest.extend(members);
+            if rows.iter().any(|i| used[*i]) {
+                rest.extend(members.into_iter().map(|m| (rows.clone(), m)));
                 continue;
             }
-            rows.iter().for_each(|i| uses[*i] += 1);
-            let block = columns.select_rows(&rows).select_columns(&members);
-            own.extend(directions(&block, &rows));
+            rows.iter().for_each(|i| used[*i] = true);
+            own.extend(directions(&members, &rows));
         }
         let mut root = Self {
             own,
             common: Vec::new(),
         };
-        let n = columns.nrows().max(1);
-        for column in columns.as_mut_slice().chunks_mut(n) {
-            root.apply(column);
-        }
-        let rows: Vec<usize> = (0..columns.nrows()).collect();
-        root.common = directions(&columns.select_columns(&rest), &rows);
+        let rest: Vec<DVector<f64>> = rest
+            .into_iter()
+            .map(|(rows, values)| {
+                let mut dense = DVector::zeros(readings);
+                rows.iter().zip(&values).for_each(|(i, v)| dense[*i] = *v);
+                root.apply(dense.as_mut_slice());
+                dense
+            })
+            .collect();
+        let all: Vec<usize> = (0..readings).collect();
+        root.common = directions(&rest, &all);
         root
     }
 
@@ -85,18 +92,19 @@ impl Direction {
 }
 
 /// Principal directions of some columns, which stand in the given rows.
-fn directions(columns: &DMatrix<f64>, rows: &[usize]) -> Vec<Direction> {
-    if columns.is_empty() {
+fn directions(columns: &[DVector<f64>], rows: &[usize]) -> Vec<Direction> {
+    if columns.is_empty() || rows.is_empty() {
         return Vec::new();
     }
-    let eigen = SymmetricEigen::new(columns.tr_mul(columns));
+    let columns = DMatrix::from_columns(columns);
+    let eigen = SymmetricEigen::new(columns.tr_mul(&columns));
     eigen
         .eigenvalues
         .iter()
         .zip(eigen.eigenvectors.column_iter())
         .filter(|(variance, _)| **variance > SLIGHT)
         .map(|(variance, combination)| {
-            let direction: DVector<f64> = columns * combination / variance.sqrt();
+            let direction: DVector<f64> = &columns * combination / variance.sqrt();
             Direction {
                 rows: rows.to_vec(),
                 values: direction.as_slice().to_vec(),
@@ -126,7 +134,7 @@ mod tests {
             for k in 0..20 {
                 columns[(k % 10, 10 + k / 10)] = values[20 + k];
             }
-            let root = ScatterRoot::new(columns.clone());
+            let root = ScatterRoot::new(columns.column_iter().map(|c| c.clone_owned()));
             let mut inverse = DMatrix::identity(10, 10);
             let mut transposed = DMatrix::identity(10, 10);
             for k in 0..10 {

@@ -55,14 +55,14 @@ impl Space {
 
     /// The space of the readings of some traces, in the order of those traces.
     pub fn of_traces<M: FittedModel>(model: &M, law: &NoiseLaw, chosen: &[usize]) -> Self {
-        Self::made(model, law, chosen, None)
+        Self::made(model, law, chosen, &[])
     }
 
     fn made<M: FittedModel>(
         model: &M,
         law: &NoiseLaw,
         chosen: &[usize],
-        scatter: Option<&DMatrix<f64>>,
+        scatter: &[Column],
     ) -> Self {
         let mut traces = Vec::new();
         let mut whitening: Vec<Arc<Whitening>> = Vec::new();
@@ -102,9 +102,15 @@ impl Space {
             absorbed: DMatrix::zeros(start, 0),
             rank: 0,
         };
-        if let Some(scatter) = scatter {
-            let mut whitened = scatter.select_rows(&rows);
-            space.whiten(&mut whitened);
+        if !scatter.is_empty() {
+            let whitened = scatter.iter().map(|column| {
+                let mut dense = DMatrix::zeros(start, 1);
+                for (&row, &value) in column.rows.iter().zip(&column.values) {
+                    dense[row] += value;
+                }
+                space.whiten(&mut dense);
+                dense.column(0).clone_owned()
+            });
             space.scatter = Some(ScatterRoot::new(whitened));
         }
         let columns = freedom.columns.select_rows(&rows);

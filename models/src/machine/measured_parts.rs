@@ -18,7 +18,7 @@ pub struct MeasuredParts {
     predicted: DVector<f64>,
     record: Record,
     parts: Vec<String>,
-    expected: Option<Arc<DMatrix<f64>>>,
+    expected: Arc<[Column]>,
 }
 
 impl MeasuredParts {
@@ -38,7 +38,7 @@ impl MeasuredParts {
             key(a).cmp(&key(b)).then(along(a).total_cmp(&along(b)))
         });
         let residuals = part_residuals(machine, &readings)?;
-        let places = readings
+        let places: Vec<Place> = readings
             .iter()
             .map(|r| Place {
                 channel: r.axis.index(),
@@ -57,6 +57,7 @@ impl MeasuredParts {
                 _ => traces.push(i..i + 1),
             }
         }
+        let expected = expected_scatter(machine, &readings, &places).into();
         Ok(Self {
             predicted: DVector::from_iterator(
                 readings.len(),
@@ -73,7 +74,7 @@ impl MeasuredParts {
                 names.sort_unstable();
                 names.into_iter().map(|(_, name)| name).collect()
             },
-            expected: expected_scatter(machine, &readings).map(Arc::new),
+            expected,
             readings,
         })
     }
@@ -98,40 +99,35 @@ impl MeasuredParts {
 
 /// What the machine's spreads let readings be off, um: its coefficients, common to all parts, and its
 /// scatter, drawn anew for every point of every part.
-fn expected_scatter(machine: &Machine, readings: &[PartReading]) -> Option<DMatrix<f64>> {
-    let mut columns: Vec<DVector<f64>> = Vec::new();
+fn expected_scatter(machine: &Machine, readings: &[PartReading], places: &[Place]) -> Vec<Column> {
+    let mut columns = Vec::new();
     for error in machine.errors() {
-        let motion =
-            |r: &PartReading| machine.sensitivity(error.component, &r.position)[r.axis.index()];
-        if error.spread.covariance.is_empty() {
+        let spread = &error.spread;
+        if spread.covariance.is_empty() {
             continue;
         }
-        let eigen = error.spread.covariance.clone().symmetric_eigen();
-        let pairs = eigen
-            .eigenvalues
-            .iter()
-            .zip(eigen.eigenvectors.column_iter());
-        for coefficient in pairs.map(|(value, direction)| value.max(0.0).sqrt() * direction) {
-            let off = |r: &PartReading| {
-                let at = coordinate(error.component, &r.position);
-                let powers = error.spread.basis.powers(at);
-                motion(r)
-                    * powers
-                        .zip(coefficient.iter())
-                        .map(|(p, c)| p * c)
-                        .sum::<f64>()
+        let motion =
+            |r: &PartReading| machine.sensitivity(error.component, &r.position)[r.axis.index()];
+        let eigen = spread.covariance.clone().symmetric_eigen();
+        let directions = eigen.eigenvectors.column_iter();
+        for (variance, direction) in eigen.eigenvalues.iter().zip(directions) {
+            let deviation = |r: &PartReading| {
+                let powers = spread
+                    .basis
+                    .powers(coordinate(error.component, &r.position));
+                powers.zip(&direction).map(|(p, d)| p * d).sum::<f64>()
             };
-            columns.push(DVector::from_iterator(
-                readings.len(),
-                readings.iter().map(off),
-            ));
+            let size = variance.max(0.0).sqrt();
+            columns.push(Column::from_places(places, |k, _| {
+                size * motion(&readings[k]) * deviation(&readings[k])
+            }));
         }
     }
     let mut points: BTreeMap<(&str, &str), Vec<usize>> = BTreeMap::new();
     for (k, r) in readings.iter().enumerate() {
         points.entry((&r.part, &r.feature)).or_default().push(k);
     }
-    for rows in points.values() {
+    for rows in points.into_values() {
         let position = &readings[rows[0]].position;
         let mut covariance = Matrix3::zeros();
         for error in machine.errors() {
@@ -139,20 +135,20 @@ fn expected_scatter(machine: &Machine, readings: &[PartReading]) -> Option<DMatr
             covariance += motion * motion.transpose() * error.spread.scatter;
         }
         let eigen = covariance.symmetric_eigen();
-        for (value, direction) in eigen
-            .eigenvalues
-            .iter()
-            .zip(eigen.eigenvectors.column_iter())
-        {
-            let mut column = DVector::zeros(readings.len());
-            for &k in rows {
-                column[k] = value.max(0.0).sqrt() * direction[readings[k].axis.index()];
-            }
-            columns.push(column);
+        let directions = eigen.eigenvectors.column_iter();
+        for (variance, direction) in eigen.eigenvalues.iter().zip(directions) {
+            let size = variance.max(0.0).sqrt();
+            let values = rows
+                .iter()
+                .map(|k| size * direction[readings[*k].axis.index()]);
+            columns.push(Column {
+                values: values.collect(),
+                rows: rows.clone(),
+            });
         }
     }
-    columns.retain(|column| column.amax() > 0.0);
-    (!columns.is_empty()).then(|| DMatrix::from_columns(&columns))
+    columns.retain(|column| column.values.iter().any(|v| *v != 0.0));
+    columns
 }
 
 /// Number of each name by its first occurrence.
@@ -193,8 +189,8 @@ impl FittedModel for MeasuredParts {
         &self.record.observed - &self.predicted
     }
 
-    fn expected_scatter(&self) -> Option<&DMatrix<f64>> {
-        self.expected.as_deref()
+    fn expected_scatter(&self) -> &[Column] {
+        &self.expected
     }
 
     fn channel_names(&self) -> Vec<String> {

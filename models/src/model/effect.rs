@@ -1,0 +1,230 @@
+//! An effect that a model leaves out: what it is, its shapes and sizes, and its signature.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Column;
+
+/// A parameter of an effect with its unit and the range in which it is physically plausible.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Name in tables and JSON.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Smallest plausible value.
+    pub low: f64,
+    /// Greatest plausible value.
+    pub high: f64,
+}
+
+impl Parameter {
+    /// A parameter of either sign.
+    pub const fn symmetric(name: &'static str, unit: &'static str, reach: f64) -> Self {
+        Self {
+            name,
+            unit,
+            low: -reach,
+            high: reach,
+        }
+    }
+
+    /// A parameter between two plausible values.
+    pub const fn between(name: &'static str, unit: &'static str, low: f64, high: f64) -> Self {
+        Self {
+            name,
+            unit,
+            low,
+            high,
+        }
+    }
+}
+
+/// The estimate of one parameter of an effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Name of the parameter.
+    pub name: String,
+    /// Best value.
+    pub value: f64,
+    /// Standard uncertainty.
+    pub std: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// One member of an effect's family of signatures: its variant and its nonlinear parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// Which of the effect's discrete variants (a channel, a sign pattern …).
+    pub variant: usize,
+    /// Nonlinear parameters, in the order of [`Effect::shape_parameters`].
+    pub values: Vec<f64>,
+    /// First step of the search around each value; zero keeps it.
+    pub steps: Vec<f64>,
+}
+
+impl Shape {
+    /// The only member of an effect without nonlinear parameters.
+    pub fn only() -> Self {
+        Self::variant(0)
+    }
+
+    /// A variant without nonlinear parameters.
+    pub fn variant(variant: usize) -> Self {
+        Self {
+            variant,
+            values: Vec::new(),
+            steps: Vec::new(),
+        }
+    }
+
+    /// Number of parameters that the search may change.
+    pub fn free(&self) -> usize {
+        self.steps.iter().filter(|step| **step != 0.0).count()
+    }
+}
+
+/// What people should know of an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct About {
+    /// What happens physically.
+    pub physics: &'static str,
+    /// The observation that would confirm or refute it.
+    pub confirm: &'static str,
+    /// Where the formula comes from.
+    pub source: &'static str,
+}
+
+/// Where in the chain from the machine to the reading an effect acts. Signatures that depend on what
+/// is seen are taken with the changes of the effects that come before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Link {
+    /// It moves what the sensor sees at a place.
+    Stylus,
+    /// It moves the place: what is seen there comes with it.
+    Slide,
+    /// It depends on what the sensor sees.
+    Sensor,
+    /// It adds to the reading.
+    Reading,
+    /// It depends on the reading, with all that any other effect has added to it.
+    Pointer,
+}
+
+impl Link {
+    /// Whether an effect here depends on what an effect at another link changes.
+    pub fn sees(self, other: Self) -> bool {
+        match self {
+            Self::Stylus | Self::Reading => false,
+            Self::Slide => other == Self::Stylus,
+            Self::Sensor => matches!(other, Self::Stylus | Self::Slide),
+            Self::Pointer => other != Self::Pointer,
+        }
+    }
+}
+
+/// A physical effect that a model leaves out.
+pub trait Effect<M>: Send + Sync {
+    /// Name in verdicts, options and files.
+    fn name(&self) -> &str;
+
+    /// Physics, confirmation and source.
+    fn about(&self) -> About;
+
+    /// The parameters that enter linearly, one signature each.
+    fn amplitudes(&self) -> Vec<Parameter>;
+
+    /// The parameters that enter nonlinearly.
+    fn shape_parameters(&self) -> Vec<Parameter> {
+        Vec::new()
+    }
+
+    /// The shapes at which the search begins, dense enough that the best is near one of them.
+    fn grid(&self, _model: &M) -> Vec<Shape> {
+        vec![Shape::only()]
+    }
+
+    /// The change of the readings per unit of each amplitude, at the fitted state of the model.
+    fn columns(&self, model: &M, shape: &Shape) -> Vec<Column>;
+
+    /// Where in the chain from the machine to the reading it acts.
+    fn link(&self) -> Link {
+        Link::Reading
+    }
+
+    /// Whether the model absorbs this effect whatever its size: it is listed as undetectable and
+    /// never named, whatever small part of it bent states or missing traces leave visible.
+    fn absorbed(&self) -> bool {
+        false
+    }
+
+    /// Whether a shape is one that the search may go to.
+    fn allowed(&self, _model: &M, _shape: &Shape) -> bool {
+        true
+    }
+
+    /// Whether amplitudes inside their ranges are possible at this state too: an indicator's
+    /// reading rises with what it sees.
+    fn possible(&self, _model: &M, _shape: &Shape, _amplitudes: &[f64]) -> bool {
+        true
+    }
+
+    /// The shape that belongs to estimated amplitudes, for effects whose signature depends on
+    /// their size.
+    fn settled(&self, _shape: &Shape, _amplitudes: &[f64]) -> Option<Shape> {
+        None
+    }
+
+    /// The same physical effect at another state of the model, where shape or amplitudes are told
+    /// relative to the state.
+    fn carried(&self, _from: &M, _to: &M, shape: &Shape, amplitudes: &[f64]) -> (Shape, Vec<f64>) {
+        (shape.clone(), amplitudes.to_vec())
+    }
+
+    /// The readings without this effect, where taking its change out of them does not suffice
+    /// because the effect hides a part of the state: from the readings with it and those less its
+    /// change, `clean`.
+    fn restored(
+        &self,
+        _model: &M,
+        _readings: &DVector<f64>,
+        _clean: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        None
+    }
+
+    /// The standard uncertainty that the spacing of the readings leaves in each shape parameter,
+    /// where the signature changes by steps.
+    fn resolution(&self, _model: &M, _shape: &Shape) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// The variant in words, where the effect has several.
+    fn variant_name(&self, _model: &M, _shape: &Shape) -> Option<String> {
+        None
+    }
+
+    /// What is reported from amplitudes and shape, both with their covariance
+    /// (amplitudes first, then shape parameters).
+    fn estimates(
+        &self,
+        shape: &Shape,
+        amplitudes: &[f64],
+        covariance: &DMatrix<f64>,
+    ) -> Vec<Estimate> {
+        let values = amplitudes.iter().chain(&shape.values);
+        let names = self.amplitudes().into_iter().chain(self.shape_parameters());
+        values
+            .zip(names)
+            .enumerate()
+            .map(|(k, (&value, parameter))| Estimate {
+                name: parameter.name.to_owned(),
+                value,
+                std: covariance
+                    .get((k, k))
+                    .map_or(f64::NAN, |v| v.clamp(0.0, f64::INFINITY).sqrt()),
+                unit: parameter.unit.to_owned(),
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,88 @@
+//! Counts of truths inside intervals, and the table that is made of them.
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// The share of a normal distribution within one standard deviation.
+pub const ONE_SIGMA: f64 = 0.682_689_492_137_085_9;
+
+/// What is counted of one quantity.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Tally {
+    values: u64,
+    squares: f64,
+    inside_68: u64,
+    inside_95: u64,
+}
+
+impl Tally {
+    /// One value: its error, its standard uncertainty and the degrees of freedom of that (infinite for
+    /// a normal distribution), intervals ± t·u.
+    pub fn add(&mut self, error: f64, std: f64, freedom: f64) {
+        let factor = |share: f64| {
+            if freedom.is_finite() {
+                StudentsT::new(0.0, 1.0, freedom)
+                    .map_or(f64::NAN, |t| t.inverse_cdf(0.5 + share / 2.0))
+            } else if share > 0.9 {
+                1.959_963_984_540_054
+            } else {
+                1.0
+            }
+        };
+        self.add_intervals(error, std, factor(ONE_SIGMA) * std, factor(0.95) * std);
+    }
+
+    /// One value with the half widths of its intervals as the command gives them.
+    pub fn add_intervals(&mut self, error: f64, std: f64, half_68: f64, half_95: f64) {
+        self.values += 1;
+        self.squares += (error / std).powi(2);
+        self.inside_68 += u64::from(error.abs() <= half_68);
+        self.inside_95 += u64::from(error.abs() <= half_95);
+    }
+
+    /// Both counts together.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            values: self.values + other.values,
+            squares: self.squares + other.squares,
+            inside_68: self.inside_68 + other.inside_68,
+            inside_95: self.inside_95 + other.inside_95,
+        }
+    }
+}
+
+/// One line of the table.
+#[derive(Debug, Clone)]
+pub struct Row {
+    /// What was measured, and on what data.
+    pub case: String,
+    /// Whose uncertainty it is.
+    pub quantity: String,
+    /// Data sets; several values of one set, as of a profile, are not independent.
+    pub seeds: u64,
+    /// The counts.
+    pub tally: Tally,
+}
+
+/// Prints the rows as a table; a row whose 95 % interval holds less than 93 % or more than 97 % is marked.
+pub fn print(rows: &[Row]) {
+    println!("| case | quantity | data sets | values | rms of error/u | in 68.27 % | in 95 % | |");
+    println!("|---|---|---|---|---|---|---|---|");
+    for row in rows {
+        let t = row.tally;
+        let count = t.values.max(1) as f64;
+        let share = |inside: u64| 100.0 * inside as f64 / count;
+        let outside = !(93.0..=97.0).contains(&share(t.inside_95));
+        println!(
+            "| {} | {} | {} | {} | {:.3} | {:.1} % | {:.1} % | {} |",
+            row.case,
+            row.quantity,
+            row.seeds,
+            t.values,
+            (t.squares / count).sqrt(),
+            share(t.inside_68),
+            share(t.inside_95),
+            if outside { "outside" } else { "" }
+        );
+    }
+}

@@ -240,3 +240,66 @@ fn the_component_between_is_what_the_repeats_leave() {
     let future = found.future_reading.unwrap().result.standard_uncertainty;
     near("future", future * future, 8.0 / 6.0 + 3.0 + 2.0, 1e-13);
 }
+
+/// Readings of three parts measured three times, and what a statistician prints for them.
+#[test]
+fn three_parts_give_two_degrees_of_freedom_to_a_future_reading() {
+    let groups = [[10.0, 10.1, 9.9], [14.0, 14.1, 13.9], [7.0, 7.1, 6.9]];
+    let groups = groups.iter().enumerate().map(|(i, readings)| Group {
+        name: i.to_string(),
+        readings: readings.to_vec(),
+    });
+    let found = analyse(&Groups::new(groups.collect()).unwrap(), "um", 0.95).unwrap();
+    // By hand: the means 10, 14, 7 have the variance 37/3; (1 + 1/3)·37/3 + (1 − 1/3)·0.01 = 16.451.
+    let future = found.future_reading.unwrap().result;
+    let u = future.standard_uncertainty;
+    near(
+        "variance",
+        u * u,
+        4.0 / 3.0 * 37.0 / 3.0 + 2.0 / 3.0 * 0.01,
+        1e-13,
+    );
+    // t(0.975; 2) = 4.303: the second digit of what Satterthwaite adds to two is not certified.
+    near("degrees", future.degrees_of_freedom.as_f64(), 2.0, 0.001);
+    near(
+        "U",
+        future.expanded(0.95).unwrap().upper - future.value,
+        17.45,
+        0.01,
+    );
+}
+
+#[test]
+fn the_mean_of_unequal_counts_is_as_sure_as_its_groups_allow() {
+    // Limit: when the groups do not scatter beyond their readings' noise the generalised form is the
+    // weighted scatter of the means, when they scatter far more the plain one times N²/Σn².
+    let make = |offsets: [f64; 3]| {
+        let counts = [2usize, 5, 9];
+        let groups = counts
+            .iter()
+            .zip(offsets)
+            .enumerate()
+            .map(|(i, (n, o))| Group {
+                name: i.to_string(),
+                // Deviations that sum to zero in each group, so that the means are the offsets.
+                readings: (0..*n)
+                    .map(|j| o + (j as f64 - 0.5 * (*n as f64 - 1.0)))
+                    .collect(),
+            });
+        analyse(&Groups::new(groups.collect()).unwrap(), "um", 0.95).unwrap()
+    };
+    let far = make([0.0, 1e6, 3e6]);
+    let s2 = (7.0 / 3.0) * 1e12;
+    let share = (4.0 + 25.0 + 81.0) / 256.0;
+    // Exact limit, to the share of one reading's variance (9) in the means' (10¹²).
+    let u = far.mean.standard_uncertainty;
+    near("far", u * u / (s2 * share), 1.0, 1e-10);
+    assert_eq!(far.mean.degrees_of_freedom.as_f64(), 2.0);
+    let close = make([0.0, 0.1, -0.1]);
+    let grand = (2.0 * 0.0 + 5.0 * 0.1 - 9.0 * 0.1) / 16.0;
+    let squares = 2.0 * grand * grand
+        + 5.0 * (0.1 - grand) * (0.1 - grand)
+        + 9.0 * (-0.1 - grand) * (-0.1 - grand);
+    let u = close.mean.standard_uncertainty;
+    near("close", u * u, squares / 2.0 / 16.0, 1e-13);
+}

@@ -33,14 +33,6 @@ pub struct Components {
     pub within: Option<Interval>,
 }
 
-impl Components {
-    /// Whether a component between the groups shows at all (its estimate is positive).
-    #[must_use]
-    pub fn between_visible(&self) -> bool {
-        self.between.is_some_and(|b| b.variance > 0.0)
-    }
-}
-
 /// `E[MS_w] = σ_w²` and `E[MS_b] = σ_w² + n0 σ_b²` solved for the components.
 pub(super) fn components(
     groups: &Groups,
@@ -105,16 +97,11 @@ fn between_limits(
     within: &MeanSquare,
     tail: f64,
 ) -> Result<(f64, f64), AnovaError> {
-    let list = groups.groups();
-    let nu = list.len() as f64 - 1.0;
-    let inverse_counts: f64 = list.iter().map(|g| 1.0 / g.readings.len() as f64).sum();
-    let h = list.len() as f64 / inverse_counts;
-    let centre = groups.mean_of_means();
-    let square = h * list
-        .iter()
-        .map(|g| (g.mean() - centre).powi(2))
-        .sum::<f64>()
-        / nu;
+    let Some(spread) = groups.spread_of_means() else {
+        return Ok((0.0, f64::INFINITY));
+    };
+    let (nu, h) = (spread.degrees, spread.harmonic_count);
+    let square = h * spread.variance;
     let chi = chi_squared(nu)?;
     let f = FisherSnedecor::new(nu, within.degrees_of_freedom as f64)
         .map_err(|_| UncertaintyError::BadDegreesOfFreedom { found: nu })?;
@@ -144,6 +131,6 @@ fn difference_degrees(
     Ok(DegreesOfFreedom::new(degrees.max(1.0))?)
 }
 
-fn chi_squared(nu: f64) -> Result<ChiSquared, UncertaintyError> {
+pub(super) fn chi_squared(nu: f64) -> Result<ChiSquared, UncertaintyError> {
     ChiSquared::new(nu).map_err(|_| UncertaintyError::BadDegreesOfFreedom { found: nu })
 }

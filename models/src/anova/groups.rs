@@ -46,6 +46,17 @@ pub struct Groups {
     groups: Vec<Group>,
 }
 
+/// Scatter of the group means about their plain mean.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SpreadOfMeans {
+    /// Sample variance, unit of the readings squared: it estimates `σ_b² + σ_w²/h`.
+    pub variance: f64,
+    /// `k - 1`.
+    pub degrees: f64,
+    /// Harmonic mean `h` of the counts.
+    pub harmonic_count: f64,
+}
+
 impl Groups {
     /// Checks the groups: at least two readings in all, every group with a reading and a name of
     /// its own.
@@ -124,6 +135,27 @@ impl Groups {
         let k = self.groups.len() as f64;
         let n = self.readings() as f64;
         (k > 1.0).then(|| (n - self.sum_of_squared_counts() / n) / (k - 1.0))
+    }
+
+    /// How the group means scatter; `None` for one group.
+    pub(super) fn spread_of_means(&self) -> Option<SpreadOfMeans> {
+        let k = self.groups.len() as f64;
+        let inverse_counts: f64 = self
+            .groups
+            .iter()
+            .map(|g| 1.0 / g.readings.len() as f64)
+            .sum();
+        let centre = self.mean_of_means();
+        let squares: f64 = self
+            .groups
+            .iter()
+            .map(|g| (g.mean() - centre).powi(2))
+            .sum();
+        (k > 1.0).then(|| SpreadOfMeans {
+            variance: squares / (k - 1.0),
+            degrees: k - 1.0,
+            harmonic_count: k / inverse_counts,
+        })
     }
 
     /// `Σ n_i²`.

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::components::{Components, components};
-use super::{AnovaError, Groups};
-use crate::uncertainty::{Budget, Correlation, DegreesOfFreedom, Quantity};
+use super::components::{Components, chi_squared, components};
+use super::{AnovaError, Group, Groups};
+use crate::uncertainty::{Budget, Correlation, DegreesOfFreedom, Quantity, welch_satterthwaite};
 
 /// A line of the table of analysis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -86,8 +86,8 @@ pub fn analyse(groups: &Groups, unit: &str, confidence: f64) -> Result<OneWay, A
             .map(|d| d.sf(f))
     });
     let components = components(groups, &between, &within, confidence)?;
-    let mean = mean(groups, grand, &between, &within, &components, unit)?;
-    let future_reading = future_reading(&mean, &components, unit)?;
+    let mean = mean(groups, grand, &within, &components, unit)?;
+    let future_reading = future_reading(groups, &mean, &within, unit)?;
     Ok(OneWay {
         groups: k,
         readings: n,
@@ -102,81 +102,104 @@ pub fn analyse(groups: &Groups, unit: &str, confidence: f64) -> Result<OneWay, A
     })
 }
 
-/// The mean of all readings has the variance `σ_b² Σ n_i²/N² + σ_w²/N`, written here through the
-/// mean squares: with `q = Σ n_i² / (N n0)` it is `[q MS_b + (1 - q) MS_w] / N`, which for equal
-/// counts is `MS_b / N`. The degrees of freedom are Satterthwaite's for that sum.
+/// The mean `Σ p_i ȳ_i` of all readings, `p_i = n_i/N`, has the variance `Σ p_i² v_i` with
+/// `v_i = σ_b² + σ_w²/n_i`. The components say how the `v_i` compare with one another; how large they are
+/// is taken from the scatter of the group means alone, `q = Σ (ȳ_i - m)²/v_i / (k - 1)` about their mean
+/// `m` weighted by `1/v_i`, as Hartung and Knapp do it (J. Hartung, G. Knapp, *Statistics in Medicine* 20
+/// (2001) 3875). With `k - 1` degrees of freedom; for equal counts that is `MS_b/N`, exact for any `σ_b`.
 fn mean(
     groups: &Groups,
     grand: f64,
-    between: &MeanSquare,
     within: &MeanSquare,
     components: &Components,
     unit: &str,
 ) -> Result<Quantity, AnovaError> {
     let n = groups.readings() as f64;
-    let (variance, degrees) = match (between.mean_square, within.mean_square) {
-        (Some(b), Some(w)) if components.between_visible() => {
-            let q =
-                groups.sum_of_squared_counts() / (n * groups.effective_replicates().unwrap_or(1.0));
-            let variance = q * b + (1.0 - q) * w;
-            let spread = (q * b / variance).powi(2) / between.degrees_of_freedom as f64
-                + ((1.0 - q) * w / variance).powi(2) / within.degrees_of_freedom as f64;
-            (variance / n, 1.0 / spread)
-        }
-        (Some(b), None) => (b / n, between.degrees_of_freedom as f64),
-        // No scatter between groups shows: all readings are one sample.
-        _ => {
-            let degrees = between.degrees_of_freedom + within.degrees_of_freedom;
-            let squares = between.sum_of_squares + within.sum_of_squares;
-            (squares / degrees as f64 / n, degrees as f64)
-        }
-    };
-    let degrees = if variance > 0.0 {
-        DegreesOfFreedom::new(degrees)?
+    let list = groups.groups();
+    let (variance, degrees) = if list.len() == 1 {
+        (within.mean_square.unwrap_or(0.0) / n, n - 1.0)
     } else {
-        DegreesOfFreedom::new(n - 1.0)?
+        let sigma_b = components.between.map_or(1.0, |b| b.variance.max(0.0));
+        let sigma_w = within.mean_square.unwrap_or(0.0);
+        let spread = |g: &Group| {
+            let v = sigma_b + sigma_w / g.readings.len() as f64;
+            if v > 0.0 { v } else { 1.0 }
+        };
+        let weights: f64 = list.iter().map(|g| 1.0 / spread(g)).sum();
+        let deviations = list.iter().map(|g| (g.mean() - grand) / spread(g));
+        let centre = grand + deviations.sum::<f64>() / weights;
+        let degrees = list.len() as f64 - 1.0;
+        let q = list
+            .iter()
+            .map(|g| (g.mean() - centre).powi(2) / spread(g))
+            .sum::<f64>()
+            / degrees;
+        let variance = list
+            .iter()
+            .map(|g| (g.readings.len() as f64 / n).powi(2) * spread(g))
+            .sum::<f64>();
+        (q * variance, degrees)
     };
-    Ok(
-        Quantity::new("mean", grand, variance.max(0.0).sqrt(), unit)?
-            .with_degrees_of_freedom(degrees),
-    )
+    Ok(Quantity::new("mean", grand, variance.sqrt(), unit)?
+        .with_degrees_of_freedom(DegreesOfFreedom::new(degrees)?))
 }
 
-/// A reading of a new group: mean, the group's own deviation, the reading's own deviation.
+/// The probability with which the spread of the group means is taken to be at most what the degrees of
+/// freedom of a future reading count with.
+const CAUTIOUS: f64 = 0.75;
+
+/// A reading of a new group differs from the mean of all readings by the variance
+/// `(1 + a) σ_b² + (1 + 1/N) σ_w²`, `a = Σ n_i²/N²`. The new group's own deviation and the mean rest on the
+/// same group means, so they are one influence, `(1 + a) S²` with the variance `S²` of the group means, which
+/// estimates `σ_b² + σ_w²/h` (`h` the harmonic mean count); what is left to the scatter within a group is
+/// `(1 + 1/N - (1 + a)/h) MS_w`.
+///
+/// The degrees of freedom are Satterthwaite's for that sum. Where `S²` happens to be small the interval is
+/// short and `ν` large at once, and intervals of three groups hold 93 % instead of 95; so `ν` counts with the
+/// upper quartile of what `S²` says of its variance, `S² ν/χ²_ν(0.25)`.
 fn future_reading(
+    groups: &Groups,
     mean: &Quantity,
-    components: &Components,
+    within: &MeanSquare,
     unit: &str,
 ) -> Result<Option<Budget>, AnovaError> {
-    let Some(within) = &components.within else {
+    let Some(within_square) = within.mean_square else {
         return Ok(None);
     };
-    let mut inputs = vec![(mean.clone(), 1.0)];
-    if let Some(between) = &components.between {
-        inputs.push((
-            deviation("between groups", between.variance, between.degrees, unit)?,
-            1.0,
-        ));
-    }
-    inputs.push((
-        deviation("within a group", within.variance, within.degrees, unit)?,
-        1.0,
-    ));
+    let n = groups.readings() as f64;
+    let within_degrees = within.degrees_of_freedom as f64;
+    let within_influence = influence("within a group", within_square, within_degrees, unit)?;
+    let (inputs, degrees) = match groups.spread_of_means() {
+        None => (
+            vec![(within_influence, (1.0 + 1.0 / n).sqrt())],
+            DegreesOfFreedom::new(within_degrees)?,
+        ),
+        Some(spread) => {
+            let share = 1.0 + groups.sum_of_squared_counts() / (n * n);
+            let rest = (1.0 + 1.0 / n - share / spread.harmonic_count).max(0.0);
+            let caution = spread.degrees / chi_squared(spread.degrees)?.inverse_cdf(1.0 - CAUTIOUS);
+            let counted = |variance: f64, degrees| -> Result<_, AnovaError> {
+                Ok((variance.sqrt(), DegreesOfFreedom::new(degrees)?))
+            };
+            let degrees = welch_satterthwaite(&[
+                counted(caution * share * spread.variance, spread.degrees)?,
+                counted(rest * within_square, within_degrees)?,
+            ]);
+            let label = "between groups, with the mean";
+            let between = influence(label, spread.variance, spread.degrees, unit)?;
+            (
+                vec![(between, share.sqrt()), (within_influence, rest.sqrt())],
+                degrees,
+            )
+        }
+    };
     let independent = Correlation::none(inputs.len());
-    Ok(Some(Budget::combine(
-        "future reading",
-        mean.value,
-        unit,
-        inputs,
-        &independent,
-    )?))
+    let mut budget = Budget::combine("future reading", mean.value, unit, inputs, &independent)?;
+    budget.result = budget.result.with_degrees_of_freedom(degrees);
+    Ok(Some(budget))
 }
 
-fn deviation(
-    label: &str,
-    variance: f64,
-    degrees: DegreesOfFreedom,
-    unit: &str,
-) -> Result<Quantity, AnovaError> {
-    Ok(Quantity::new(label, 0.0, variance.max(0.0).sqrt(), unit)?.with_degrees_of_freedom(degrees))
+fn influence(label: &str, variance: f64, degrees: f64, unit: &str) -> Result<Quantity, AnovaError> {
+    Ok(Quantity::new(label, 0.0, variance.sqrt(), unit)?
+        .with_degrees_of_freedom(DegreesOfFreedom::new(degrees)?))
 }

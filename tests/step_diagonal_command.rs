@@ -268,6 +268,91 @@ fn report_shows_errors_and_ambiguities() {
     assert!(folder.read("out/residuals.csv").lines().count() > 30);
 }
 
+/// How well a slope is known changes no rank, and each of what it settles by as much as it must.
+#[test]
+fn a_slope_of_any_uncertainty_is_used_as_it_is() {
+    let folder = Folder::with(&[]);
+    let simulate = ["simulate", "step-diagonal", "--steps", "2"];
+    folder.write("d.csv", &run(&folder, &simulate).stdout);
+    let answer = |std: &str| {
+        let setup = format!("[[measured]]\naxis = \"X\"\nslope = 0.004\nstd = {std}\n");
+        folder.write("s.toml", &setup);
+        json(
+            &folder,
+            &[
+                "step-diagonal",
+                "d.csv",
+                "--setup",
+                "s.toml",
+                "--format",
+                "json",
+            ],
+        )
+    };
+    let usual = answer("5e-4");
+    for std in ["1e-60", "1e-12", "1e-9", "1e3", "1e60"] {
+        let found = answer(std);
+        assert_eq!(found["rank"], usual["rank"], "{std}");
+        assert_eq!(
+            found["degrees_of_freedom"], usual["degrees_of_freedom"],
+            "{std}"
+        );
+        let end = |answer: &Value, what: &str| component(answer, "EXX")[what][2].as_f64().unwrap();
+        // The far end of EXX rests on the slope alone: travel times the slope, and its uncertainty.
+        let expected = 600.0 * std.parse::<f64>().unwrap();
+        // epsilons through the condition of the readings
+        assert!((end(&found, "value") / 2.4 - 1.0).abs() < 1e-9, "{std}");
+        assert!((end(&found, "std") / expected - 1.0).abs() < 1e-9, "{std}");
+        // What the readings alone determine stays as it is.
+        let other = |answer: &Value| component(answer, "EBY")["std"][2].as_f64().unwrap();
+        assert!((other(&found) / other(&usual) - 1.0).abs() < 1e-9, "{std}");
+    }
+    let setup = "[[measured]]\naxis = \"X\"\nslope = 0.004\nstd = 1e-200\n";
+    folder.write("s.toml", setup);
+    bad_input(
+        &folder,
+        &[
+            "step-diagonal",
+            "d.csv",
+            "--setup",
+            "s.toml",
+            "--out",
+            "out",
+        ],
+        &["standard uncertainty of the measured positioning slope of X"],
+    );
+}
+
+/// Readings times a power of two: everything else too, also where squares leave the range of numbers.
+#[test]
+fn the_size_of_the_readings_does_not_matter() {
+    let folder = Folder::with(&[]);
+    let simulate = ["simulate", "step-diagonal", "--steps", "2"];
+    let readings = run(&folder, &simulate).stdout;
+    let answer = |factor: f64| {
+        let scaled: Vec<String> = readings
+            .lines()
+            .map(|line| match line.rsplit_once(',') {
+                Some((rest, value)) => match value.parse::<f64>() {
+                    Ok(value) => format!("{rest},{:e}", factor * value),
+                    Err(_) => line.to_owned(),
+                },
+                None => line.to_owned(),
+            })
+            .collect();
+        folder.write("d.csv", &(scaled.join("\n") + "\n"));
+        json(&folder, &["step-diagonal", "d.csv", "--format", "json"])
+    };
+    let usual = answer(1.0);
+    let noise = |answer: &Value| answer["noise"]["value"].as_f64().unwrap();
+    for factor in [2f64.powi(-600), 2f64.powi(515)] {
+        let found = answer(factor);
+        assert_eq!(found["rank"], usual["rank"]);
+        // epsilons
+        assert!((noise(&found) / factor / noise(&usual) - 1.0).abs() < 1e-12);
+    }
+}
+
 #[test]
 fn bad_readings_are_refused() {
     let header = "diagonal,sequence,x,y,z,reading\n";
@@ -289,12 +374,17 @@ fn bad_readings_are_refused() {
         (
             "path.csv",
             good.replace("100,0,0,1", "0,100,0,1"),
-            "no stop of diagonal AG",
+            "path.csv:4:1: position [0, 1, 0] (in steps) is no stop of diagonal AG",
         ),
         (
             "twice.csv",
             format!("{good}AG,XYZ,0,0,0,0\n"),
-            "repeats a stop",
+            "twice.csv:6:1: it repeats a stop",
+        ),
+        (
+            "unit.csv",
+            good.replace("100", "1e155"),
+            "the travel of X is 1e155 mm",
         ),
         (
             "uneven.csv",
@@ -324,11 +414,33 @@ fn bad_readings_are_refused() {
             "std.toml",
             "[[measured]]\naxis = \"X\"\nslope = 0.0\nstd = 0.0\n",
         ),
+        (
+            "slope.toml",
+            "[[measured]]\naxis = \"X\"\nslope = nan\nstd = 0.1\n",
+        ),
+        ("zero_noise.toml", "[test]\nnoise = 0\n"),
+        ("less.toml", "[test]\nnoise = -1\n"),
+        ("none.toml", "[test]\nnoise = nan\n"),
+        ("endless.toml", "[test]\nnoise = inf\n"),
     ]);
     let with = |setup: &'static str| ["step-diagonal", "d.csv", "--out", "out", "--setup", setup];
     bad_input(&folder, &with("zero.toml"), &["zero.toml:2", "EXQ"]);
     bad_input(&folder, &with("key.toml"), &["did you mean `target`"]);
-    bad_input(&folder, &with("std.toml"), &["standard uncertainty"]);
+    bad_input(
+        &folder,
+        &with("std.toml"),
+        &["std.toml:4:7", "standard uncertainty"],
+    );
+    bad_input(&folder, &with("slope.toml"), &["slope.toml:3:9", "NaN"]);
+    for (setup, noise) in [
+        ("zero_noise.toml", "0"),
+        ("less.toml", "-1"),
+        ("none.toml", "NaN"),
+        ("endless.toml", "inf"),
+    ] {
+        let place = format!("{setup}:2:9: the noise of a reading is {noise}");
+        bad_input(&folder, &with(setup), &[&place]);
+    }
     bad_input(
         &folder,
         &["simulate", "step-diagonal", "--steps", "0"],

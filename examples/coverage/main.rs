@@ -9,6 +9,7 @@
 mod anova;
 mod circle;
 mod machine;
+mod step_diagonal;
 mod tally;
 
 use std::process::ExitCode;
@@ -21,8 +22,9 @@ type Room = (&'static str, u64, fn(u64) -> Vec<Row>);
 /// One line a model.
 const ROOMS: &[Room] = &[
     ("circle", 2000, circle::rows),
-    ("anova", 2000, anova::rows),
+    ("step-diagonal", 2000, step_diagonal::rows),
     ("machine", 2000, machine::rows),
+    ("anova", 2000, anova::rows),
 ];
 
 fn main() -> ExitCode {

@@ -87,6 +87,16 @@ fn refuses_what_does_not_turn() {
         find_turning(&still[..9], None),
         Err(NoTraces::TooFew { samples: 9 })
     );
+    // Far more turns than samples, and less than one turn.
+    for per_second in [1e8 / 60.0, 1e300, 1e-9] {
+        assert!(
+            matches!(
+                find_turning(&run(0.1, 1), Some(per_second)),
+                Err(NoTraces::Speed { .. })
+            ),
+            "{per_second}"
+        );
+    }
     let mut back = still.clone();
     back[7].time = 1.0;
     assert_eq!(find_turning(&back, None), Err(NoTraces::Time { index: 7 }));

@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::bounds::ActiveBound;
+use crate::loss::Loss;
 use crate::outcome::{Combination, Fit};
 
 /// Covariance of the parameters, in the parameters' own order and units.
@@ -29,6 +30,9 @@ pub struct Covariance {
     pub active_bounds: Vec<ActiveBound>,
     /// For each parameter whether some undetermined combination moves it.
     loose: Vec<bool>,
+    /// The matrix and the residual variance for residuals counted in a unit in which neither leaves
+    /// the range of numbers.
+    counted: (DMatrix<f64>, Option<f64>),
 }
 
 impl Covariance {
@@ -62,24 +66,27 @@ impl Covariance {
             .collect();
         let held = triangle.dependent().iter().map(|&a| free[a]).collect();
         let degrees_of_freedom = fit.degrees_of_freedom();
+        let matrix = matrix * robust_factor(fit);
+        let variance = residual_variance(fit);
         Self {
-            matrix: matrix * robust_factor(fit),
+            matrix: &matrix / fit.unit / fit.unit,
             names: fit.names.clone(),
             degrees_of_freedom,
-            residual_variance: residual_variance(fit),
+            residual_variance: variance.map(|v| v * fit.unit * fit.unit),
             undetermined,
             held,
             active_bounds: fit.active_bounds.clone(),
             loose,
+            counted: (matrix, variance),
         }
     }
 
     /// The covariance for residuals whose common standard deviation is unknown: multiplied by the
     /// residual variance. `None` without degrees of freedom to estimate that from.
     pub fn scaled_by_residuals(&self) -> Option<Self> {
-        let variance = self.residual_variance?;
+        let (matrix, variance) = &self.counted;
         Some(Self {
-            matrix: &self.matrix * variance,
+            matrix: matrix * (*variance)?,
             ..self.clone()
         })
     }
@@ -142,15 +149,21 @@ fn free_parameters(fit: &Fit) -> Vec<usize> {
         .collect()
 }
 
+/// The residuals in the unit of the fit, and the loss for them.
+fn counted(fit: &Fit) -> (DVector<f64>, Loss) {
+    (&fit.residuals / fit.unit, fit.loss.in_unit(fit.unit))
+}
+
 /// ψ = ρ′ r and its derivative ρ′ + 2sρ″, averaged as Huber's covariance needs them.
 fn influence(fit: &Fit) -> (f64, f64, f64) {
     let m = fit.residuals.len() as f64;
     let mut squares = 0.0;
     let mut slopes = 0.0;
     let mut slope_squares = 0.0;
-    for r in fit.residuals.iter() {
+    let (residuals, loss) = counted(fit);
+    for r in residuals.iter() {
         let s = r * r;
-        let at = fit.loss.at(s);
+        let at = loss.at(s);
         let slope = at.first + 2.0 * s * at.second;
         squares += (at.first * r).powi(2);
         slopes += slope;
@@ -168,7 +181,7 @@ fn residual_variance(fit: &Fit) -> Option<f64> {
         return None;
     }
     if fit.loss.scale().is_none() {
-        return Some(fit.residuals.norm_squared() / freedom as f64);
+        return Some(counted(fit).0.norm_squared() / freedom as f64);
     }
     let (squares, mean, variance) = influence(fit);
     let share = fit.triangle.rank() as f64 / fit.residuals.len() as f64;

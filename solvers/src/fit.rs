@@ -78,12 +78,18 @@ pub fn fit_with<'a, P: Problem + ?Sized>(
         jacobian_evaluations: count("jacobian_count") + 1,
     };
     let system = run.problem.get_problem().ok_or_else(lost)?;
+    let unit = run.solver.unit;
     let point = match run.solver.point {
         Some(point) => point,
         // A checkpoint of a finished run carries parameters only.
-        None => point_at(&system, run.state.get_param().cloned().ok_or_else(lost)?)?,
+        None => {
+            let parameters = run.state.get_param().cloned().ok_or_else(lost)?;
+            run.solver
+                .check_lengths(problem.parameter_count(), &parameters)?;
+            point_at(&system, parameters, unit)?
+        }
     };
-    assemble(problem, &system, point, ending, effort, options)
+    assemble(problem, &system, (point, unit), ending, effort, options)
 }
 
 /// Fits a separable problem by variable projection from a start of its nonlinear parameters
@@ -130,14 +136,15 @@ pub fn fit_separable<P: SeparableProblem + ?Sized>(
         ..options.clone()
     };
     let system = dense(&joint, &free);
-    let point = point_at(&system, all)?;
+    let unit = projected.unit;
+    let point = point_at(&system, all, unit)?;
     let ending = joint_ending(projected.ending, &joint, &point);
     let effort = Effort {
         iterations: projected.iterations,
         residual_evaluations: projected.residual_evaluations,
         jacobian_evaluations: projected.jacobian_evaluations,
     };
-    assemble(&joint, &system, point, ending, effort, &free)
+    assemble(&joint, &system, (point, unit), ending, effort, &free)
 }
 
 /// The ending in all parameters: a minimum may leave linear parameters undetermined.
@@ -188,11 +195,12 @@ fn names_of<P: Problem + ?Sized>(problem: &P) -> Vec<String> {
 fn point_at<P: Problem + ?Sized>(
     system: &Dense<'_, P>,
     parameters: DVector<f64>,
+    unit: f64,
 ) -> Result<Point<DenseModel>, FitError> {
     let evaluation = system
-        .evaluate(&parameters)
+        .evaluate(&parameters, unit)
         .map_err(|no| FitError::NoValueAtStart { reason: no.reason })?;
-    let model = system.linearize(&parameters, &evaluation)?;
+    let model = system.linearize(&parameters, &evaluation, unit)?;
     Ok(Point {
         parameters,
         evaluation,
@@ -203,7 +211,7 @@ fn point_at<P: Problem + ?Sized>(
 fn assemble<P: Problem + ?Sized>(
     problem: &P,
     system: &Dense<'_, P>,
-    point: Point<DenseModel>,
+    (point, unit): (Point<DenseModel>, f64),
     ending: Ending,
     effort: Effort,
     options: &Options,
@@ -223,6 +231,7 @@ fn assemble<P: Problem + ?Sized>(
     let next_step = relative_step(&model, &parameters, &active_bounds);
     let triangle = free_triangle(
         &jacobian,
+        unit,
         &evaluation.residuals,
         model,
         options,
@@ -230,9 +239,9 @@ fn assemble<P: Problem + ?Sized>(
     );
     Ok(Fit {
         parameters,
-        residuals: evaluation.residuals,
+        residuals: evaluation.residuals * unit,
         jacobian,
-        cost: evaluation.cost,
+        cost: evaluation.cost * unit * unit,
         ending,
         iterations: effort.iterations,
         residual_evaluations: effort.residual_evaluations,
@@ -242,6 +251,7 @@ fn assemble<P: Problem + ?Sized>(
         active_bounds,
         loss: options.loss,
         triangle,
+        unit,
     })
 }
 
@@ -365,10 +375,11 @@ fn relative_step(model: &DenseModel, parameters: &DVector<f64>, active: &[Active
     if length > 0.0 { step / length } else { step }
 }
 
-/// The triangle of the plain Jacobian in the free parameters: that of the last model unless a
-/// robust loss has weighted its rows.
+/// The triangle of the plain Jacobian, of residuals in `unit`, in the free parameters: that of the
+/// last model unless a robust loss has weighted its rows.
 fn free_triangle(
     jacobian: &nalgebra::DMatrix<f64>,
+    unit: f64,
     residuals: &DVector<f64>,
     model: DenseModel,
     options: &Options,
@@ -376,7 +387,7 @@ fn free_triangle(
 ) -> Triangle {
     let plain = if options.loss.scale().is_some() {
         DenseModel::new(
-            jacobian.clone(),
+            jacobian / unit,
             residuals,
             options.factorization,
             options.rank_tolerance,

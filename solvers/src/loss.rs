@@ -77,6 +77,25 @@ impl Loss {
         }
     }
 
+    /// The same loss for residuals counted in `unit`.
+    pub(crate) fn in_unit(self, unit: f64) -> Self {
+        match self {
+            Self::Quadratic => Self::Quadratic,
+            Self::Huber { scale } => Self::Huber {
+                scale: scale / unit,
+            },
+            Self::SoftL1 { scale } => Self::SoftL1 {
+                scale: scale / unit,
+            },
+            Self::Cauchy { scale } => Self::Cauchy {
+                scale: scale / unit,
+            },
+            Self::Tukey { scale } => Self::Tukey {
+                scale: scale / unit,
+            },
+        }
+    }
+
     /// ½ Σ ρ(rᵢ²).
     pub fn cost(&self, residuals: &[f64]) -> f64 {
         0.5 * residuals.iter().map(|r| self.at(r * r).value).sum::<f64>()

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use crate::bounds::ActiveBound;
 use crate::covariance::Covariance;
+use crate::linear::pivoted_qr::norm;
 use crate::linear::triangle::Triangle;
 use crate::loss::Loss;
 
@@ -41,6 +42,18 @@ pub enum Ending {
     /// No step along the direction of descent lowers the cost: the Jacobian does not belong to
     /// the residuals, or the residuals are not smooth.
     NoDescent,
+    /// Every step that would lower the cost leads to where the model has no value: no minimum.
+    AtWall {
+        /// Why there is no value, in the model's own words.
+        reason: String,
+    },
+    /// The cost falls on and on while a parameter grows: there is no minimum at finite parameters.
+    RunsAway {
+        /// The name of the parameter.
+        parameter: String,
+    },
+    /// The squares of the residuals are too large or too small for floating-point numbers.
+    OutOfRange,
     /// The caller raised the stop flag or interrupted the run.
     StoppedByUser,
 }
@@ -129,6 +142,19 @@ impl fmt::Display for Ending {
             Self::TimeLimit => f.write_str("time limit reached before a minimum"),
             Self::NoDescent => f.write_str(
                 "no descent: no step lowers the cost, check the Jacobian against the residuals",
+            ),
+            Self::AtWall { reason } => write!(
+                f,
+                "at a wall: every step that lowers the cost leads to where the model has no value \
+                 ({reason}); this is no minimum"
+            ),
+            Self::RunsAway { parameter } => write!(
+                f,
+                "no minimum: the cost falls on and on while `{parameter}` grows"
+            ),
+            Self::OutOfRange => f.write_str(
+                "out of range: the squares of the residuals overflow or vanish, \
+                 give the residuals in another unit",
             ),
             Self::StoppedByUser => f.write_str("stopped by the user before a minimum"),
         }
@@ -244,6 +270,17 @@ pub enum FitError {
         /// Index of the residual.
         residual: usize,
     },
+    /// A checkpoint that belongs to another problem.
+    #[error(
+        "the checkpoint is of a problem with {found} parameters, this one has {expected}: \
+         remove it to start afresh"
+    )]
+    CheckpointLength {
+        /// Number of parameters.
+        expected: usize,
+        /// Number of parameters in the checkpoint.
+        found: usize,
+    },
     /// An observer or a checkpoint failed.
     #[error("the run was broken off: {reason}")]
     BrokenOff {
@@ -261,7 +298,8 @@ pub struct Fit {
     pub residuals: DVector<f64>,
     /// The Jacobian at the parameters, without the loss, m × n.
     pub jacobian: DMatrix<f64>,
-    /// ½ Σ ρ(rᵢ²): half the sum of squares for ordinary least squares.
+    /// ½ Σ ρ(rᵢ²): half the sum of squares for ordinary least squares. Infinite or zero where that
+    /// is beyond the range of numbers.
     pub cost: f64,
     /// Why the fit ended.
     pub ending: Ending,
@@ -280,8 +318,10 @@ pub struct Fit {
     pub active_bounds: Vec<ActiveBound>,
     /// The loss that was minimised.
     pub loss: Loss,
-    /// The triangle of the Jacobian in the parameters not held by a bound.
+    /// The triangle of the Jacobian in the parameters not held by a bound, of residuals in `unit`.
     pub(crate) triangle: Triangle,
+    /// The power of two in which residuals were counted while fitting.
+    pub(crate) unit: f64,
 }
 
 impl Fit {
@@ -293,7 +333,7 @@ impl Fit {
     /// √(Σ r² / ν): the residual standard deviation, `None` without degrees of freedom.
     pub fn residual_deviation(&self) -> Option<f64> {
         let freedom = self.degrees_of_freedom();
-        (freedom > 0).then(|| (self.residuals.norm_squared() / freedom as f64).sqrt())
+        (freedom > 0).then(|| norm(self.residuals.as_slice()) / (freedom as f64).sqrt())
     }
 
     /// The covariance of the parameters for residuals in units of their standard deviation; for

@@ -198,6 +198,61 @@ fn a_killed_run_continues_to_the_same_end() {
     );
 }
 
+/// Readings of a parabola: three parameters.
+struct Parabola;
+
+impl Problem for Parabola {
+    fn parameter_count(&self) -> usize {
+        3
+    }
+
+    fn residual_count(&self) -> usize {
+        5
+    }
+
+    fn residuals(&self, p: &DVector<f64>) -> Result<DVector<f64>, NoValue> {
+        Ok(DVector::from_fn(5, |i, _| {
+            let x = i as f64;
+            p[0] + p[1] * x + p[2] * x * x - (1.0 + 0.3 * x).exp()
+        }))
+    }
+
+    fn jacobian(&self, _: &DVector<f64>) -> Result<DMatrix<f64>, NoValue> {
+        Ok(DMatrix::from_fn(5, 3, |i, j| (i as f64).powi(j as i32)))
+    }
+}
+
+#[test]
+fn a_checkpoint_of_a_problem_of_another_size_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // One saved in the middle of a run, one at its end.
+    for iterations in [3, 1000] {
+        let file = folder.path().join(format!("after{iterations}"));
+        let options = Options {
+            max_iterations: iterations,
+            ..Options::default()
+        };
+        fit_with(&Valley, dvector![-1.2, 1.0], &options, |executor| {
+            executor.checkpointing(CheckpointFile::new(&file, 1))
+        })
+        .expect("a good problem");
+        for limit in [iterations, 2000] {
+            let options = Options {
+                max_iterations: limit,
+                ..Options::default()
+            };
+            let other = fit_with(&Parabola, dvector![0.0, 0.0, 0.0], &options, |executor| {
+                executor.checkpointing(CheckpointFile::new(&file, 1))
+            });
+            let expected = FitError::CheckpointLength {
+                expected: 3,
+                found: 2,
+            };
+            assert_eq!(other.expect_err("another size"), expected);
+        }
+    }
+}
+
 #[test]
 fn endings_are_sentences() {
     let fit = fit(&Valley, dvector![-1.2, 1.0], &Options::default()).expect("a good problem");

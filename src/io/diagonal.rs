@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use errsep_models::diagonal::{
-    Component, Diagonal, DiagonalReading, Sequence, Target, Travel, WorkZone,
+    Component, Diagonal, DiagonalReading, Sequence, Target, Travel, WorkZone, check,
 };
 use errsep_models::uncertainty::DegreesOfFreedom;
 use serde::Deserialize;
@@ -34,7 +34,14 @@ pub struct TestSetup {
     /// `mirror` or `retro-reflector`, for data without the column.
     pub target: Option<Target>,
     /// Standard deviation of one reading, µm.
-    pub noise: Option<f64>,
+    pub noise: Option<Spanned<f64>>,
+}
+
+impl TestSetup {
+    /// The standard deviation of one reading, µm, where it is stated.
+    pub fn noise_um(&self) -> Option<f64> {
+        self.noise.as_ref().map(|noise| *noise.get_ref())
+    }
 }
 
 /// `[assume]`.
@@ -53,9 +60,9 @@ pub struct MeasuredSetup {
     /// Axis.
     pub axis: errsep_models::diagonal::Axis,
     /// Positioning slope by end points, µm/mm.
-    pub slope: f64,
+    pub slope: Spanned<f64>,
     /// Its standard uncertainty, µm/mm.
-    pub std: f64,
+    pub std: Spanned<f64>,
     /// How well that is known; absent: infinite.
     pub degrees_of_freedom: Option<DegreesOfFreedom>,
 }
@@ -64,10 +71,38 @@ impl DiagonalSetup {
     /// Reads the set-up and the errors it takes as zero.
     ///
     /// # Errors
-    /// Those of [`SetupFile`]; a name that is no error function.
+    /// Those of [`SetupFile`]; a name that is no error function; a standard deviation or uncertainty
+    /// that is not greater than zero, or a number that is not finite.
     pub fn read(path: &Path) -> Result<(Self, Vec<Component>), Message> {
         let file = SetupFile::read(path)?;
         let setup: Self = file.parse()?;
+        let positive = |value: &Spanned<f64>, what: &str| {
+            let number = *value.get_ref();
+            if number > 0.0 && number.is_finite() {
+                return Ok(());
+            }
+            Err(file.bad(
+                value.span(),
+                format!("{what} is {number}: it must be greater than zero and finite"),
+                "give the value, or remove the line where it is not known",
+            ))
+        };
+        if let Some(noise) = &setup.test.noise {
+            positive(noise, "the noise of a reading")?;
+        }
+        for measured in &setup.measured {
+            positive(
+                &measured.std,
+                "the standard uncertainty of a measured slope",
+            )?;
+            if !measured.slope.get_ref().is_finite() {
+                return Err(file.bad(
+                    measured.slope.span(),
+                    format!("the measured slope is {}", measured.slope.get_ref()),
+                    "give the slope in um/mm",
+                ));
+            }
+        }
         let mut zero = Vec::new();
         for name in &setup.assume.zero {
             zero.push(Component::from_name(name.get_ref()).ok_or_else(|| {
@@ -87,7 +122,8 @@ impl DiagonalSetup {
 /// `repeat`, `direction` and `target`; the work zone is the box that the positions fill.
 ///
 /// # Errors
-/// The table cannot be read, a name is unknown, or the positions make no grid.
+/// The table cannot be read, a name is unknown, the positions make no grid, or a reading is no stop
+/// of its run or repeats one.
 pub fn read_readings(
     path: &Path,
     target: Option<Target>,
@@ -181,6 +217,7 @@ pub fn read_readings(
         steps = steps.max(stops.len() - 1);
     }
     let zone = WorkZone { travel, steps };
+    let mut lines = Vec::with_capacity(rows.len());
     let mut readings = Vec::with_capacity(rows.len());
     for (line, position, mut reading) in rows {
         for a in 0..3 {
@@ -201,7 +238,16 @@ pub fn read_readings(
                 reading.at[a] = place.round() as usize;
             }
         }
+        lines.push(line);
         readings.push(reading);
     }
+    check(&zone, &readings).map_err(|e| match e.at_reading() {
+        Some((index, what)) => table
+            .at_line(lines.get(index).copied().unwrap_or(0), what)
+            .remedy("each run visits the stops of its diagonal in its sequence, each once"),
+        None => Message::bad_input(e.to_string())
+            .in_file(path)
+            .remedy("give the positions in mm, the same number of even steps on every axis"),
+    })?;
     Ok((zone, readings))
 }

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use errsep_solvers::linear::limited::svd;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -45,7 +46,7 @@ pub fn lack_of_fit(
     if within == 0.0 || between == 0.0 || pure <= 0.0 {
         return None;
     }
-    let factor = columns.clone().svd(true, true);
+    let factor = svd(columns.clone(), true, true)?;
     if factor.rank(1e-12 * factor.singular_values.amax()) < unknowns {
         return None;
     }

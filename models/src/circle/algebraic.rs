@@ -5,7 +5,8 @@
 //! and N. Chernov, *Error analysis for circle fitting algorithms*, Electron. J. Stat. 3 (2009).
 
 use super::points::{Circle, CircleError, Frame, Point, check_points};
-use nalgebra::{DMatrix, Matrix3, Matrix4, SymmetricEigen, Vector4};
+use errsep_solvers::linear::limited;
+use nalgebra::{DMatrix, Matrix3, Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
 
 /// Which algebraic fit.
@@ -96,7 +97,7 @@ fn taubin(factor: &Matrix4<f64>, mean_square: f64) -> Option<Vector4<f64>> {
     for i in 0..3 {
         block[(i, 2)] /= scale;
     }
-    let svd = block.svd(false, true);
+    let svd = limited::svd(block, false, true)?;
     let direction = svd
         .v_t?
         .row(least_index(svd.singular_values.as_slice()))
@@ -114,7 +115,7 @@ fn taubin(factor: &Matrix4<f64>, mean_square: f64) -> Option<Vector4<f64>> {
 /// symmetric block [[0, cross], [cross, corner]] at (D, A). Written for 1/η with M = V Σ² Vᵀ, it is the
 /// greatest eigenvalue of Σ⁻¹ Vᵀ N V Σ⁻¹, which keeps its digits when the points are almost exact.
 fn constrained(factor: &Matrix4<f64>, cross: f64, corner: f64) -> Option<Vector4<f64>> {
-    let svd = factor.svd(false, true);
+    let svd = limited::svd(*factor, false, true)?;
     let v_t = svd.v_t?;
     let least = least_index(svd.singular_values.as_slice());
     let greatest = svd.singular_values.max();
@@ -127,7 +128,7 @@ fn constrained(factor: &Matrix4<f64>, cross: f64, corner: f64) -> Option<Vector4
     constraint[(0, 3)] = cross;
     constraint[(3, 0)] = cross;
     let inverse = Matrix4::from_diagonal(&svd.singular_values.map(|s| 1.0 / s));
-    let eigen = SymmetricEigen::new(inverse * v_t * constraint * v_t.transpose() * inverse);
+    let eigen = limited::symmetric_eigen(inverse * v_t * constraint * v_t.transpose() * inverse)?;
     let chosen = eigen.eigenvalues.imax();
     (eigen.eigenvalues[chosen] > 0.0)
         .then(|| v_t.transpose() * inverse * eigen.eigenvectors.column(chosen))

@@ -4,6 +4,7 @@ use super::components::{Axis, Component, NodeKind};
 use super::diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
 use super::prediction::{Parameter, Unknowns, sensitivities};
 use super::readings::{DiagonalError, DiagonalReading, Run};
+use errsep_solvers::linear::limited;
 use nalgebra::{DMatrix, DVector};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -155,8 +156,15 @@ pub(super) struct Decomposition {
     pub(super) null: DMatrix<f64>,
 }
 
-pub(super) fn decompose(matrix: &DMatrix<f64>) -> Result<Decomposition, DiagonalError> {
+/// Singular values below `floor` or a billionth of the greatest count as zero.
+pub(super) fn decompose(matrix: &DMatrix<f64>, floor: f64) -> Result<Decomposition, DiagonalError> {
     let n = matrix.ncols();
+    if matrix.is_empty() {
+        return Ok(Decomposition {
+            determined: Vec::new(),
+            null: DMatrix::identity(n, n),
+        });
+    }
     let triangle = if matrix.nrows() > n {
         matrix.clone().qr().unpack_r()
     } else {
@@ -164,10 +172,8 @@ pub(super) fn decompose(matrix: &DMatrix<f64>) -> Result<Decomposition, Diagonal
         square.rows_mut(0, matrix.nrows()).copy_from(matrix);
         square
     };
-    let svd = nalgebra::SVD::try_new(triangle, false, true, f64::EPSILON, 0).ok_or_else(|| {
-        DiagonalError::Numerical {
-            reason: "the singular values did not converge".to_owned(),
-        }
+    let svd = limited::svd(triangle, false, true).ok_or_else(|| DiagonalError::Numerical {
+        reason: "the singular values did not converge".to_owned(),
     })?;
     let v_t = svd.v_t.ok_or_else(|| DiagonalError::Numerical {
         reason: "no singular vectors".to_owned(),
@@ -177,7 +183,7 @@ pub(super) fn decompose(matrix: &DMatrix<f64>) -> Result<Decomposition, Diagonal
     let mut null = Vec::new();
     for (i, &value) in svd.singular_values.iter().enumerate() {
         let vector: DVector<f64> = v_t.row(i).transpose();
-        if value > RANK_TOLERANCE * greatest {
+        if value > floor.max(RANK_TOLERANCE * greatest) {
             determined.push((value, vector));
         } else {
             null.push(vector);
@@ -220,9 +226,9 @@ pub fn identifiability(
     Ok(Identifiability {
         readings: readings.len() - all.runs.len(),
         parameters: all.unknowns.parameters.len(),
-        rank: decompose(&all.matrix)?.determined.len(),
+        rank: decompose(&all.matrix, 0.0)?.determined.len(),
         defined_parameters: defined.unknowns.parameters.len(),
-        defined_rank: decompose(&defined.matrix)?.determined.len(),
+        defined_rank: decompose(&defined.matrix, 0.0)?.determined.len(),
     })
 }
 

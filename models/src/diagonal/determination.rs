@@ -4,7 +4,9 @@
 use super::components::{Axis, Component, Location, NodeKind};
 use super::design::{Function, nodes_of};
 use super::prediction::{Parameter, Unknowns};
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use super::readings::DiagonalError;
+use errsep_solvers::linear::limited::symmetric_eigen;
+use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
 /// Squared length below which part of an orthonormal null vector counts as none. Null vectors are
@@ -202,24 +204,30 @@ pub(super) fn open_shape(function: Function, nodes: &[(usize, usize)]) -> DVecto
 }
 
 /// The part of a null basis that leaves a block alone.
-fn without(basis: &DMatrix<f64>, block: &Block) -> DMatrix<f64> {
+fn without(basis: &DMatrix<f64>, block: &Block) -> Result<DMatrix<f64>, DiagonalError> {
     if basis.ncols() == 0 {
-        return basis.clone();
+        return Ok(basis.clone());
     }
     let part = block.coordinates(basis);
     if part.norm_squared() <= NOTHING {
-        return basis.clone();
+        return Ok(basis.clone());
     }
-    let eigen = SymmetricEigen::new(part.transpose() * part);
+    let eigen = eigen(part.transpose() * part)?;
     let kept: Vec<DVector<f64>> = (0..basis.ncols())
         .filter(|&i| eigen.eigenvalues[i] <= NOTHING)
         .map(|i| basis * eigen.eigenvectors.column(i))
         .collect();
-    if kept.is_empty() {
+    Ok(if kept.is_empty() {
         DMatrix::zeros(basis.nrows(), 0)
     } else {
         DMatrix::from_columns(&kept)
-    }
+    })
+}
+
+fn eigen(matrix: DMatrix<f64>) -> Result<SymmetricEigen<f64, Dyn>, DiagonalError> {
+    symmetric_eigen(matrix).ok_or_else(|| DiagonalError::Numerical {
+        reason: "the eigenvalues did not converge".to_owned(),
+    })
 }
 
 /// How far one function is determined, and an orthonormal basis (free nodes × lost) of the
@@ -228,14 +236,14 @@ pub(super) fn determination(
     unknowns: &Unknowns,
     null: &DMatrix<f64>,
     function: Function,
-) -> (Determined, DMatrix<f64>) {
+) -> Result<(Determined, DMatrix<f64>), DiagonalError> {
     let nodes = nodes_of(unknowns, function);
     let rows: Vec<usize> = nodes.iter().map(|n| n.0).collect();
     if rows.is_empty() {
-        return (Determined::NotTouched, DMatrix::zeros(0, 0));
+        return Ok((Determined::NotTouched, DMatrix::zeros(0, 0)));
     }
     let own = null.select_rows(&rows);
-    let eigen = SymmetricEigen::new(&own * own.transpose());
+    let eigen = eigen(&own * own.transpose())?;
     let lost: Vec<DVector<f64>> = (0..rows.len())
         .filter(|&i| eigen.eigenvalues[i] > NOTHING)
         .map(|i| eigen.eigenvectors.column(i).into_owned())
@@ -255,11 +263,14 @@ pub(super) fn determination(
     } else {
         DMatrix::from_columns(&lost)
     };
-    (determined, lost)
+    Ok((determined, lost))
 }
 
 /// The ambiguities, each reduced to a least set, without repetition.
-pub(super) fn ambiguities(unknowns: &Unknowns, null: &DMatrix<f64>) -> Vec<Ambiguity> {
+pub(super) fn ambiguities(
+    unknowns: &Unknowns,
+    null: &DMatrix<f64>,
+) -> Result<Vec<Ambiguity>, DiagonalError> {
     let all = blocks(unknowns);
     let mut order: Vec<usize> = (0..all.len()).collect();
     order.sort_by_key(|&b| all[b].rank);
@@ -278,7 +289,7 @@ pub(super) fn ambiguities(unknowns: &Unknowns, null: &DMatrix<f64>) -> Vec<Ambig
             if candidate == subject {
                 continue;
             }
-            let reduced = without(&basis, &all[candidate]);
+            let reduced = without(&basis, &all[candidate])?;
             if reduced.ncols() > 0 && all[subject].moved_by(&reduced) {
                 basis = reduced;
                 members.retain(|&m| m != candidate);
@@ -290,7 +301,7 @@ pub(super) fn ambiguities(unknowns: &Unknowns, null: &DMatrix<f64>) -> Vec<Ambig
             found.push((members, ambiguity));
         }
     }
-    found.into_iter().map(|f| f.1).collect()
+    Ok(found.into_iter().map(|f| f.1).collect())
 }
 
 fn describe(members: &[&Block]) -> Ambiguity {
@@ -332,24 +343,31 @@ fn list(items: &[&str]) -> String {
 }
 
 /// What each single further measurement would settle; those that settle nothing are left out.
-pub(super) fn remedies(unknowns: &Unknowns, null: &DMatrix<f64>) -> Vec<Remedy> {
+pub(super) fn remedies(
+    unknowns: &Unknowns,
+    null: &DMatrix<f64>,
+) -> Result<Vec<Remedy>, DiagonalError> {
     let all = blocks(unknowns);
-    all.iter()
+    let mut remedies = Vec::new();
+    let measurable = all
+        .iter()
         .filter(|b| b.rank == 0 || b.part == Part::Slope)
-        .filter(|b| b.moved_by(null))
-        .filter_map(|known| {
-            let rest = without(null, known);
-            let settles: Vec<String> = all
-                .iter()
-                .filter(|b| b.moved_by(null) && !b.moved_by(&rest) && b.name != known.name)
-                .map(|b| b.name.clone())
-                .collect();
-            (!settles.is_empty()).then(|| Remedy {
+        .filter(|b| b.moved_by(null));
+    for known in measurable {
+        let rest = without(null, known)?;
+        let settles: Vec<String> = all
+            .iter()
+            .filter(|b| b.moved_by(null) && !b.moved_by(&rest) && b.name != known.name)
+            .map(|b| b.name.clone())
+            .collect();
+        if !settles.is_empty() {
+            remedies.push(Remedy {
                 measure: known.name.clone(),
                 settles,
-            })
-        })
-        .collect()
+            });
+        }
+    }
+    Ok(remedies)
 }
 
 /// Gradient of the positioning slope of an axis in µm/mm by end points, in its free nodes.

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::design::{Design, is_definition};
 use super::effects;
 use super::prediction::{Parameter, sensitivities};
-use super::readings::{DiagonalError, DiagonalReading, check};
+use super::readings::{DiagonalError, DiagonalReading, check, check_noise};
 use super::{Component, Diagonal, Sequence, Target, Travel, WorkZone};
 use crate::model::{Effect, FittedModel, Freedom, Place, Record};
 
@@ -44,6 +44,7 @@ impl DiagonalRuns {
         noise: Option<f64>,
     ) -> Result<Self, DiagonalError> {
         check(zone, readings)?;
+        check_noise(noise)?;
         let mut channels: Vec<Channel> = readings
             .iter()
             .map(|r| (r.diagonal, r.target, r.sequence))

@@ -40,6 +40,6 @@ pub use estimators::{ESTIMATORS, Estimator};
 pub use geometry::exact_reading;
 pub use plan::{SequenceChoice, choose_sequences, determined_by};
 pub use prediction::{Parameter, Unknowns, predicted_reading};
-pub use readings::{DiagonalError, DiagonalReading, Edges, Motion};
+pub use readings::{DiagonalError, DiagonalReading, Edges, Motion, check};
 pub use regression::regress;
 pub use simulate::{DiagonalSimulation, Disturbance, Misalignments, simulate, simulate_disturbed};

@@ -17,15 +17,13 @@ pub fn determined_by(
 ) -> Result<Vec<(Component, Determined)>, DiagonalError> {
     let readings = blank_readings(zone, runs);
     let design = Design::of(zone, &readings, |p| !is_definition(p, zone.steps));
-    let null = decompose(&design.matrix)?.null;
-    Ok(Component::all()
+    let null = decompose(&design.matrix, 0.0)?.null;
+    Component::all()
         .map(|c| {
-            (
-                c,
-                determination(&design.unknowns, &null, Function::Error(c)).0,
-            )
+            let function = Function::Error(c);
+            Ok((c, determination(&design.unknowns, &null, function)?.0))
         })
-        .collect())
+        .collect()
 }
 
 /// A set of sequences, run on every diagonal, and the angular errors that it determines.

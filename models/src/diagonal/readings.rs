@@ -51,17 +51,33 @@ pub enum DiagonalError {
         /// Steps on each axis.
         steps: usize,
     },
+    /// A travel of no machine.
+    #[error(
+        "the travel of {} is {travel:e} mm: positions are in mm, travels from {LEAST_TRAVEL:e} to {GREATEST_TRAVEL:e} mm can be used",
+        axis.letter()
+    )]
+    Travel {
+        /// Axis.
+        axis: Axis,
+        /// Its travel, mm.
+        travel: f64,
+    },
+    /// A standard deviation of a reading that is not positive and finite.
+    #[error(
+        "the standard deviation of a reading is {noise} um: it must be greater than zero and finite"
+    )]
+    Noise {
+        /// As given, µm.
+        noise: f64,
+    },
     /// A reading is NaN or infinite.
-    #[error("reading {} is not finite", index + 1)]
+    #[error("reading {}: it is not finite", index + 1)]
     NotFinite {
         /// Place in the list, from 0.
         index: usize,
     },
     /// A position that the diagonal's steps do not reach.
-    #[error(
-        "reading {}: position {at:?} (in steps) is no stop of diagonal {} in sequence {}",
-        index + 1, diagonal.name(), sequence.name()
-    )]
+    #[error("reading {}: {}", index + 1, off_path(*at, *diagonal, *sequence))]
     OffPath {
         /// Place in the list, from 0.
         index: usize,
@@ -73,10 +89,7 @@ pub enum DiagonalError {
         sequence: Sequence,
     },
     /// The same stop twice in one run.
-    #[error(
-        "reading {} repeats a stop of diagonal {}, sequence {}, repeat {repeat}, {}: number the repeats",
-        index + 1, diagonal.name(), sequence.name(), travel.name()
-    )]
+    #[error("reading {}: {}", index + 1, repeated(*diagonal, *sequence, *repeat, *travel))]
     Duplicate {
         /// Place in the list, from 0.
         index: usize,
@@ -89,8 +102,10 @@ pub enum DiagonalError {
         /// Sense of travel.
         travel: Travel,
     },
-    /// A measured quantity whose standard uncertainty is not positive.
-    #[error("the standard uncertainty of the measured {what} must be greater than zero")]
+    /// A measured quantity whose standard uncertainty cannot be used.
+    #[error(
+        "the standard uncertainty of the measured {what} must be greater than zero and finite, and within a hundred decades of what the readings give"
+    )]
     MeasuredUncertainty {
         /// The quantity.
         what: String,
@@ -103,8 +118,63 @@ pub enum DiagonalError {
     },
 }
 
+/// Travels beyond these, mm, are no machine's; their squares might leave the range of numbers.
+const LEAST_TRAVEL: f64 = 1e-6;
+const GREATEST_TRAVEL: f64 = 1e9;
+
+fn off_path(at: [usize; 3], diagonal: Diagonal, sequence: Sequence) -> String {
+    format!(
+        "position {at:?} (in steps) is no stop of diagonal {} in sequence {}",
+        diagonal.name(),
+        sequence.name()
+    )
+}
+
+fn repeated(diagonal: Diagonal, sequence: Sequence, repeat: u32, travel: Travel) -> String {
+    format!(
+        "it repeats a stop of diagonal {}, sequence {}, repeat {repeat}, {}: number the repeats",
+        diagonal.name(),
+        sequence.name(),
+        travel.name()
+    )
+}
+
+impl DiagonalError {
+    /// The place in the list, from 0, of the reading that is wrong, and what is wrong with it.
+    pub fn at_reading(&self) -> Option<(usize, String)> {
+        match self {
+            Self::NotFinite { index } => Some((*index, "the reading is not finite".to_owned())),
+            Self::OffPath {
+                index,
+                at,
+                diagonal,
+                sequence,
+            } => Some((*index, off_path(*at, *diagonal, *sequence))),
+            Self::Duplicate {
+                index,
+                diagonal,
+                sequence,
+                repeat,
+                travel,
+            } => Some((*index, repeated(*diagonal, *sequence, *repeat, *travel))),
+            _ => None,
+        }
+    }
+}
+
+/// Refuses a standard deviation of a reading that is none.
+pub(super) fn check_noise(noise: Option<f64>) -> Result<(), DiagonalError> {
+    match noise {
+        Some(noise) if !(noise > 0.0 && noise.is_finite()) => Err(DiagonalError::Noise { noise }),
+        _ => Ok(()),
+    }
+}
+
 /// Refuses readings that the analysis cannot place.
-pub(super) fn check(zone: &WorkZone, readings: &[DiagonalReading]) -> Result<(), DiagonalError> {
+///
+/// # Errors
+/// What [`DiagonalError`] lists of readings and work zone.
+pub fn check(zone: &WorkZone, readings: &[DiagonalReading]) -> Result<(), DiagonalError> {
     if readings.is_empty() {
         return Err(DiagonalError::NoReadings);
     }
@@ -119,6 +189,15 @@ pub(super) fn check(zone: &WorkZone, readings: &[DiagonalReading]) -> Result<(),
             travel: zone.travel,
             steps: zone.steps,
         });
+    }
+    for axis in &Axis::ALL[..used] {
+        let travel = zone.travel[axis.index()];
+        if !(LEAST_TRAVEL..=GREATEST_TRAVEL).contains(&travel) {
+            return Err(DiagonalError::Travel {
+                axis: *axis,
+                travel,
+            });
+        }
     }
     let mut seen = std::collections::BTreeSet::new();
     let mut paths: BTreeMap<(Diagonal, Sequence), Vec<[usize; 3]>> = BTreeMap::new();

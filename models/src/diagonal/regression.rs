@@ -1,7 +1,7 @@
 //! All identifiable combinations of the errors at once, from all readings.
 
 use super::components::{Component, Location};
-use super::design::{Decomposition, Design, Function, decompose, is_definition, nodes_of};
+use super::design::{Design, Function, decompose, is_definition, nodes_of};
 use super::determination::{
     Determined, ambiguities, determination, end_slope, open_shape, remedies,
 };
@@ -10,9 +10,21 @@ use super::estimates::{
     Assumptions, ComponentEstimate, LocationEstimate, MirrorEstimate, StepDiagonalFit,
 };
 use super::prediction::Parameter;
-use super::readings::{DiagonalError, DiagonalReading, check};
+use super::readings::{DiagonalError, DiagonalReading, check, check_noise};
 use crate::uncertainty::{DegreesOfFreedom, welch_satterthwaite};
+use errsep_solvers::linear::pivoted_qr::PivotedQr;
 use nalgebra::{DMatrix, DVector, Dyn};
+
+/// Residuals of so many roundings of the readings are no noise.
+const ROUNDINGS: f64 = 100.0;
+
+/// What a measured slope must share with the directions that the readings leave open to determine one
+/// of them: those are known to about 1e-11, and what a set-up leaves open shows with more than 1e-4.
+const OPEN: f64 = 1e-6;
+
+/// A measured slope may count this much less than a reading, or as much more: beyond, squares leave
+/// the range of numbers.
+const LEAST_WEIGHT: f64 = 1e-100;
 
 /// Estimates everything that the readings determine.
 ///
@@ -24,6 +36,7 @@ pub fn regress(
     assumptions: &Assumptions,
 ) -> Result<StepDiagonalFit, DiagonalError> {
     check(zone, readings)?;
+    check_noise(assumptions.noise)?;
     for m in &assumptions.slopes {
         if !(m.std > 0.0 && m.std.is_finite() && m.slope.is_finite()) {
             return Err(DiagonalError::MeasuredUncertainty {
@@ -39,31 +52,30 @@ pub fn regress(
     let mut observed = DVector::from_iterator(readings.len(), readings.iter().map(|r| r.value));
     design.free_of_zero(&mut observed);
 
-    let from_readings = Solution::of(&design.matrix, &observed)?;
+    let from_readings = Solution::of_readings(&design.matrix, &observed)?;
     let freedom_of = |rank: usize, rows: usize| rows.saturating_sub(design.runs.len() + rank);
     let readings_alone = freedom_of(from_readings.rank(), readings.len());
-    let (noise, noise_degrees_of_freedom) = match assumptions.noise.filter(|&sigma| sigma > 0.0) {
+    let (noise, noise_degrees_of_freedom) = match assumptions.noise {
         Some(given) => (Some(given), Some(DegreesOfFreedom::Infinite)),
-        None if readings_alone > 0 => {
-            let freedom = readings_alone as f64;
-            let sum = from_readings.residuals.norm_squared();
-            let degrees = DegreesOfFreedom::Finite(freedom);
-            (Some((sum / freedom).sqrt()), Some(degrees))
-        }
-        None => (None, None),
+        None => match scatter(&from_readings.residuals, &observed, readings_alone) {
+            Some(noise) => {
+                let degrees = DegreesOfFreedom::Finite(readings_alone as f64);
+                (Some(noise), Some(degrees))
+            }
+            None => (None, None),
+        },
     };
     // Measured slopes join as further rows, weighted by the noise of a reading over their own.
-    let extra = slope_rows(&design, zone, assumptions, noise);
+    let extra = slope_rows(&design, zone, assumptions, noise)?;
     let (solution, freedom) = if extra.is_empty() {
         (from_readings, readings_alone)
     } else {
-        let (matrix, right) = stacked(&design.matrix, &observed, &extra);
-        let solution = Solution::of(&matrix, &right)?;
+        let solution = from_readings.joined(&design.matrix, &observed, &extra)?;
         let freedom = freedom_of(solution.rank(), readings.len() + extra.len());
         (solution, freedom)
     };
 
-    let null = &solution.decomposition.null;
+    let null = &solution.null;
     let estimate = Estimate {
         design: &design,
         solution: &solution,
@@ -76,13 +88,13 @@ pub fn regress(
     let functions = |of: fn(Component) -> Function| {
         Component::all()
             .map(|c| estimate.function(zone, of(c)))
-            .collect()
+            .collect::<Result<Vec<_>, _>>()
     };
     let back = readings.iter().any(|r| r.travel == Travel::Backward);
     Ok(StepDiagonalFit {
-        components: functions(Function::Error),
+        components: functions(Function::Error)?,
         reversals: if back {
-            functions(Function::Reversal)
+            functions(Function::Reversal)?
         } else {
             Vec::new()
         },
@@ -120,17 +132,12 @@ pub fn regress(
             .collect(),
         parameters: design.unknowns.parameters.len(),
         rank: solution.rank(),
-        ambiguities: ambiguities(&design.unknowns, null),
-        remedies: remedies(&design.unknowns, null),
+        ambiguities: ambiguities(&design.unknowns, null)?,
+        remedies: remedies(&design.unknowns, null)?,
         noise,
         noise_degrees_of_freedom,
         degrees_of_freedom: freedom,
-        residuals: solution
-            .residuals
-            .iter()
-            .take(readings.len())
-            .copied()
-            .collect(),
+        residuals: solution.residuals.iter().copied().collect(),
         jacobian: DMatrix::from_fn(design.matrix.nrows(), design.matrix.ncols(), |i, j| {
             design.matrix[(i, j)] / design.scale[j]
         }),
@@ -138,41 +145,135 @@ pub fn regress(
     })
 }
 
+/// The standard deviation of a reading by the residuals; none without redundancy, or where nothing
+/// but the rounding of the readings is left.
+fn scatter(residuals: &DVector<f64>, observed: &DVector<f64>, freedom: usize) -> Option<f64> {
+    let (largest, greatest) = (residuals.amax(), observed.amax());
+    if freedom == 0 || largest <= ROUNDINGS * f64::EPSILON * greatest {
+        return None;
+    }
+    // Divided first: the squares of very large or very small readings leave the range of numbers.
+    let sum = residuals.iter().map(|r| (r / largest).powi(2)).sum::<f64>();
+    Some(largest * (sum / freedom as f64).sqrt())
+}
+
 /// Least squares of least norm: parameters, their half covariance W with (MᵀM)⁺ = W Wᵀ, residuals.
 struct Solution {
-    decomposition: Decomposition,
+    /// Orthonormal basis of what is determined, n × rank.
+    determined: DMatrix<f64>,
+    /// Orthonormal basis of what is not, n × nullity.
+    null: DMatrix<f64>,
     parameters: DVector<f64>,
     half_covariance: DMatrix<f64>,
+    /// Of the readings alone.
     residuals: DVector<f64>,
 }
 
 impl Solution {
-    fn of(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Result<Self, DiagonalError> {
-        let decomposition = decompose(matrix)?;
-        let gradient = matrix.transpose() * right;
+    fn of_readings(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Result<Self, DiagonalError> {
+        let decomposition = decompose(matrix, 0.0)?;
         let n = matrix.ncols();
+        let rank = decomposition.determined.len();
         let mut parameters = DVector::zeros(n);
-        let mut half_covariance = DMatrix::zeros(n, decomposition.determined.len());
-        let mut add = |parameters: &mut DVector<f64>, gradient: &DVector<f64>| {
-            for (k, (value, v)) in decomposition.determined.iter().enumerate() {
-                *parameters += v * (v.dot(gradient) / (value * value));
-                half_covariance.set_column(k, &(v / *value));
+        let mut half_covariance = DMatrix::zeros(n, rank);
+        let mut determined = DMatrix::zeros(n, rank);
+        for (k, (value, v)) in decomposition.determined.iter().enumerate() {
+            half_covariance.set_column(k, &(v / *value));
+            determined.set_column(k, v);
+        }
+        // The second round is one step of refinement: it brings the rounding of MᵀM back to that of M.
+        for _ in 0..2 {
+            let gradient = matrix.transpose() * (right - matrix * &parameters);
+            for (value, v) in &decomposition.determined {
+                parameters += v * (v.dot(&gradient) / (value * value));
             }
-        };
-        add(&mut parameters, &gradient);
-        // One step of refinement brings the rounding of MᵀM back to that of M.
-        let correction = matrix.transpose() * (right - matrix * &parameters);
-        add(&mut parameters, &correction);
+        }
         Ok(Self {
             residuals: right - matrix * &parameters,
-            decomposition,
+            determined,
+            null: decomposition.null,
+            parameters,
+            half_covariance,
+        })
+    }
+
+    /// The solution with measured slopes beside the readings.
+    ///
+    /// What the slopes determine further is sought among what the readings leave open, by their
+    /// direction alone: the rank must not depend on how well a slope is known. In the basis of what
+    /// both determine the problem has full rank, and Householder reflections with pivoted columns and
+    /// the heavy rows first solve it whatever the weights (Cox & Higham, BIT 38 (1998) 34).
+    fn joined(
+        &self,
+        matrix: &DMatrix<f64>,
+        right: &DVector<f64>,
+        slopes: &[SlopeRow],
+    ) -> Result<Self, DiagonalError> {
+        let (readings, n) = matrix.shape();
+        let rows = DMatrix::from_fn(slopes.len(), self.null.ncols(), |k, j| {
+            self.null[(slopes[k].place, j)]
+        });
+        let further = decompose(&rows, OPEN)?;
+        let added: Vec<DVector<f64>> = further
+            .determined
+            .iter()
+            .map(|(_, v)| &self.null * v)
+            .collect();
+        let from_readings = self.rank();
+        let rank = from_readings + added.len();
+        let mut determined = self.determined.clone().resize_horizontally(rank, 0.0);
+        for (k, direction) in added.iter().enumerate() {
+            determined.set_column(from_readings + k, direction);
+        }
+
+        let mut order: Vec<usize> = (0..slopes.len()).collect();
+        order.sort_by(|&a, &b| slopes[b].coefficient.total_cmp(&slopes[a].coefficient));
+        let heavy = order.partition_point(|&k| slopes[k].coefficient > 1.0);
+        let (before, after) = order.split_at(heavy);
+        let mut weighted = DMatrix::zeros(readings + slopes.len(), rank);
+        let mut observed = DVector::zeros(readings + slopes.len());
+        let of_slopes = before.iter().enumerate().chain(
+            after
+                .iter()
+                .enumerate()
+                .map(|(i, k)| (heavy + readings + i, k)),
+        );
+        for (row, &k) in of_slopes {
+            let slope = &slopes[k];
+            weighted.set_row(row, &(determined.row(slope.place) * slope.coefficient));
+            observed[row] = slope.value;
+        }
+        // What the slopes add leaves the readings alone: zero, not the rounding of M times it.
+        weighted
+            .view_mut((heavy, 0), (readings, from_readings))
+            .copy_from(&(matrix * &self.determined));
+        observed.rows_mut(heavy, readings).copy_from(right);
+
+        let qr = PivotedQr::new(weighted);
+        qr.apply_transposed(&mut observed);
+        let mut permuted = DMatrix::zeros(n, rank);
+        for (k, &j) in qr.permutation().iter().enumerate() {
+            permuted.set_column(k, &determined.column(j));
+        }
+        let inverse = qr
+            .upper()
+            .solve_upper_triangular(&DMatrix::identity(rank, rank))
+            .ok_or_else(|| DiagonalError::Numerical {
+                reason: "the measured slopes and the readings make no triangle".to_owned(),
+            })?;
+        let half_covariance = permuted * inverse;
+        let parameters = &half_covariance * observed.rows(0, rank);
+        Ok(Self {
+            residuals: right - matrix * &parameters,
+            determined,
+            null: &self.null * further.null,
             parameters,
             half_covariance,
         })
     }
 
     fn rank(&self) -> usize {
-        self.decomposition.determined.len()
+        self.determined.ncols()
     }
 }
 
@@ -185,11 +286,14 @@ struct Estimate<'a> {
 }
 
 impl Estimate<'_> {
-    fn function(&self, zone: &WorkZone, function: Function) -> ComponentEstimate {
+    fn function(
+        &self,
+        zone: &WorkZone,
+        function: Function,
+    ) -> Result<ComponentEstimate, DiagonalError> {
         let component = function.component();
         let unknowns = &self.design.unknowns;
-        let null = &self.solution.decomposition.null;
-        let (determined, lost) = determination(unknowns, null, function);
+        let (determined, lost) = determination(unknowns, &self.solution.null, function)?;
         let nodes = nodes_of(unknowns, function);
         let mut estimate = ComponentEstimate {
             component,
@@ -201,7 +305,7 @@ impl Estimate<'_> {
         };
         let count = nodes.len();
         let functionals: DMatrix<f64> = match determined {
-            Determined::NotTouched | Determined::Nothing => return estimate,
+            Determined::NotTouched | Determined::Nothing => return Ok(estimate),
             Determined::Wholly => DMatrix::identity(count, count),
             Determined::ShapeOnly => {
                 let line = open_shape(function, &nodes);
@@ -239,7 +343,7 @@ impl Estimate<'_> {
                 estimate.degrees_of_freedom[index] = degrees;
             }
         }
-        estimate
+        Ok(estimate)
     }
 
     /// Standard uncertainty, in scaled parameters, and effective degrees of freedom of a functional c
@@ -274,7 +378,7 @@ impl Estimate<'_> {
             return (Determined::NotTouched, None, None);
         };
         // A tenth of a millionth of a unit vector: see the threshold of `determination`.
-        if self.solution.decomposition.null.row(place).norm() > 1e-6 {
+        if self.solution.null.row(place).norm() > 1e-6 {
             return (Determined::Nothing, None, None);
         }
         let scale = self.design.scale[place];
@@ -304,36 +408,28 @@ fn slope_rows(
     zone: &WorkZone,
     assumptions: &Assumptions,
     noise: Option<f64>,
-) -> Vec<SlopeRow> {
-    assumptions
-        .slopes
-        .iter()
-        .filter_map(|m| {
-            let travel = zone.travel[m.axis.index()];
-            let (place, gradient) = end_slope(&design.unknowns, m.axis, travel, zone.steps)?;
-            // Without any redundancy the readings' noise is taken as that of the slope over the travel.
-            let weight = noise.unwrap_or(m.std * travel) / m.std;
-            Some(SlopeRow {
-                place,
-                coefficient: weight * gradient * design.scale[place],
-                value: weight * m.slope,
-                degrees_of_freedom: m.degrees_of_freedom,
-            })
-        })
-        .collect()
-}
-
-fn stacked(
-    matrix: &DMatrix<f64>,
-    right: &DVector<f64>,
-    extra: &[SlopeRow],
-) -> (DMatrix<f64>, DVector<f64>) {
-    let (rows, columns) = matrix.shape();
-    let mut taller = matrix.clone().resize(rows + extra.len(), columns, 0.0);
-    let mut longer = right.clone().resize_vertically(rows + extra.len(), 0.0);
-    for (k, row) in extra.iter().enumerate() {
-        taller[(rows + k, row.place)] = row.coefficient;
-        longer[rows + k] = row.value;
+) -> Result<Vec<SlopeRow>, DiagonalError> {
+    let mut rows = Vec::new();
+    for m in &assumptions.slopes {
+        let travel = zone.travel[m.axis.index()];
+        let Some((place, gradient)) = end_slope(&design.unknowns, m.axis, travel, zone.steps)
+        else {
+            continue;
+        };
+        // Without any redundancy the readings' noise is taken as that of the slope over the travel.
+        let weight = noise.unwrap_or(m.std * travel) / m.std;
+        let coefficient = weight * gradient * design.scale[place];
+        if !(LEAST_WEIGHT..=1.0 / LEAST_WEIGHT).contains(&coefficient) {
+            return Err(DiagonalError::MeasuredUncertainty {
+                what: format!("positioning slope of {}", m.axis.letter()),
+            });
+        }
+        rows.push(SlopeRow {
+            place,
+            coefficient,
+            value: weight * m.slope,
+            degrees_of_freedom: m.degrees_of_freedom,
+        });
     }
-    (taller, longer)
+    Ok(rows)
 }

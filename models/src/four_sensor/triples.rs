@@ -3,6 +3,7 @@
 //!
 //! The paper's numbered equations are rebuilt from its text; see the theory page.
 
+use errsep_solvers::linear::jacobi_svd::JacobiSvd;
 use errsep_solvers::regularization::Decomposition;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
@@ -74,7 +75,7 @@ pub fn condition(matrix: &DMatrix<f64>) -> Result<(f64, usize), FourSensorError>
 /// Two orthonormal relations cᵀΔe = 0: Δe = W·e with W of rank two, so they span its left null
 /// space.
 fn relations(weights: &Matrix4<f64>) -> [Vector4<f64>; 2] {
-    let svd = weights.svd(true, false);
-    let left = svd.u.unwrap_or_else(Matrix4::identity);
-    [left.column(2).into_owned(), left.column(3).into_owned()]
+    let transposed = DMatrix::from_fn(4, 4, |i, j| weights[(j, i)]);
+    let right = JacobiSvd::new(transposed).right;
+    [2, 3].map(|k| Vector4::from_fn(|i, _| right[(i, k)]))
 }

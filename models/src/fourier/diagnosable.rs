@@ -7,6 +7,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use errsep_solvers::linear::limited;
 use nalgebra::{DMatrix, DVector};
 
 use super::effects;
@@ -71,10 +72,10 @@ impl FourierScans {
         let columns = model.design();
         let gram = columns.tr_mul(&columns);
         let cut = 1e-12 * gram.diagonal().amax();
-        let inverse = gram
-            .pseudo_inverse(cut)
-            .map_err(|what| FourierError::Simulation {
-                what: what.to_owned(),
+        let inverse = limited::svd(gram, true, true)
+            .and_then(|factors| factors.pseudo_inverse(cut).ok())
+            .ok_or_else(|| FourierError::Simulation {
+                what: "the singular values of the design did not converge".to_owned(),
             })?;
         model.solver = Arc::new(inverse * columns.transpose());
         model.columns = Arc::new(columns);

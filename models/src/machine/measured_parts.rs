@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
+use errsep_solvers::linear::limited::symmetric_eigen;
 use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::model::coordinate;
-use super::{Axis, Machine, MachineError, PartReading, effects, part_residuals};
+use super::{Axis, ComponentError, Machine, MachineError, PartReading, effects, part_residuals};
 use crate::model::{Column, Effect, FittedModel, Freedom, Place, Quantity, Record};
 
 /// Parts measured at points whose deviations a machine model predicts.
@@ -57,7 +58,7 @@ impl MeasuredParts {
                 _ => traces.push(i..i + 1),
             }
         }
-        let expected = expected_scatter(machine, &readings, &places).into();
+        let expected = expected_scatter(machine, &readings, &places)?.into();
         Ok(Self {
             predicted: DVector::from_iterator(
                 readings.len(),
@@ -99,7 +100,15 @@ impl MeasuredParts {
 
 /// What the machine's spreads let readings be off, um: its coefficients, common to all parts, and its
 /// scatter, drawn anew for every point of every part.
-fn expected_scatter(machine: &Machine, readings: &[PartReading], places: &[Place]) -> Vec<Column> {
+fn expected_scatter(
+    machine: &Machine,
+    readings: &[PartReading],
+    places: &[Place],
+) -> Result<Vec<Column>, MachineError> {
+    let spectrum = |error: &ComponentError| MachineError::BadComponent {
+        component: error.component,
+        why: "the spread of its coefficients has no finite principal axes".to_owned(),
+    };
     let mut columns = Vec::new();
     for error in machine.errors() {
         let spread = &error.spread;
@@ -108,7 +117,7 @@ fn expected_scatter(machine: &Machine, readings: &[PartReading], places: &[Place
         }
         let motion =
             |r: &PartReading| machine.sensitivity(error.component, &r.position)[r.axis.index()];
-        let eigen = spread.covariance.clone().symmetric_eigen();
+        let eigen = symmetric_eigen(spread.covariance.clone()).ok_or_else(|| spectrum(error))?;
         let directions = eigen.eigenvectors.column_iter();
         for (variance, direction) in eigen.eigenvalues.iter().zip(directions) {
             let deviation = |r: &PartReading| {
@@ -134,7 +143,10 @@ fn expected_scatter(machine: &Machine, readings: &[PartReading], places: &[Place
             let motion = machine.sensitivity(error.component, position);
             covariance += motion * motion.transpose() * error.spread.scatter;
         }
-        let eigen = covariance.symmetric_eigen();
+        let eigen = symmetric_eigen(covariance).ok_or(MachineError::NotFinite {
+            what: "the expected scatter of a part",
+            found: covariance.amax(),
+        })?;
         let directions = eigen.eigenvectors.column_iter();
         for (variance, direction) in eigen.eigenvalues.iter().zip(directions) {
             let size = variance.max(0.0).sqrt();
@@ -148,7 +160,7 @@ fn expected_scatter(machine: &Machine, readings: &[PartReading], places: &[Place
         }
     }
     columns.retain(|column| column.values.iter().any(|v| *v != 0.0));
-    columns
+    Ok(columns)
 }
 
 /// Number of each name by its first occurrence.

@@ -1,5 +1,6 @@
 //! Which combinations of the unknowns a set of channels determines, and from which weights.
 
+use errsep_solvers::linear::limited::svd;
 use nalgebra::DMatrix;
 
 /// A combination of unknowns that the channels determine: Σ coefficient·unknown = Σ weight·channel.
@@ -54,7 +55,9 @@ const ROUNDING: f64 = 1e-9;
 /// `halved` (a mean or half difference).
 pub fn determined(design: &DMatrix<f64>, halved: &[usize]) -> Vec<Combination> {
     // The rows are few and their entries small integers: the tolerance parts 0 from at least 0.3.
-    let Ok(inverse) = design.clone().pseudo_inverse(ROUNDING) else {
+    let inverse =
+        svd(design.clone(), true, true).and_then(|factors| factors.pseudo_inverse(ROUNDING).ok());
+    let Some(inverse) = inverse else {
         return Vec::new();
     };
     let projector = &inverse * design;

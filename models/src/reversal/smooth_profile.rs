@@ -6,7 +6,8 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use errsep_solvers::linear::limited::symmetric_eigen;
+use nalgebra::{DMatrix, DVector};
 
 /// The smoother of one set of positions: found once, used for every profile over them.
 #[derive(Debug, Clone)]
@@ -79,7 +80,7 @@ impl Smoother {
             }
         }
         let curvature = gram.cholesky()?.solve(&differences.transpose());
-        let eigen = SymmetricEigen::new(&differences * &curvature);
+        let eigen = symmetric_eigen(&differences * &curvature)?;
         Some(Self {
             positions: Arc::new(positions.to_vec()),
             basis: Arc::new(eigen.eigenvectors),

@@ -6,6 +6,7 @@
 //! fit of wave and smooth background leaves least. Every half turn the indicator sees the opposite
 //! side, as in the channels 1A and 2B of the reversal.
 
+use errsep_solvers::linear::limited::svd;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -52,6 +53,18 @@ pub enum NoTraces {
         /// How many there are.
         samples: usize,
     },
+    /// A speed at which a turn has too few samples, or the run too few turns.
+    #[error(
+        "{samples} samples are {turns:.1} turns at {per_second} turns a second: a run of three turns with 12 samples a turn is needed"
+    )]
+    Speed {
+        /// How many there are.
+        samples: usize,
+        /// Turns in the run at that speed.
+        turns: f64,
+        /// The speed, turns a second.
+        per_second: f64,
+    },
     /// Times do not grow.
     #[error("sample {index}: times must grow")]
     Time {
@@ -70,6 +83,8 @@ const HARMONICS: usize = 2;
 /// Samples a turn needs, and turns a run needs.
 const SAMPLES_PER_TURN: f64 = 20.0;
 const FEWEST_TURNS: f64 = 3.0;
+/// Samples a turn below which the widest window at an angle (60° on either side) has no four of them.
+const FEWEST_PER_TURN: f64 = 12.0;
 
 /// Finds how the spindle turned; `about` is a guess of its turns in a second, if there is one.
 ///
@@ -87,6 +102,13 @@ pub fn find_turning(samples: &[Sample], about: Option<f64>) -> Result<Turning, N
     let span = samples[n - 1].time - samples[0].time;
     let step = 1.0 / (2.0 * span);
     let (from, to) = match about {
+        Some(f) if !(FEWEST_TURNS..=n as f64 / FEWEST_PER_TURN).contains(&(1.05 * f * span)) => {
+            return Err(NoTraces::Speed {
+                samples: n,
+                turns: f * span,
+                per_second: f,
+            });
+        }
         Some(f) => (0.95 * f, 1.05 * f),
         None => (FEWEST_TURNS / span, n as f64 / (SAMPLES_PER_TURN * span)),
     };
@@ -205,7 +227,7 @@ fn passage(samples: &[Sample], time: f64) -> Option<(f64, f64)> {
     let fit = |columns: usize, y: fn(&Sample) -> f64| {
         let design = DMatrix::from_fn(samples.len(), columns, |i, j| at(i).powi(j as i32));
         let values = DVector::from_iterator(samples.len(), samples.iter().map(y));
-        let solution = design.svd(true, true).solve(&values, 1e-12).ok()?;
+        let solution = svd(design, true, true)?.solve(&values, 1e-12).ok()?;
         solution.get(0).copied()
     };
     Some((fit(2, |p| p.x)?, fit(3, |p| p.value)?))

@@ -5,6 +5,7 @@ pub mod banded;
 pub mod bordered;
 pub mod dense;
 pub mod jacobi_svd;
+pub mod limited;
 pub mod pivoted_qr;
 pub mod triangle;
 

@@ -31,6 +31,7 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
                     &point.evaluation,
                     &point.model,
                     velocity,
+                    self.unit,
                 ))
             })
             .map_err(broken_off)?;

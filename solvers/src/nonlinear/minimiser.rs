@@ -26,6 +26,21 @@ pub type FitState = IterState<DVector<f64>, DVector<f64>, (), (), DVector<f64>, 
 /// Least share of the promised fall that makes a step worth taking.
 const LEAST_GAIN: f64 = 1e-4;
 
+/// Below this cost residuals are counted in another unit: squares a hundred decades smaller, as those
+/// of single residuals and of steps near the minimum are, still have all their digits.
+const LEAST_COST: f64 = 1e-200;
+
+/// A step that moves a parameter by more than this share of all that it has ever been ends nothing,
+/// however little the residuals change: roots up to the tenth order are approached by less.
+const FAR: f64 = 1e-2;
+
+/// A step of this share of the undamped one was not held up by a wall.
+const UNIMPEDED: f64 = 0.5;
+
+/// Where a step of this share of the parameters is refused a value, the wall is here. Far steps may
+/// well be refused on the way to a minimum.
+const AT_WALL: f64 = 1e-6;
+
 /// Steps tried from one point before giving up: each failure shortens the step at least by half.
 const MOST_TRIALS: usize = 100;
 
@@ -39,6 +54,13 @@ pub struct Minimiser<S, M> {
     pub(super) scale: DVector<f64>,
     /// The largest ‖N p‖ so far, N the column norms of the Jacobian at p.
     longest: f64,
+    /// The largest magnitude that each parameter has had.
+    farthest: DVector<f64>,
+    /// The power of two in which residuals are counted.
+    pub(crate) unit: f64,
+    /// The shortest step that was refused a value, until one about as long as the undamped step is
+    /// taken.
+    refused: Option<Refusal>,
     ending: Option<Ending>,
     #[serde(skip)]
     pub(crate) point: Option<Point<M>>,
@@ -52,12 +74,31 @@ pub(crate) struct Point<M> {
     pub model: M,
 }
 
+/// The undamped step from a point.
+#[derive(Default)]
+struct Full {
+    /// The fall that it promises.
+    promised: f64,
+    /// ‖D s‖.
+    length: f64,
+    /// A parameter that it moves far.
+    far: Option<usize>,
+}
+
+/// A step that was refused a value.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Refusal {
+    reason: String,
+    /// Its length as a share of the parameters' greatest.
+    share: f64,
+}
+
 /// How an iteration left things.
 enum Progress {
     Moved(Trial),
     Rescued,
     Rest(Convergence),
-    NoDescent,
+    Stuck(Ending),
 }
 
 impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
@@ -68,6 +109,9 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
             options,
             scale: DVector::zeros(0),
             longest: 0.0,
+            farthest: DVector::zeros(0),
+            unit: 1.0,
+            refused: None,
             ending: None,
             point: None,
         }
@@ -80,6 +124,7 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
 
     /// Linearises at parameters whose evaluation is known.
     pub(super) fn arrive<O: System<Model = M>>(
+        &self,
         problem: &mut Counted<O>,
         parameters: DVector<f64>,
         evaluation: Evaluation,
@@ -87,7 +132,7 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
         let mut made = None;
         problem
             .problem("jacobian_count", |system| {
-                made = Some(system.linearize(&parameters, &evaluation));
+                made = Some(system.linearize(&parameters, &evaluation, self.unit));
                 Ok(())
             })
             .map_err(broken_off)?;
@@ -99,38 +144,105 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
         })
     }
 
-    /// Cost and residuals; `None` where the model has no value.
+    /// Cost and residuals; the reason where the model has no value or its cost no finite one.
     pub(super) fn evaluate<O: System<Model = M>>(
+        &self,
+        problem: &mut Counted<O>,
+        parameters: &DVector<f64>,
+    ) -> Result<Result<Evaluation, String>, FitError> {
+        let evaluation = self.residuals(problem, parameters)?;
+        Ok(evaluation.and_then(|evaluation| {
+            if evaluation.cost.is_finite() {
+                Ok(evaluation)
+            } else {
+                Err("the sum of squared residuals overflows".to_string())
+            }
+        }))
+    }
+
+    fn residuals<O: System<Model = M>>(
+        &self,
         problem: &mut Counted<O>,
         parameters: &DVector<f64>,
     ) -> Result<Result<Evaluation, String>, FitError> {
         problem
             .problem("residual_count", |system| {
-                Ok(system.evaluate(parameters).map_err(|no| no.reason))
+                Ok(system
+                    .evaluate(parameters, self.unit)
+                    .map_err(|no| no.reason))
             })
             .map_err(broken_off)
     }
 
-    fn start<O: System<Model = M>>(
-        problem: &mut Counted<O>,
-        parameters: DVector<f64>,
-    ) -> Result<Point<M>, FitError> {
-        let mut expected = parameters.len();
+    /// The system's number of parameters.
+    fn expected<O: System<Model = M>>(problem: &mut Counted<O>) -> Result<usize, FitError> {
+        let mut expected = 0;
         problem
             .problem("name_count", |system| {
                 expected = system.parameter_count();
                 Ok(())
             })
             .map_err(broken_off)?;
-        if parameters.len() != expected {
-            return Err(FitError::StartLength {
-                expected,
-                found: parameters.len(),
-            });
+        Ok(expected)
+    }
+
+    /// Evaluates the start and chooses the unit in which residuals are counted.
+    fn start<O: System<Model = M>>(
+        &mut self,
+        problem: &mut Counted<O>,
+        parameters: DVector<f64>,
+    ) -> Result<Point<M>, FitError> {
+        let (expected, found) = (Self::expected(problem)?, parameters.len());
+        if found != expected {
+            return Err(FitError::StartLength { expected, found });
         }
-        match Self::evaluate(problem, &parameters)? {
-            Ok(evaluation) => Self::arrive(problem, parameters, evaluation),
+        let refused = |reason| FitError::NoValueAtStart { reason };
+        self.unit = 1.0;
+        let plain = self.residuals(problem, &parameters)?.map_err(refused)?;
+        let largest = plain.residuals.amax();
+        if plain.cost.is_finite() && (plain.cost > LEAST_COST || largest == 0.0) {
+            return self.arrive(problem, parameters, plain);
+        }
+        self.unit = largest.log2().floor().exp2();
+        let counted = self.evaluate(problem, &parameters)?.map_err(refused)?;
+        match self.arrive(problem, parameters.clone(), counted) {
+            // Residuals that vanish beside their derivatives need no other unit.
+            Err(FitError::JacobianNotFinite { .. }) if plain.cost.is_finite() => {
+                self.unit = 1.0;
+                self.arrive(problem, parameters, plain)
+            }
+            other => other,
+        }
+    }
+
+    /// Goes on from the parameters of a checkpoint.
+    fn resume<O: System<Model = M>>(
+        &self,
+        problem: &mut Counted<O>,
+        parameters: DVector<f64>,
+    ) -> Result<Point<M>, FitError> {
+        let expected = Self::expected(problem)?;
+        self.check_lengths(expected, &parameters)?;
+        match self.evaluate(problem, &parameters)? {
+            Ok(evaluation) => self.arrive(problem, parameters, evaluation),
             Err(reason) => Err(FitError::NoValueAtStart { reason }),
+        }
+    }
+
+    /// Whether what a checkpoint holds is for as many parameters as the problem has.
+    pub(crate) fn check_lengths(
+        &self,
+        expected: usize,
+        parameters: &DVector<f64>,
+    ) -> Result<(), FitError> {
+        let bounds = self.options.bounds.as_ref();
+        let lengths = [parameters.len(), self.scale.len(), self.farthest.len()]
+            .into_iter()
+            .chain(bounds.map(|b| b.lower().len()))
+            .chain(bounds.map(|b| b.upper().len()));
+        match lengths.into_iter().find(|&found| found != expected) {
+            Some(found) => Err(FitError::CheckpointLength { expected, found }),
+            None => Ok(()),
         }
     }
 
@@ -143,6 +255,12 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
             self.scale.zip_apply(norms, |d, norm| *d = d.max(norm));
         }
         self.longest = self.longest.max(felt_length(point, &point.parameters));
+        if self.farthest.len() != norms.len() {
+            self.farthest = point.parameters.abs();
+        } else {
+            self.farthest
+                .zip_apply(&point.parameters, |f, p| *f = f.max(p.abs()));
+        }
     }
 
     pub(super) fn scaled_length(&self, vector: &DVector<f64>) -> f64 {
@@ -209,23 +327,33 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
             .fold(0.0, f64::max)
     }
 
-    /// Whether the point is a minimum to rounding, and the fall that an undamped step promises.
-    fn at_rest(&self, point: &Point<M>) -> Result<(Option<Convergence>, f64), FitError> {
+    /// Whether the point is a minimum to rounding, and the undamped step with the fall it promises.
+    fn at_rest(&self, point: &Point<M>) -> Result<(Option<Convergence>, Full), FitError> {
+        let rest = |by| Ok((Some(by), Full::default()));
         if point.evaluation.cost == 0.0 {
-            return Ok((Some(Convergence::Cost), 0.0));
+            return rest(Convergence::Cost);
         }
         if self.largest_cosine(point) <= self.options.gradient_tolerance {
-            return Ok((Some(Convergence::Gradient), 0.0));
+            return rest(Convergence::Gradient);
         }
-        let full = self.undamped(point)?.step;
-        let promised = point.model.predicted_reduction(&full);
-        if promised.abs() <= Self::cost_rounding(point) {
-            return Ok((Some(Convergence::Cost), promised));
+        let step = self.undamped(point)?.step;
+        let full = Full {
+            promised: point.model.predicted_reduction(&step),
+            length: self.scaled_length(&step),
+            far: self.goes_far(&step),
+        };
+        if full.promised.abs() <= Self::cost_rounding(point) {
+            return rest(Convergence::Cost);
         }
-        if felt_length(point, &full) <= f64::EPSILON * self.longest {
-            return Ok((Some(Convergence::Step), promised));
+        if felt_length(point, &step) <= f64::EPSILON * self.longest {
+            return Ok((Some(Convergence::Step), full));
         }
-        Ok((None, promised))
+        Ok((None, full))
+    }
+
+    /// A parameter that a step moves by a good part of all that it has ever been, if there is one.
+    fn goes_far(&self, step: &DVector<f64>) -> Option<usize> {
+        (0..step.len()).find(|&j| step[j].abs() > FAR * self.farthest[j])
     }
 
     /// One iteration: tries steps from `point` until one is worth taking.
@@ -234,10 +362,16 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
         problem: &mut Counted<O>,
         point: Point<M>,
     ) -> Result<(Point<M>, Progress), FitError> {
-        let (rest, promised) = self.at_rest(&point)?;
+        let (rest, full) = self.at_rest(&point)?;
         if let Some(by) = rest {
+            // Residuals may vanish along a way that does not end.
+            if let (Convergence::Step, Some(j)) = (by, full.far) {
+                let parameter = Self::name_of(problem, j)?;
+                return Ok((point, Progress::Stuck(Ending::RunsAway { parameter })));
+            }
             return Ok((point, Progress::Rest(by)));
         }
+        let promised = full.promised;
         let cost = point.evaluation.cost;
         let negligible = self.options.cost_tolerance * cost;
         let parameter_length = felt_length(&point, &point.parameters);
@@ -262,16 +396,24 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
                 self.strategy.rejected(&trial);
                 continue;
             }
-            let Ok(evaluation) = Self::evaluate(problem, &proposal.parameters)? else {
-                self.strategy.invalid(length);
-                continue;
+            let evaluation = match self.evaluate(problem, &proposal.parameters)? {
+                Ok(evaluation) => evaluation,
+                Err(reason) => {
+                    let share = length / self.reach(&full);
+                    if self.refused.as_ref().is_none_or(|r| share < r.share) {
+                        self.refused = Some(Refusal { reason, share });
+                    }
+                    self.strategy.invalid(length);
+                    continue;
+                }
             };
             trial.actual = cost - evaluation.cost;
             let gain = trial.gain();
+            let near = promised <= self.options.cost_tolerance.sqrt() * cost;
             let settled = trial.actual.abs() <= negligible
                 && trial.predicted <= negligible
                 && gain <= 2.0
-                && promised <= self.options.cost_tolerance.sqrt() * cost;
+                && near;
             if gain < LEAST_GAIN {
                 if settled {
                     return Ok((point, Progress::Rest(Convergence::Cost)));
@@ -283,10 +425,14 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
             let short = tried == 0
                 && gain > 0.25
                 && felt_length(&point, step) <= self.options.step_tolerance * parameter_length;
-            let next = Self::arrive(problem, proposal.parameters, evaluation)?;
-            let progress = match (settled, short) {
-                (true, _) => Progress::Rest(Convergence::Cost),
-                (_, true) => Progress::Rest(Convergence::Step),
+            if length >= UNIMPEDED * full.length {
+                self.refused = None;
+            }
+            let next = self.arrive(problem, proposal.parameters, evaluation)?;
+            let progress = match (settled, short, self.at_wall()) {
+                (true, ..) => Progress::Rest(Convergence::Cost),
+                (_, true, Some(wall)) if !near => Progress::Stuck(wall),
+                (_, true, _) => Progress::Rest(Convergence::Step),
                 _ => Progress::Moved(trial),
             };
             return Ok((next, progress));
@@ -296,12 +442,46 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
         }
         match self.rescue(problem, &point)? {
             Verdict::Better(parameters, evaluation) => {
-                let next = Self::arrive(problem, parameters, evaluation)?;
+                let next = self.arrive(problem, parameters, evaluation)?;
                 Ok((next, Progress::Rescued))
             }
-            Verdict::Flat => Ok((point, Progress::Rest(Convergence::Cost))),
-            Verdict::WrongJacobian => Ok((point, Progress::NoDescent)),
+            Verdict::NoValue(reason) => Ok((point, Progress::Stuck(Ending::AtWall { reason }))),
+            Verdict::WrongJacobian => Ok((point, Progress::Stuck(Ending::NoDescent))),
+            Verdict::Flat => Ok((
+                point,
+                self.at_wall()
+                    .map_or(Progress::Rest(Convergence::Cost), Progress::Stuck),
+            )),
         }
+    }
+
+    /// ‖D p‖ for the greatest magnitudes that parameters have had; before any has left zero, the
+    /// undamped step's length.
+    fn reach(&self, full: &Full) -> f64 {
+        let reach = self.scaled_length(&self.farthest);
+        if reach > 0.0 { reach } else { full.length }
+    }
+
+    /// The ending, where steps were refused a value however short they were.
+    fn at_wall(&self) -> Option<Ending> {
+        let refusal = self.refused.as_ref().filter(|r| r.share <= AT_WALL)?;
+        Some(Ending::AtWall {
+            reason: refusal.reason.clone(),
+        })
+    }
+
+    fn name_of<O: System<Model = M>>(
+        problem: &mut Counted<O>,
+        index: usize,
+    ) -> Result<String, FitError> {
+        let mut name = String::new();
+        problem
+            .problem("name_count", |system| {
+                name = system.parameter_name(index);
+                Ok(())
+            })
+            .map_err(broken_off)?;
+        Ok(name)
     }
 
     fn iterate<O: System<Model = M>>(
@@ -325,8 +505,8 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
                 self.strategy.begin(self.scaled_length(&point.parameters));
                 Ok((point, KV::new()))
             }
-            Progress::NoDescent => {
-                self.ending = Some(Ending::NoDescent);
+            Progress::Stuck(ending) => {
+                self.ending = Some(ending);
                 Ok((point, KV::new()))
             }
             Progress::Rest(by) => {
@@ -344,8 +524,8 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
     fn show(&mut self, state: FitState, point: Point<M>) -> FitState {
         let mut state = state
             .param(point.parameters.clone())
-            .cost(point.evaluation.cost)
-            .gradient(point.model.gradient().clone());
+            .cost(point.evaluation.cost * self.unit * self.unit)
+            .gradient(point.model.gradient() * self.unit * self.unit);
         self.point = Some(point);
         state = match &self.ending {
             Some(ending) if ending.is_minimum() => {
@@ -374,7 +554,7 @@ where
         mut state: FitState,
     ) -> Result<(FitState, Option<KV>), argmin::core::Error> {
         let start = state.take_param().ok_or(FitError::NoParameters)?;
-        let point = Self::start(problem, start)?;
+        let point = self.start(problem, start)?;
         self.rescale(&point);
         self.strategy.begin(self.scaled_length(&point.parameters));
         Ok((self.show(state, point), None))
@@ -390,7 +570,7 @@ where
             Some(point) => point,
             None => {
                 let parameters = state.take_param().ok_or(FitError::NoParameters)?;
-                Self::start(problem, parameters)?
+                self.resume(problem, parameters)?
             }
         };
         let (point, report) = self.iterate(problem, point)?;

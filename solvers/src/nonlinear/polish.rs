@@ -43,14 +43,14 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
             if length <= 0.25 * f64::EPSILON * parameter_length {
                 break;
             }
-            let Ok(evaluation) = Self::evaluate(problem, &proposal.parameters)? else {
+            let Ok(evaluation) = self.evaluate(problem, &proposal.parameters)? else {
                 break;
             };
             let allowed = ROUNDINGS * Self::cost_rounding(&point);
             if evaluation.cost > point.evaluation.cost + allowed {
                 break;
             }
-            let next = Self::arrive(problem, proposal.parameters, evaluation)?;
+            let next = self.arrive(problem, proposal.parameters, evaluation)?;
             let next_proposal = self.undamped(&next)?;
             let next_effect = next.model.image_norm(&next_proposal.step);
             if next_effect.is_nan() || next_effect > CONTRACTION * effect {

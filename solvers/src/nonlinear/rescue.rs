@@ -1,8 +1,8 @@
 //! What is done, and said, when every step along a method's path has failed.
 //!
-//! Three things lead there: the cost is flat to its rounding although the undamped step promises
+//! Four things lead there: the cost is flat to its rounding although the undamped step promises
 //! more; columns of the Jacobian so badly scaled that no trust region suits them all; a Jacobian
-//! that does not belong to the residuals. The parameter with the steepest cost is moved alone to
+//! that does not belong to the residuals; a wall, beyond which the model has no value. The parameter with the steepest cost is moved alone to
 //! tell them apart.
 
 use argmin::core::Problem as Counted;
@@ -23,6 +23,8 @@ pub(super) enum Verdict {
     Flat,
     /// The cost does not change as the Jacobian says.
     WrongJacobian,
+    /// The model has no value where the parameter moves to.
+    NoValue(String),
 }
 
 /// Fractions of the parameter's own lowest point that are tried.
@@ -75,7 +77,7 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
                 break;
             }
             let parameters = moved(lowest * fraction);
-            if let Ok(evaluation) = Self::evaluate(problem, &parameters)? {
+            if let Ok(evaluation) = self.evaluate(problem, &parameters)? {
                 let fall = point.evaluation.cost - evaluation.cost;
                 if fall >= LEAST_GAIN * promised {
                     return Ok(Verdict::Better(parameters, evaluation));
@@ -86,11 +88,12 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
         let residual = (2.0 * point.evaluation.cost).sqrt();
         let h = DIFFERENCE * point.parameters[j].abs().max(residual / norms[j]);
         let (ahead, behind) = (
-            Self::evaluate(problem, &moved(h))?,
-            Self::evaluate(problem, &moved(-h))?,
+            self.evaluate(problem, &moved(h))?,
+            self.evaluate(problem, &moved(-h))?,
         );
-        let (Ok(ahead), Ok(behind)) = (ahead, behind) else {
-            return Ok(Verdict::Flat);
+        let (ahead, behind) = match (ahead, behind) {
+            (Ok(ahead), Ok(behind)) => (ahead, behind),
+            (Err(reason), _) | (_, Err(reason)) => return Ok(Verdict::NoValue(reason)),
         };
         let slope = 0.5 * (ahead.cost - behind.cost) / h;
         if (slope - gradient[j]).abs() <= DISAGREEMENT * norms[j] * residual {

@@ -8,7 +8,8 @@ use crate::loss::Loss;
 use crate::outcome::FitError;
 use crate::problem::{NoValue, Problem};
 
-/// The cost at some parameters, with the residuals where the system keeps them.
+/// The cost at some parameters, with the residuals where the system keeps them, both for residuals
+/// counted in the unit that was asked for.
 #[derive(Debug, Clone)]
 pub struct Evaluation {
     /// ½ Σ ρ(rᵢ²).
@@ -18,6 +19,9 @@ pub struct Evaluation {
 }
 
 /// A least-squares system that can be evaluated and linearised.
+///
+/// Residuals and their derivatives are divided by `unit`, a power of two that the minimiser chooses
+/// so that squares neither overflow nor vanish; it is 1 for residuals of ordinary size.
 pub trait System {
     /// The factored linear model it makes.
     type Model: LinearModel;
@@ -28,11 +32,12 @@ pub trait System {
     /// The name of a parameter.
     fn parameter_name(&self, index: usize) -> String;
 
-    /// Cost and residuals at some parameters, all finite.
+    /// Cost and residuals at some parameters. The residuals are finite; the cost is infinite where
+    /// their squares overflow.
     ///
     /// # Errors
     /// [`NoValue`] where the model is not defined or not finite.
-    fn evaluate(&self, parameters: &DVector<f64>) -> Result<Evaluation, NoValue>;
+    fn evaluate(&self, parameters: &DVector<f64>, unit: f64) -> Result<Evaluation, NoValue>;
 
     /// The linear model at parameters whose evaluation is given.
     ///
@@ -42,6 +47,7 @@ pub trait System {
         &self,
         parameters: &DVector<f64>,
         evaluation: &Evaluation,
+        unit: f64,
     ) -> Result<Self::Model, FitError>;
 
     /// The second derivative of the residuals along v, d²r(p + t v)/dt² at t = 0, in the rows of
@@ -52,6 +58,7 @@ pub trait System {
         _evaluation: &Evaluation,
         _model: &Self::Model,
         _direction: &DVector<f64>,
+        _unit: f64,
     ) -> Option<DVector<f64>> {
         None
     }
@@ -87,6 +94,11 @@ impl<'a, P: Problem + ?Sized> Dense<'a, P> {
 
     /// The Jacobian without the loss, checked for shape and finite entries.
     pub(crate) fn jacobian(&self, parameters: &DVector<f64>) -> Result<DMatrix<f64>, FitError> {
+        self.jacobian_in(1.0, parameters)
+    }
+
+    /// The Jacobian of the residuals counted in `unit`.
+    fn jacobian_in(&self, unit: f64, parameters: &DVector<f64>) -> Result<DMatrix<f64>, FitError> {
         let (rows, columns) = (
             self.problem.residual_count(),
             self.problem.parameter_count(),
@@ -104,6 +116,7 @@ impl<'a, P: Problem + ?Sized> Dense<'a, P> {
                 found_columns,
             });
         }
+        let jacobian = jacobian / unit;
         match jacobian.iter().position(|value| !value.is_finite()) {
             Some(at) => Err(FitError::JacobianNotFinite {
                 parameter: self.problem.parameter_name(at / rows),
@@ -140,12 +153,11 @@ impl<P: Problem + ?Sized> System for Dense<'_, P> {
         self.problem.parameter_name(index)
     }
 
-    fn evaluate(&self, parameters: &DVector<f64>) -> Result<Evaluation, NoValue> {
-        let residuals = self.residuals(parameters)?;
-        let cost = self.loss.cost(residuals.as_slice());
-        if !cost.is_finite() {
-            return Err(NoValue::new("the sum of squared residuals overflows"));
-        }
+    fn evaluate(&self, parameters: &DVector<f64>, unit: f64) -> Result<Evaluation, NoValue> {
+        let residuals = self.residuals(parameters)? / unit;
+        let cost = self.loss.in_unit(unit).cost(residuals.as_slice());
+        // A robust loss may make NaN of squares that overflow.
+        let cost = if cost.is_nan() { f64::INFINITY } else { cost };
         Ok(Evaluation { cost, residuals })
     }
 
@@ -153,10 +165,12 @@ impl<P: Problem + ?Sized> System for Dense<'_, P> {
         &self,
         parameters: &DVector<f64>,
         evaluation: &Evaluation,
+        unit: f64,
     ) -> Result<DenseModel, FitError> {
-        let mut jacobian = self.jacobian(parameters)?;
+        let mut jacobian = self.jacobian_in(unit, parameters)?;
         let (factorization, tolerance) = (self.factorization, self.rank_tolerance);
-        if self.loss.scale().is_none() {
+        let loss = self.loss.in_unit(unit);
+        if loss.scale().is_none() {
             let residuals = &evaluation.residuals;
             return Ok(DenseModel::new(
                 jacobian,
@@ -168,7 +182,7 @@ impl<P: Problem + ?Sized> System for Dense<'_, P> {
         let factors: Vec<(f64, f64)> = evaluation
             .residuals
             .iter()
-            .map(|&r| self.loss.row_factors(r))
+            .map(|&r| loss.row_factors(r))
             .collect();
         for mut column in jacobian.column_iter_mut() {
             for (entry, (row, _)) in column.iter_mut().zip(&factors) {
@@ -193,12 +207,13 @@ impl<P: Problem + ?Sized> System for Dense<'_, P> {
         evaluation: &Evaluation,
         model: &DenseModel,
         direction: &DVector<f64>,
+        unit: f64,
     ) -> Option<DVector<f64>> {
         if self.loss.scale().is_some() {
             return None;
         }
         let h = SECOND_DIFFERENCE;
-        let ahead = self.residuals(&(parameters + direction * h)).ok()?;
+        let ahead = self.residuals(&(parameters + direction * h)).ok()? / unit;
         let slope = model.image(direction)?;
         Some(((ahead - &evaluation.residuals) / h - slope) * (2.0 / h))
     }

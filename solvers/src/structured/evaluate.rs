@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::problem::{Parameters, StructuredProblem};
-use super::sink::Sink;
+use super::sink::{LEAST_COST, Sink};
 use crate::linear::bordered::{Bordered, BorderedCovariance, Group};
 use crate::problem::NoValue;
 
@@ -21,6 +21,9 @@ pub struct Evaluation {
     pub cost: f64,
     /// The factorised system.
     pub system: Bordered,
+    /// Whether the cost says nothing: it is so small that residuals other than zero have vanished
+    /// from it.
+    pub(super) vanished: bool,
 }
 
 /// Factorises all rows at a point.
@@ -35,14 +38,18 @@ pub fn evaluate<P: StructuredProblem>(problem: &P, at: &Parameters) -> Result<Ev
         problem.border_count(),
     );
     let mut cost = 0.0;
-    for_each_task(problem, &prepared, |groups| {
+    let vanished = for_each_task(problem, &prepared, |groups| {
         for group in &groups {
             cost += group.cost;
             system.absorb(group, 1.0);
         }
     })?;
     system.finish();
-    Ok(Evaluation { cost, system })
+    Ok(Evaluation {
+        vanished: vanished && cost < LEAST_COST,
+        cost,
+        system,
+    })
 }
 
 /// The trace of the hat matrix J cov Jᵀ, summed by part: how many unknowns the rows of each part
@@ -70,13 +77,13 @@ pub fn hat_traces<P: StructuredProblem>(
 }
 
 /// Runs the tasks on all cores and hands over their groups in order, the next tasks being
-/// worked on meanwhile.
+/// worked on meanwhile. True where squares of residuals have vanished somewhere.
 pub(super) fn for_each_task<P: StructuredProblem>(
     problem: &P,
     prepared: &P::Prepared,
     mut take: impl FnMut(Vec<Group>) + Send,
-) -> Result<(), NoValue> {
-    type Chunk = Result<Vec<Vec<Group>>, NoValue>;
+) -> Result<bool, NoValue> {
+    type Chunk = Result<Vec<(Vec<Group>, bool)>, NoValue>;
     let count = problem.task_count(prepared);
     let chunk = |from: usize| -> Chunk {
         (from..count.min(from + TASKS_AT_ONCE))
@@ -90,15 +97,17 @@ pub(super) fn for_each_task<P: StructuredProblem>(
     };
     let mut ready = chunk(0)?;
     let mut next = TASKS_AT_ONCE;
+    let mut vanished = false;
     loop {
         let mut hand_over = || {
-            for groups in std::mem::take(&mut ready) {
+            for (groups, some_vanished) in std::mem::take(&mut ready) {
+                vanished |= some_vanished;
                 take(groups);
             }
         };
         if next >= count {
             hand_over();
-            return Ok(());
+            return Ok(vanished);
         }
         let ((), following) = rayon::join(hand_over, || chunk(next));
         ready = following?;

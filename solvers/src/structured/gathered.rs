@@ -3,8 +3,9 @@
 
 use rayon::prelude::*;
 
-use super::evaluate::for_each_task;
+use super::evaluate::{Evaluation, for_each_task};
 use super::problem::{Parameters, StructuredProblem};
+use super::sink::LEAST_COST;
 use crate::linear::bordered::{Bordered, BorderedCovariance, Group, Solved};
 use crate::problem::NoValue;
 
@@ -20,6 +21,7 @@ pub(super) struct Gathered {
     groups: Vec<Group>,
     costs: Vec<f64>,
     weights: Vec<f64>,
+    vanished: bool,
 }
 
 impl Gathered {
@@ -31,7 +33,7 @@ impl Gathered {
         let prepared = problem.prepare(at)?;
         let mut all = Vec::new();
         let mut costs = vec![0.0; problem.part_count()];
-        for_each_task(problem, &prepared, |groups| {
+        let vanished = for_each_task(problem, &prepared, |groups| {
             for group in &groups {
                 costs[group.part] += group.cost;
             }
@@ -44,13 +46,24 @@ impl Gathered {
             groups: all,
             weights: vec![1.0; costs.len()],
             costs,
+            vanished,
         })
     }
 
     /// Half the sum of squares of all rows under their weights.
-    pub fn cost(&self) -> f64 {
+    fn cost(&self) -> f64 {
         let weighted = self.costs.iter().zip(&self.weights);
         weighted.map(|(cost, weight)| weight * weight * cost).sum()
+    }
+
+    /// Cost and factorised system.
+    pub fn evaluation(&self) -> Evaluation {
+        let cost = self.cost();
+        Evaluation {
+            cost,
+            system: self.system(),
+            vanished: self.vanished && cost < LEAST_COST,
+        }
     }
 
     /// Multiplies the rows of each part by a factor.
@@ -61,7 +74,7 @@ impl Gathered {
     }
 
     /// The factorised system.
-    pub fn system(&self) -> Bordered {
+    fn system(&self) -> Bordered {
         let mut system = Bordered::new(self.band, self.width, self.border);
         for group in &self.groups {
             system.absorb(group, self.weights[group.part]);

@@ -25,6 +25,9 @@ pub struct Minimiser {
     damping: f64,
     growth: f64,
     undamped_end: UndampedEnd,
+    /// Why a step was refused a value though it changes the rows by little, until a full step is
+    /// taken.
+    refused: Option<String>,
     iterations: Vec<Iteration>,
 }
 
@@ -99,6 +102,8 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// A step that fails though it changes the rows by no more than this fails for the rounding of the
 /// cost: a wrong Jacobian leads astray long before.
 const FAILED_BY_ROUNDING: f64 = 1e-12;
+/// Where a step that changes the rows by no more than this is refused a value, the wall is here.
+const AT_WALL: f64 = 1e-6;
 /// A step that promises no more than this share of the cost is near the end.
 const NEAR: f64 = 1e-9;
 /// Costs that differ by no more than this share are the same up to rounding.
@@ -125,6 +130,7 @@ impl Minimiser {
         start: Parameters,
         options: Options,
     ) -> Result<Self, NoValue> {
+        check_lengths(problem, &start)?;
         let evaluation = evaluate(problem, &start)?;
         Ok(Self::at(start, evaluation, None, options))
     }
@@ -160,6 +166,7 @@ impl Minimiser {
             damping: 0.0,
             growth: 2.0,
             undamped_end: UndampedEnd::NotTried,
+            refused: None,
             iterations: Vec::new(),
         }
     }
@@ -169,10 +176,7 @@ impl Minimiser {
     pub fn reweigh(&mut self, factors: &[f64]) {
         if let Some(gathered) = &mut self.gathered {
             gathered.reweigh(factors);
-            self.evaluation = Evaluation {
-                cost: gathered.cost(),
-                system: gathered.system(),
-            };
+            self.evaluation = gathered.evaluation();
             (self.full, self.scales) = (None, None);
         }
     }
@@ -221,6 +225,9 @@ impl Minimiser {
 
     /// Takes one step: one pass over the rows, or none where the step is the last.
     pub fn advance<P: StructuredProblem>(&mut self, problem: &P) -> Progress {
+        if self.evaluation.vanished || !self.evaluation.cost.is_finite() {
+            return Progress::Done(Ending::OutOfRange);
+        }
         let constraints = problem.constraints();
         let missing = constraints.missing(&self.at.band, &self.at.border);
         let system = &self.evaluation.system;
@@ -285,6 +292,14 @@ impl Minimiser {
         } else {
             evaluate(problem, &trial).map(|next| (next, None))
         };
+        let refused = match &next {
+            Ok((next, _)) if next.cost.is_finite() => None,
+            Ok(_) => Some("the sum of squared residuals is not finite".to_string()),
+            Err(no) => Some(no.reason.clone()),
+        };
+        if refused.is_some() && self.change(&solved) <= AT_WALL {
+            self.refused = refused;
+        }
         match next {
             Ok((next, gathered))
                 if next.cost.is_finite()
@@ -296,6 +311,9 @@ impl Minimiser {
                 (self.evaluation, self.gathered) = (next, gathered);
                 self.full = None;
                 self.record(predicted, true);
+                if self.damping == 0.0 {
+                    self.refused = None;
+                }
                 self.damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).max(0.1);
                 self.growth = 2.0;
                 if self.damping < NO_DAMPING {
@@ -308,8 +326,12 @@ impl Minimiser {
                 if self.damping == 0.0 && self.undamped_end == UndampedEnd::Tried {
                     self.undamped_end = UndampedEnd::LedAway;
                 }
+                let at_wall = self.refused.clone().map(|reason| Ending::AtWall { reason });
                 if failed_by_rounding {
-                    return self.end_here(problem, Convergence::Step);
+                    return match at_wall {
+                        Some(ending) => Progress::Done(ending),
+                        None => self.end_here(problem, Convergence::Step),
+                    };
                 }
                 self.damping = if self.damping == 0.0 {
                     FIRST_DAMPING
@@ -318,7 +340,7 @@ impl Minimiser {
                 };
                 self.growth *= 2.0;
                 if self.damping > TOO_MUCH_DAMPING {
-                    return Progress::Done(Ending::NoDescent);
+                    return Progress::Done(at_wall.unwrap_or(Ending::NoDescent));
                 }
             }
         }
@@ -392,16 +414,26 @@ impl Minimiser {
     }
 }
 
+/// Refuses a point of a problem of another size.
+fn check_lengths<P: StructuredProblem>(problem: &P, at: &Parameters) -> Result<(), NoValue> {
+    let expected = (problem.band_count(), problem.border_count());
+    let found = (at.band.len(), at.border.len());
+    if found == expected {
+        return Ok(());
+    }
+    Err(NoValue::new(format!(
+        "the start has {} unknowns in the band and {} in the border, the problem {} and {}",
+        found.0, found.1, expected.0, expected.1
+    )))
+}
+
 fn gather<P: StructuredProblem>(
     problem: &P,
     at: &Parameters,
 ) -> Result<(Evaluation, Gathered), NoValue> {
+    check_lengths(problem, at)?;
     let gathered = Gathered::new(problem, at)?;
-    let evaluation = Evaluation {
-        cost: gathered.cost(),
-        system: gathered.system(),
-    };
-    Ok((evaluation, gathered))
+    Ok((gathered.evaluation(), gathered))
 }
 
 /// Minimises from a start that satisfies the constraints.

@@ -3,6 +3,9 @@
 use crate::linear::banded::{Tall, compress};
 use crate::linear::bordered::{Group, Share};
 
+/// Below this, squares have lost digits: the least normal number over the rounding unit.
+pub(super) const LEAST_COST: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+
 /// Takes batches of rows, compresses each at once and keeps one small triangle a group.
 #[derive(Debug)]
 pub struct Sink {
@@ -11,6 +14,7 @@ pub struct Sink {
     columns: usize,
     groups: Vec<Group>,
     cost: f64,
+    vanished: bool,
 }
 
 impl Default for Sink {
@@ -21,6 +25,7 @@ impl Default for Sink {
             columns: 0,
             groups: Vec::new(),
             cost: 0.0,
+            vanished: false,
         }
     }
 }
@@ -44,6 +49,9 @@ impl Sink {
     pub fn push(&mut self) {
         let residual = self.batch.column(self.columns - 1);
         let cost = 0.5 * residual.iter().map(|r| r * r).sum::<f64>();
+        if cost < LEAST_COST && residual.iter().any(|r| *r != 0.0) {
+            self.vanished = true;
+        }
         self.push_with_cost(cost);
     }
 
@@ -67,8 +75,12 @@ impl Sink {
         });
     }
 
-    /// The groups that have come in since the last call.
-    pub(super) fn take(&mut self) -> Vec<Group> {
-        std::mem::take(&mut self.groups)
+    /// The groups that have come in since the last call, and whether a batch had residuals whose
+    /// squares are too small for a number.
+    pub(super) fn take(&mut self) -> (Vec<Group>, bool) {
+        (
+            std::mem::take(&mut self.groups),
+            std::mem::take(&mut self.vanished),
+        )
     }
 }

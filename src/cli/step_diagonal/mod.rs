@@ -89,16 +89,18 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             .iter()
             .map(|m| Measured {
                 axis: m.axis,
-                slope: m.slope,
-                std: m.std,
+                slope: *m.slope.get_ref(),
+                std: *m.std.get_ref(),
                 degrees_of_freedom: m.degrees_of_freedom.unwrap_or(DegreesOfFreedom::Infinite),
             })
             .collect(),
-        noise: setup.test.noise,
+        noise: setup.test.noise_um(),
     };
     let refused = |e: DiagonalError| {
         let message = match e {
             DiagonalError::Numerical { .. } => Message::not_solved(e.to_string()),
+            DiagonalError::MeasuredUncertainty { .. } => Message::bad_input(e.to_string())
+                .remedy("give the slope and its standard uncertainty in um/mm"),
             _ => Message::bad_input(e.to_string()).remedy("see `errsep step-diagonal --help`"),
         };
         message.in_file(&args.data)

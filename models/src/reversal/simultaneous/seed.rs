@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_PI_4;
 
+use errsep_solvers::linear::limited::svd;
 use errsep_solvers::structured::Parameters;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -42,10 +43,9 @@ pub fn tilts(unknowns: &Unknowns, lines: &[(f64, f64)]) -> Vec<f64> {
     let signs = DMatrix::from_fn(lines.len(), count, |c, j| unknowns.slope_signs(c)[j]);
     let slopes = DVector::from_iterator(lines.len(), lines.iter().map(|l| l.0));
     // The signs are those of an orthogonal design with a row or a column left out: always solvable.
-    signs
-        .svd(true, true)
-        .solve(&slopes, 1e-9)
-        .map_or_else(|_| vec![0.0; count], |t| t.iter().copied().collect())
+    svd(signs, true, true)
+        .and_then(|factors| factors.solve(&slopes, 1e-9).ok())
+        .map_or_else(|| vec![0.0; count], |t| t.iter().copied().collect())
 }
 
 /// The starting point: these tilts, the lines' offsets, forms of zero (the first step finds them:

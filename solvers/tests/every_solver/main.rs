@@ -1,5 +1,7 @@
 //! Every method on every problem: one table, and where a method is expected to fail, its words.
 
+mod endings;
+
 use errsep_solvers::{
     Damping, Ending, Factorization, Fit, Method, Options, Problem, ProjectedJacobian, fit,
     fit_separable, structured,
@@ -147,7 +149,8 @@ const METHODS: [(&str, Method); 4] = [
     ("dogleg", Method::Dogleg),
 ];
 
-fn solvers() -> Vec<Solver> {
+/// Every method with every factorisation, with and without geodesic acceleration.
+fn dense_options() -> Vec<(String, Options)> {
     let mut all = Vec::new();
     for (name, method) in METHODS {
         for (kind, factorization) in [("QR", Factorization::Qr), ("SVD", Factorization::Svd)] {
@@ -157,9 +160,19 @@ fn solvers() -> Vec<Solver> {
                     geodesic_acceleration,
                     ..Options::with_method(method)
                 };
-                all.push(dense(&format!("{name} {kind}{extra}"), options));
+                all.push((format!("{name} {kind}{extra}"), options));
             }
         }
+    }
+    all
+}
+
+fn solvers() -> Vec<Solver> {
+    let mut all: Vec<Solver> = dense_options()
+        .into_iter()
+        .map(|(name, options)| dense(&name, options))
+        .collect();
+    for (name, method) in METHODS {
         for (kind, jacobian) in [
             ("Kaufman", ProjectedJacobian::Kaufman),
             ("full", ProjectedJacobian::Full),
@@ -200,6 +213,7 @@ enum Word {
     Converged,
     NotIdentifiable,
     IterationLimit,
+    AtWall,
     Other,
 }
 
@@ -208,6 +222,7 @@ fn word(ending: &Ending) -> Word {
         Ending::Converged(_) => Word::Converged,
         Ending::NotIdentifiable { .. } => Word::NotIdentifiable,
         Ending::IterationLimit => Word::IterationLimit,
+        Ending::AtWall { .. } => Word::AtWall,
         _ => Word::Other,
     }
 }
@@ -223,10 +238,10 @@ enum Expected {
 }
 
 use Expected::{Finds, Misses};
-use Word::{Converged, IterationLimit, NotIdentifiable};
+use Word::{AtWall, Converged, IterationLimit, NotIdentifiable};
 
 /// Problem, the beginnings of the methods' names, and what they do.
-const EXCEPTIONS: [(&str, &[&str], Expected); 19] = [
+const EXCEPTIONS: [(&str, &[&str], Expected); 20] = [
     // At these minima the Jacobian has lost rank for good.
     ("33 linear, rank one (5)", &[""], Finds(&[NotIdentifiable])),
     (
@@ -279,12 +294,10 @@ const EXCEPTIONS: [(&str, &[&str], Expected); 19] = [
         &["VarPro"],
         Misses(&[Converged, NotIdentifiable]),
     ),
-    // Damping without a radius lets the rate run to where exp(-b2 x) has vanished.
-    (
-        "BoxBOD/1",
-        &["LM Nielsen", "banded", "bordered"],
-        Misses(&[Converged]),
-    ),
+    // Damping without a radius lets the rate run to where exp(-b2 x) has vanished; the way back
+    // overshoots to rates at which it overflows.
+    ("BoxBOD/1", &["LM Nielsen"], Misses(&[AtWall])),
+    ("BoxBOD/1", &["banded", "bordered"], Misses(&[Converged])),
     (
         "MGH10/1",
         &["LM Nielsen", "banded", "bordered"],

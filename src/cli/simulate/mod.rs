@@ -113,6 +113,33 @@ fn known_in_a_line(truth: &Value) -> String {
     parts.join(", ")
 }
 
+/// Most readings that a kind without a bound of its own simulates.
+const MOST_READINGS: usize = 10_000_000;
+
+/// Refuses a standard deviation that is none: `sizes` are options with their values.
+pub(super) fn standard_deviations(sizes: &[(&str, f64)]) -> Result<(), Message> {
+    for (option, value) in sizes {
+        if !(value.is_finite() && *value >= 0.0) {
+            return Err(
+                Message::bad_input(format!("{option} {value} is no standard deviation"))
+                    .remedy(format!("give {option} a finite number, zero or greater")),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Refuses more readings than are simulated: their number is the product of `counts`, which
+/// `options` set.
+pub(super) fn few_enough(counts: &[usize], options: &str) -> Result<(), Message> {
+    let product = counts.iter().fold(1_usize, |n, c| n.saturating_mul(*c));
+    if product <= MOST_READINGS {
+        return Ok(());
+    }
+    Err(Message::bad_input("that many readings are not simulated")
+        .remedy(format!("give ten million at most: lower {options}")))
+}
+
 /// The effects that are switched on, by what `make` knows of a name and a size.
 pub(super) fn effects<E>(
     texts: &[String],

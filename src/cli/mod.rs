@@ -108,8 +108,6 @@ fn answered(
     let folder = out
         .map(|place| OutFolder::reserve(place, common.force))
         .transpose()?;
-    if folder.is_some() || common.format == Format::Json {
-        begin_record();
-    }
+    begin_record(folder.is_some() || common.format == Format::Json);
     work()?.deliver(common.format, folder)
 }

@@ -23,15 +23,22 @@ thread_local! {
 }
 
 /// What has been read since the record began.
-#[derive(Default)]
 struct Record {
+    hashing: bool,
     digests: Vec<(PathBuf, String)>,
     pipes: Vec<(PathBuf, Arc<Mutex<Pipe>>)>,
 }
 
-/// Begins the record of what this thread reads; an earlier one ends.
-pub fn begin_record() {
-    RECORD.with_borrow_mut(|record| *record = Some(Record::default()));
+/// Begins the record of what this thread reads, with digests where they are wanted; an earlier one
+/// ends.
+pub fn begin_record(hashing: bool) {
+    RECORD.with_borrow_mut(|record| {
+        *record = Some(Record {
+            hashing,
+            digests: Vec::new(),
+            pipes: Vec::new(),
+        });
+    });
 }
 
 /// What a record says of an input.
@@ -108,7 +115,9 @@ impl Source {
         Ok(Self {
             path: path.to_owned(),
             bytes,
-            hash: RECORD.with_borrow(Option::is_some).then(Sha256::new),
+            hash: RECORD
+                .with_borrow(|record| record.as_ref().is_some_and(|r| r.hashing))
+                .then(Sha256::new),
         })
     }
 }
@@ -192,7 +201,7 @@ mod tests {
     fn the_digest_is_that_of_what_was_read() {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(b"abc").unwrap();
-        begin_record();
+        begin_record(true);
         assert_eq!(digest_of(file.path()), Read256::Unread);
         assert_eq!(whole(file.path()), b"abc");
         // The SHA-256 of "abc" in FIPS 180-2, appendix B.1.
@@ -203,7 +212,7 @@ mod tests {
         assert_eq!(digest_of(file.path()), Read256::Digest(abc.to_owned()));
         assert_eq!(whole(file.path()), b"abcd");
         assert_eq!(digest_of(file.path()), Read256::Changed);
-        begin_record();
+        begin_record(true);
         assert_eq!(digest_of(file.path()), Read256::Unread);
     }
 
@@ -211,7 +220,7 @@ mod tests {
     fn a_reading_that_stops_early_has_no_digest() {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(b"abc").unwrap();
-        begin_record();
+        begin_record(true);
         let mut two = [0; 2];
         let mut source = Source::open(file.path()).unwrap();
         source.read_exact(&mut two).unwrap();

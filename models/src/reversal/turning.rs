@@ -58,6 +58,18 @@ pub enum NoTraces {
         /// Which sample, from 0.
         index: usize,
     },
+    /// The speed that is given does not go with the samples.
+    #[error(
+        "at {rpm} turns a minute the run has {turns} turns of {per_turn} samples: three turns of more than four samples are needed"
+    )]
+    Speed {
+        /// Turns a minute as given.
+        rpm: f64,
+        /// Turns in the run, to one digit.
+        turns: f64,
+        /// Samples a turn, to one digit.
+        per_turn: f64,
+    },
     /// Nothing turns.
     #[error("no once-per-turn wave stands out of the readings")]
     NoWave,
@@ -70,6 +82,8 @@ const HARMONICS: usize = 2;
 /// Samples a turn needs, and turns a run needs.
 const SAMPLES_PER_TURN: f64 = 20.0;
 const FEWEST_TURNS: f64 = 3.0;
+/// Samples a turn below which its second harmonic cannot be told from a slower wave.
+const SHOWN_BY: f64 = 4.0;
 
 /// Finds how the spindle turned; `about` is a guess of its turns in a second, if there is one.
 ///
@@ -87,7 +101,18 @@ pub fn find_turning(samples: &[Sample], about: Option<f64>) -> Result<Turning, N
     let span = samples[n - 1].time - samples[0].time;
     let step = 1.0 / (2.0 * span);
     let (from, to) = match about {
-        Some(f) => (0.95 * f, 1.05 * f),
+        Some(f) => {
+            let (turns, per_turn) = (f * span, n as f64 / (f * span));
+            if !(turns >= FEWEST_TURNS && per_turn > SHOWN_BY) {
+                let tenths = |v: f64| (10.0 * v).round() / 10.0;
+                return Err(NoTraces::Speed {
+                    rpm: 60.0 * f,
+                    turns: tenths(turns),
+                    per_turn: tenths(per_turn),
+                });
+            }
+            (0.95 * f, 1.05 * f)
+        }
         None => (FEWEST_TURNS / span, n as f64 / (SAMPLES_PER_TURN * span)),
     };
     if !(from > 0.0 && from < to) {

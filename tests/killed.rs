@@ -134,7 +134,7 @@ fn sigkill_leaves_the_old_report_or_the_new_one() {
 fn sigkill_leaves_no_part_of_a_new_folder() {
     let scene = scene();
     let folder = scene.path();
-    let time = duration(folder);
+    let mut time = duration(folder);
     let mut random = ChaCha8Rng::seed_from_u64(6);
     let mut made = 0;
     for kill in 0..KILLS {
@@ -149,7 +149,10 @@ fn sigkill_leaves_no_part_of_a_new_folder() {
         wait(&mut child, folder, until, aim);
         let _ = child.kill();
         child.wait().unwrap();
-        if folder.join("new").exists() {
+        // As many come too early as too late, however busy the machine is.
+        let late = folder.join("new").exists();
+        time = time.mul_f64(if late { 0.95 } else { 1.05 });
+        if late {
             assert_eq!(whole(&folder.join("new/below/it")), "b.csv");
             fs::remove_dir_all(folder.join("new")).unwrap();
             made += 1;

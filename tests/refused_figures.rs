@@ -48,6 +48,39 @@ fn a_standard_deviation_is_not_negative() {
 }
 
 #[test]
+fn sizes_that_overflow_make_no_data() {
+    let folder = Folder::with(&[]);
+    for arguments in [
+        &[
+            "simulate",
+            "reversal",
+            "--positions",
+            "9",
+            "--alpha",
+            "1e308",
+        ][..],
+        &[
+            "simulate",
+            "calibration-line",
+            "--slope",
+            "1e308",
+            "--full-scale",
+            "100",
+        ],
+        &[
+            "simulate",
+            "circle",
+            "--radius",
+            "1e308",
+            "--centre-x",
+            "1.7e308",
+        ],
+    ] {
+        bad_input(&folder, arguments, &["help: "]);
+    }
+}
+
+#[test]
 fn huge_counts_are_refused_before_any_memory_is_taken() {
     let machine = "chain = \"XYFZ\"\n[errors.EXX]\nvalue = 1.0\nstd = 0.1\n";
     let folder = Folder::with(&[("m.toml", machine)]);

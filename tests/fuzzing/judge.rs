@@ -80,9 +80,7 @@ fn judged(code: i32, stdout: &str, stderr: &str, as_json: bool) -> Result<usize,
             return Err("no answer and not a word".to_owned());
         }
         2 if !stdout.is_empty() => return Err(format!("refused, with an answer: {stdout}")),
-        2 if !stderr.contains("help: ") && !stderr.contains("error: ") => {
-            return Err(format!("refused without a remedy: {stderr}"));
-        }
+        2 if stderr.trim().is_empty() => return Err("refused without a word".to_owned()),
         _ => {}
     }
     Ok(ending)

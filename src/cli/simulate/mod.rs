@@ -178,6 +178,10 @@ pub(super) fn effects<E>(
         .collect()
 }
 
+/// Columns in which a reading may be missing: the time where none is told, and what the second and
+/// third probe cannot reach.
+const MAY_BE_MISSING: [&str; 3] = ["time", "m2", "m3"];
+
 /// A simulation as every kind answers: the data as text in the form that the commands read, with its
 /// truth in comments; data and truth as JSON.
 pub(super) fn answer(
@@ -186,6 +190,20 @@ pub(super) fn answer(
     truth: Value,
     seed: u64,
 ) -> Result<Answer, Message> {
+    let beyond = data.columns.iter().find(|(name, values)| match values {
+        Values::Numbers(v) => {
+            let may_be_missing = MAY_BE_MISSING.contains(&name.as_str());
+            !v.iter()
+                .all(|x| x.is_finite() || (may_be_missing && x.is_nan()))
+        }
+        Values::Texts(_) | Values::Words(..) => false,
+    });
+    if let Some((name, _)) = beyond {
+        return Err(Message::bad_input(format!(
+            "these sizes make a {name} that is no finite number"
+        ))
+        .remedy("give sizes nearer to those of a machine"));
+    }
     let unwritable = |e: String| Message::bad_input(format!("the data cannot be written: {e}"));
     let mut bytes = Vec::new();
     data.write(&mut bytes)

@@ -2,8 +2,11 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use errsep::cli::Cli;
 
 fn main() -> ExitCode {
-    errsep::cli::Cli::parse().execute()
+    match Cli::from_arguments() {
+        Ok(command) => command.execute(),
+        Err(status) => status,
+    }
 }

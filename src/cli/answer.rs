@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::common::Format;
 use crate::io::provenance::Provenance;
-use crate::io::{CsvTable, Message, OutFolder, Status};
+use crate::io::{CsvTable, Message, OutFolder, Status, printable};
 use crate::report::{self, Page};
 
 /// The answer of a command, in every form in which it may be asked for.
@@ -46,17 +46,12 @@ impl Answer {
             status,
         } = self;
         if folder.is_none() && format == Format::Text {
-            print(&text)?;
+            print(&printable::lines(&text))?;
             return Ok(status);
         }
-        let provenance = Provenance::of(inputs.iter().map(PathBuf::as_path), seed)?;
-        if let Value::Object(object) = &mut json {
-            object.insert("provenance".to_owned(), as_json(&provenance)?);
-        }
-        let mut result = serde_json::to_string_pretty(&json).map_err(unwritable)?;
-        result.push('\n');
-        let mut written = String::new();
-        if let Some(folder) = folder {
+        let mut provenance = Provenance::of(inputs.iter().map(PathBuf::as_path), seed)?;
+        let (mut folder, mut written) = (folder, String::new());
+        if let Some(folder) = &mut folder {
             let page = page.provenance(report::Provenance {
                 version: provenance.version.to_owned(),
                 command: format!("{} {}", provenance.program, provenance.command.join(" ")),
@@ -69,20 +64,29 @@ impl Answer {
                 date: None,
             });
             folder.write("report.html", page.render().as_bytes())?;
-            folder.write("result.json", result.as_bytes())?;
             for table in &tables {
                 folder.write_table(table)?;
             }
-            let place = folder.place().display().to_string();
-            folder.finish()?;
+            provenance.files = folder.written();
             let names = tables.iter().map(|t| format!(", {}", t.file_name));
             written = format!(
-                "\nWritten to {place}: report.html, result.json{}\n",
+                "\nWritten to {}: report.html, result.json{}\n",
+                folder.place().display(),
                 names.collect::<String>()
             );
         }
+        if let Value::Object(object) = &mut json {
+            object.insert("provenance".to_owned(), as_json(&provenance)?);
+        }
+        let pretty = serde_json::to_string_pretty(&json).map_err(unwritable)?;
+        let mut result = printable::json(&pretty).into_owned();
+        result.push('\n');
+        if let Some(mut folder) = folder {
+            folder.write("result.json", result.as_bytes())?;
+            folder.finish(&inputs)?;
+        }
         match format {
-            Format::Text => print(&(text + &written))?,
+            Format::Text => print(&printable::lines(&(text + &written)))?,
             Format::Json => print(&result)?,
         }
         Ok(status)

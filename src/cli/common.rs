@@ -25,6 +25,9 @@ pub struct CommonArgs {
     /// Write report.html, result.json and CSV tables into this folder.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Let --out replace files that errsep did not write, or that it has just read.
+    #[arg(long, requires = "out")]
+    pub force: bool,
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,

@@ -16,6 +16,7 @@ pub mod step_diagonal;
 pub mod straightness;
 pub mod traces;
 
+use std::borrow::Cow;
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -24,7 +25,8 @@ use clap::{Parser, Subcommand};
 pub use answer::Answer;
 pub use common::{CommonArgs, Format, progress};
 
-use crate::io::{Message, OutFolder, Status};
+use crate::io::source::begin_record;
+use crate::io::{Message, OutFolder, Status, printable};
 
 /// Separates a machine tool's geometric errors from those of the artefact, the sensors and the
 /// set-up, with uncertainty.
@@ -52,6 +54,25 @@ enum Command {
 }
 
 impl Cli {
+    /// The command line of this process. Help and version are printed and end it with status 0, a
+    /// command line that is not understood with 2.
+    ///
+    /// # Errors
+    /// How the process must end.
+    pub fn from_arguments() -> Result<Self, ExitCode> {
+        Self::try_parse().map_err(|error| {
+            let plain = error.render().to_string();
+            match printable::lines(&plain) {
+                Cow::Borrowed(_) => error.exit(),
+                // It repeats what a terminal would obey.
+                Cow::Owned(safe) => {
+                    let _ = write!(std::io::stderr(), "{safe}");
+                    ExitCode::from(Status::BadInput.code())
+                }
+            }
+        })
+    }
+
     /// Runs the command, prints or writes its answer, and says how it ended: 0 done, 1 could not
     /// be solved, 2 bad input.
     pub fn execute(&self) -> ExitCode {
@@ -83,6 +104,10 @@ fn answered(
     common: &CommonArgs,
     work: impl FnOnce() -> Result<Answer, Message>,
 ) -> Result<Status, Message> {
-    let folder = common.out.as_deref().map(OutFolder::reserve).transpose()?;
+    let out = common.out.as_deref();
+    let folder = out
+        .map(|place| OutFolder::reserve(place, common.force))
+        .transpose()?;
+    begin_record(folder.is_some() || common.format == Format::Json);
     work()?.deliver(common.format, folder)
 }

@@ -11,6 +11,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use serde_json::json;
+use toml::Spanned;
 
 use super::{Answer, CommonArgs};
 use crate::diagnosis::{Diagnosability, NoiseLaw, NoiseSource, Options, certificate, for_people};
@@ -41,34 +42,103 @@ pub struct Args {
     pub(super) common: CommonArgs,
 }
 
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Planned {
-    noise: f64,
-    travel: f64,
-    positions: usize,
-    #[serde(default = "one")]
-    repeats: u32,
+struct File {
+    noise: Spanned<f64>,
+    travel: Spanned<f64>,
+    positions: Spanned<usize>,
+    repeats: Option<Spanned<u32>>,
     #[serde(default)]
     both_directions: bool,
-    #[serde(default = "expected_tilts")]
-    tilts: [f64; 3],
-    #[serde(default = "expected_forms")]
-    forms: [f64; 2],
+    tilts: Option<Spanned<[f64; 3]>>,
+    forms: Option<Spanned<[f64; 2]>>,
     #[serde(default)]
     convention: Convention,
 }
 
-fn one() -> u32 {
-    1
+#[derive(Debug, Clone)]
+struct Planned {
+    noise: f64,
+    travel: f64,
+    positions: usize,
+    repeats: u32,
+    both_directions: bool,
+    tilts: [f64; 3],
+    forms: [f64; 2],
+    convention: Convention,
 }
 
-fn expected_tilts() -> [f64; 3] {
-    [50.0, 0.0, 20.0]
-}
+/// What is expected where the set-up does not say it: tilts, urad, and forms, um.
+const TILTS: [f64; 3] = [50.0, 0.0, 20.0];
+const FORMS: [f64; 2] = [1.0, 1.0];
 
-fn expected_forms() -> [f64; 2] {
-    [1.0, 1.0]
+/// Greater expectations are slips of the unit: travel, mm, noise and forms, um, tilts, urad.
+const LONGEST_TRAVEL: f64 = 1e6;
+const LARGEST: f64 = 1e6;
+
+impl Planned {
+    fn read(setup: &SetupFile) -> Result<Self, Message> {
+        let file: File = setup.parse()?;
+        let within = |value: &Spanned<f64>, name: &str, most: f64, unit: &str| {
+            if *value.get_ref() > 0.0 && *value.get_ref() <= most {
+                return Ok(*value.get_ref());
+            }
+            let what = format!("{name} = {} {unit} cannot be planned", value.get_ref());
+            let remedy = format!("give {name} in {unit}, greater than zero and at most {most}");
+            Err(setup.bad(value.span(), what, remedy))
+        };
+        let noise = within(&file.noise, "noise", LARGEST, "um")?;
+        let travel = within(&file.travel, "travel", LONGEST_TRAVEL, "mm")?;
+        let (positions, at_positions) = (*file.positions.get_ref(), file.positions.span());
+        let repeats = file.repeats.as_ref().map_or(1, |r| *r.get_ref());
+        if let Some(given) = &file.repeats
+            && repeats == 0
+        {
+            return Err(setup.bad(given.span(), "no repeat gives no reading", "give 1 or more"));
+        }
+        let directions = if file.both_directions { 2 } else { 1 };
+        let readings = positions
+            .saturating_mul(4 * directions)
+            .saturating_mul(repeats as usize);
+        if positions < 5 || readings > MOST_READINGS {
+            return Err(setup.bad(
+                at_positions,
+                format!("{positions} positions make a plan of {readings} readings"),
+                format!("give 5 or more positions, and {MOST_READINGS} readings at most"),
+            ));
+        }
+        let limits = |least: f64| least..=LARGEST;
+        let (tilts, forms) = (file.tilts, file.forms);
+        if let Some(tilts) = &tilts
+            && !tilts.get_ref().iter().all(|t| limits(-LARGEST).contains(t))
+        {
+            return Err(setup.bad(
+                tilts.span(),
+                "the expected tilts cannot be",
+                "give alpha, beta, gamma in urad, finite and below 1e6",
+            ));
+        }
+        if let Some(forms) = &forms
+            && !forms.get_ref().iter().all(|f| limits(0.0).contains(f))
+        {
+            return Err(setup.bad(
+                forms.span(),
+                "the expected forms cannot be",
+                "give root mean squares of slide and artefact in um, zero or greater and below 1e6",
+            ));
+        }
+        Ok(Self {
+            noise,
+            travel,
+            positions,
+            repeats,
+            both_directions: file.both_directions,
+            tilts: tilts.map_or(TILTS, Spanned::into_inner),
+            forms: forms.map_or(FORMS, Spanned::into_inner),
+            convention: file.convention,
+        })
+    }
 }
 
 /// Most readings of a plan.
@@ -85,36 +155,12 @@ const DRAWS: usize = 400;
 /// # Errors
 /// The set-up is bad, or the plan leaves nothing over to diagnose.
 pub fn run(args: &Args) -> Result<Answer, Message> {
-    let file = SetupFile::read(&args.plan)?;
-    let planned: Planned = file.parse()?;
-    let bad =
-        |what: &str, remedy: &str| Message::bad_input(what).in_file(&args.plan).remedy(remedy);
-    let directions = if planned.both_directions { 2 } else { 1 };
-    let readings = planned
-        .positions
-        .saturating_mul(4 * directions)
-        .saturating_mul(planned.repeats as usize);
-    if planned.positions < 5 || planned.repeats == 0 || readings > MOST_READINGS {
-        return Err(bad(
-            "the plan has too few or too many readings",
-            "give 5 or more positions and 1 or more repeats, 100000 readings at most",
-        ));
-    }
-    if !(planned.noise > 0.0
-        && planned.noise.is_finite()
-        && planned.travel > 0.0
-        && planned.travel.is_finite())
-    {
-        return Err(bad(
-            "noise and travel must be greater than zero",
-            "give noise in um and travel in mm",
-        ));
-    }
+    let planned = Planned::read(&SetupFile::read(&args.plan)?)?;
     let rows = certified(&planned, args.common.seed).map_err(|m| m.in_file(&args.plan))?;
     let extras = extras(&planned)
         .into_iter()
         .map(|(name, plan)| {
-            let with = certified(&plan, args.common.seed)?;
+            let with = certified(&plan, args.common.seed).map_err(|m| m.in_file(&args.plan))?;
             Ok((name, gain(&rows, &with), newly(&rows, &with)))
         })
         .collect::<Result<Vec<_>, Message>>()?;

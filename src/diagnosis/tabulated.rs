@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use errsep_models::model::{About, Column, Effect, FittedModel, Parameter, Place, Shape};
 use serde::Deserialize;
+use toml::Spanned;
 
 use super::formula::{Circumstances, Formula};
 
@@ -36,7 +37,7 @@ pub struct Tabulated {
 #[serde(deny_unknown_fields)]
 pub struct TabulatedEffects {
     /// One table each.
-    pub effect: Vec<Tabulated>,
+    pub effect: Vec<Spanned<Tabulated>>,
 }
 
 fn circumstances(place: &Place) -> Circumstances {

@@ -152,7 +152,7 @@ impl Dialect {
 }
 
 /// A control character that no text file holds.
-const fn is_binary(byte: u8) -> bool {
+pub(super) const fn is_binary(byte: u8) -> bool {
     byte < b' ' && !matches!(byte, b'\t' | b'\n' | b'\r' | 0x0C | 0x1A)
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use errsep_models::machine::{
     COMPONENTS, Chain, Component, ComponentError, ErrorFunction, Kind, LineSummary, Machine,
-    Observation, Position, Sense, Spread, fit_component,
+    MachineError, Observation, Position, Sense, Spread, fit_component,
 };
 use errsep_models::uncertainty::DegreesOfFreedom;
 use nalgebra::Vector3;
@@ -80,11 +80,58 @@ struct RegressionEntry {
 /// Highest degree of a fitted polynomial.
 const HIGHEST_DEGREE: usize = 30;
 
+/// A machine and the file that it comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FiledMachine {
+    /// The machine.
+    pub machine: Machine,
+    file: SetupFile,
+    /// Where the entry of each component stands, by its index.
+    entries: BTreeMap<usize, Range<usize>>,
+}
+
+impl FiledMachine {
+    /// What the machine cannot answer, at the entry that is the reason.
+    pub fn wrong(&self, error: &MachineError, remedy: &str) -> Message {
+        refused(&self.file, &self.entries, error, remedy)
+    }
+}
+
+fn refused(
+    file: &SetupFile,
+    entries: &BTreeMap<usize, Range<usize>>,
+    error: &MachineError,
+    remedy: &str,
+) -> Message {
+    let of = match error {
+        MachineError::OutsideTable { component, .. }
+        | MachineError::BadComponent { component, .. }
+        | MachineError::NotAFunction { component }
+        | MachineError::RepeatedComponent { component }
+        | MachineError::Regression { component, .. } => entries.get(&component.index()),
+        _ => None,
+    };
+    match of {
+        Some(span) => file.bad(span.clone(), error.to_string(), remedy),
+        None => Message::bad_input(error.to_string())
+            .in_file(file.path())
+            .remedy(remedy),
+    }
+}
+
 /// Reads a machine; `components` are the readings to which its entries with a `degree` are fitted.
 ///
 /// # Errors
 /// A file that cannot be read, and whatever is wrong with an entry, at its line.
 pub fn read_machine(path: &Path, components: Option<&Path>) -> Result<Machine, Message> {
+    Ok(read_filed(path, components)?.machine)
+}
+
+/// As [`read_machine`], for messages that point into the file later.
+///
+/// # Errors
+/// Those of [`read_machine`].
+pub fn read_filed(path: &Path, components: Option<&Path>) -> Result<FiledMachine, Message> {
     let file = SetupFile::read(path)?;
     let content: MachineFile = file.parse()?;
     let mut readings = match components {
@@ -93,8 +140,10 @@ pub fn read_machine(path: &Path, components: Option<&Path>) -> Result<Machine, M
     };
     let chain = chain(&file, &content)?;
     let mut errors = Vec::new();
+    let mut entries = BTreeMap::new();
     for (name, entry) in &content.errors {
         let component = component(&file, name, entry.span())?;
+        entries.insert(component.index(), entry.span());
         let given = readings.remove(&component.index());
         let error = component_error(&file, component, entry, given.as_deref(), components)?;
         errors.push(error);
@@ -116,11 +165,19 @@ pub fn read_machine(path: &Path, components: Option<&Path>) -> Result<Machine, M
         SenseName::Tool => Sense::Tool,
         SenseName::Work => Sense::Work,
     };
-    Machine::new(chain, sense, errors).map_err(|error| {
-        Message::bad_input(error.to_string())
-            .in_file(path)
-            .remedy("correct the entry of this component")
-    })
+    match Machine::new(chain, sense, errors) {
+        Ok(machine) => Ok(FiledMachine {
+            machine,
+            file,
+            entries,
+        }),
+        Err(error) => Err(refused(
+            &file,
+            &entries,
+            &error,
+            "correct the entry of this component",
+        )),
+    }
 }
 
 fn chain(file: &SetupFile, content: &MachineFile) -> Result<Chain, Message> {
@@ -247,9 +304,7 @@ fn component_error(
         },
         _ => ErrorFunction::constant(0.0),
     };
-    let wrong = |error: errsep_models::machine::MachineError| {
-        bad(error.to_string(), "correct the numbers of this entry")
-    };
+    let wrong = |error: MachineError| bad(error.to_string(), "correct the numbers of this entry");
     function.check(component).map_err(wrong)?;
     let spread = spread(component, e).map_err(wrong)?;
     Ok(ComponentError {
@@ -259,8 +314,8 @@ fn component_error(
     })
 }
 
-fn spread(component: Component, e: &Entry) -> Result<Spread, errsep_models::machine::MachineError> {
-    use errsep_models::machine::MachineError::BadComponent;
+fn spread(component: Component, e: &Entry) -> Result<Spread, MachineError> {
+    use MachineError::BadComponent;
     let bad = |why: &str| BadComponent {
         component,
         why: why.to_owned(),
@@ -299,13 +354,10 @@ fn read_components(path: &Path) -> Result<BTreeMap<usize, Vec<Observation>>, Mes
     let position = table.column("position")?;
     let mut readings: BTreeMap<usize, Vec<Observation>> = BTreeMap::new();
     while let Some(row) = table.next_row()? {
-        let component: Component =
-            row.text(&name)
-                .parse()
-                .map_err(|error: errsep_models::machine::MachineError| {
-                    row.error(&name, error.to_string())
-                        .remedy("use the names of ISO 230-1")
-                })?;
+        let component: Component = row.text(&name).parse().map_err(|error: MachineError| {
+            row.error(&name, error.to_string())
+                .remedy("use the names of ISO 230-1")
+        })?;
         let observation = Observation {
             position: row.number(&position)?,
             value: row.number(&value)?,

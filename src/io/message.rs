@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use miette::{Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan};
 use thiserror::Error;
 
+use super::printable;
+
 /// How a run ended, as the exit status says it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Status {
@@ -46,18 +48,79 @@ pub struct Place {
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let file = self.file.to_string_lossy();
+        let file = printable::line(&file);
         if self.line == 0 {
-            write!(f, "{}", self.file.display())
+            write!(f, "{file}")
         } else {
-            write!(
-                f,
-                "{}:{}:{}",
-                self.file.display(),
-                self.line,
-                self.column.max(1)
-            )
+            write!(f, "{file}:{}:{}", self.line, self.column.max(1))
         }
     }
+}
+
+/// The part of a line that is shown, fit for a terminal.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Shown {
+    file: String,
+    line: usize,
+    column: usize,
+    text: String,
+    /// Where the offending part begins in `text` and how long it is, bytes.
+    marked: (usize, usize),
+}
+
+/// Characters of a long line that are shown, and how many of them stand before the offending part.
+const SHOWN: usize = 160;
+const BEFORE: usize = 60;
+
+/// Characters of what is wrong, and of the remedy: names from a file may be of any length.
+const LONGEST: usize = 1000;
+
+impl Shown {
+    fn of(place: &Place) -> Self {
+        let text: Vec<char> = printable::source_line(&place.text).chars().collect();
+        let from = place.column.saturating_sub(1).min(text.len());
+        let after = byte_of_column(&place.text, place.column);
+        let to = from
+            + place.text[after..]
+                .char_indices()
+                .take_while(|(byte, _)| *byte < place.length)
+                .count();
+        let (first, last) = if text.len() > SHOWN {
+            let first = from.saturating_sub(BEFORE);
+            (first, (first + SHOWN).min(text.len()))
+        } else {
+            (0, text.len())
+        };
+        let part = |range: std::ops::Range<usize>| -> String { text[range].iter().collect() };
+        let before = if first > 0 { "…" } else { "" }.to_owned() + &part(first..from);
+        let marked = part(from..to.min(last));
+        let behind = part(to.min(last)..last) + if last < text.len() { "…" } else { "" };
+        Self {
+            file: printable::line(&place.file.to_string_lossy()).into_owned(),
+            line: place.line,
+            column: place.column,
+            marked: (before.len(), marked.len()),
+            text: before + &marked + &behind,
+        }
+    }
+}
+
+/// One line of a message: fit for a terminal, its middle left out where it is very long.
+fn told(text: &str) -> String {
+    let text = printable::line(text);
+    let count = text.chars().count();
+    if count <= LONGEST {
+        return text.into_owned();
+    }
+    let end = LONGEST / 4;
+    let begin = LONGEST - end;
+    let characters = || text.chars();
+    characters()
+        .take(begin)
+        .chain(" … ".chars())
+        .chain(characters().skip(count - end))
+        .collect()
 }
 
 /// What went wrong, told to the person who can mend it.
@@ -68,6 +131,7 @@ impl fmt::Display for Place {
 pub struct Message {
     what: String,
     place: Option<Box<Place>>,
+    shown: Option<Box<Shown>>,
     remedy: Option<String>,
     status: Status,
 }
@@ -76,8 +140,9 @@ impl Message {
     /// Wrong input or command line (exit status 2).
     pub fn bad_input(what: impl Into<String>) -> Self {
         Self {
-            what: what.into(),
+            what: told(&what.into()),
             place: None,
+            shown: None,
             remedy: None,
             status: Status::BadInput,
         }
@@ -106,6 +171,7 @@ impl Message {
     /// Adds the place that the message is about.
     #[must_use]
     pub fn at(mut self, place: Place) -> Self {
+        self.shown = (!place.text.is_empty()).then(|| Box::new(Shown::of(&place)));
         self.place = Some(Box::new(place));
         self
     }
@@ -113,7 +179,7 @@ impl Message {
     /// Adds what to do about it.
     #[must_use]
     pub fn remedy(mut self, remedy: impl Into<String>) -> Self {
-        self.remedy = Some(remedy.into());
+        self.remedy = Some(told(&remedy.into()));
         self
     }
 
@@ -139,10 +205,6 @@ impl Message {
             Err(fmt::Error) => format!("{self}\n"),
         }
     }
-
-    fn has_line(&self) -> bool {
-        self.place().is_some_and(|p| !p.text.is_empty())
-    }
 }
 
 impl Diagnostic for Message {
@@ -153,18 +215,12 @@ impl Diagnostic for Message {
     }
 
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.has_line()
-            .then(|| self.place().map(|p| p as &dyn SourceCode))
-            .flatten()
+        self.shown.as_deref().map(|shown| shown as &dyn SourceCode)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        if !self.has_line() {
-            return None;
-        }
-        let place = self.place()?;
-        let start = byte_of_column(&place.text, place.column);
-        let span = LabeledSpan::new(None, start, place.length.min(place.text.len() - start));
+        let (start, length) = self.shown.as_deref()?.marked;
+        let span = LabeledSpan::new(None, start, length);
         Some(Box::new(std::iter::once(span)))
     }
 }
@@ -175,8 +231,8 @@ fn byte_of_column(text: &str, column: usize) -> usize {
         .map_or(text.len(), |(byte, _)| byte)
 }
 
-/// A place is a source of one line that knows its own line number.
-impl SourceCode for Place {
+/// A source of one line that knows its own line number.
+impl SourceCode for Shown {
     fn read_span<'a>(
         &'a self,
         span: &SourceSpan,
@@ -187,7 +243,7 @@ impl SourceCode for Place {
             return Err(MietteError::OutOfBounds);
         }
         Ok(Box::new(MietteSpanContents::new_named(
-            self.file.display().to_string(),
+            self.file.clone(),
             self.text.as_bytes(),
             (0, self.text.len()).into(),
             self.line.saturating_sub(1),
@@ -223,5 +279,71 @@ pub fn list(names: &[&str]) -> String {
         [] => String::new(),
         [one] => (*one).to_owned(),
         [head @ .., last] => format!("{} or {last}", head.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(text: &str, column: usize, length: usize) -> String {
+        Message::bad_input("is wrong")
+            .at(Place {
+                file: "a.csv".into(),
+                line: 7,
+                column,
+                text: text.to_owned(),
+                length,
+            })
+            .remedy("mend it")
+            .render()
+    }
+
+    #[test]
+    fn a_long_line_is_shown_around_the_place() {
+        let text = "é".repeat(100_000) + ",wrong," + &"x".repeat(500_000);
+        let told = at(&text, 100_002, 5);
+        assert!(told.contains("a.csv:7:100002"), "{told}");
+        assert!(told.contains("é,wrong,x"), "{told}");
+        assert!(told.chars().count() < 2000, "{}", told.len());
+        // The mark stands below the word.
+        let lines: Vec<&str> = told.lines().collect();
+        let row = lines.iter().position(|l| l.contains("wrong,")).unwrap();
+        let column = |line: &str, what: &str| {
+            let byte = line.find(what).unwrap();
+            line[..byte].chars().count()
+        };
+        let word = column(lines[row], "wrong");
+        assert_eq!(column(lines[row + 1], "──┬──"), word, "{told}");
+        // A part that is longer than what is shown, and one past the end.
+        assert!(at(&text, 1, text.len()).chars().count() < 2000);
+        assert!(at("short", 70_000, 9).contains("a.csv:7:70000"));
+    }
+
+    #[test]
+    fn nothing_in_a_message_commands_the_terminal() {
+        let hostile = "\u{1b}]0;title\u{7}\u{9b}2J\u{202e}";
+        let told = Message::bad_input(format!("unknown column `{hostile}`\nfake: line"))
+            .at(Place {
+                file: format!("{hostile}.csv").into(),
+                line: 1,
+                column: 2,
+                text: format!("a{hostile}b"),
+                length: 3,
+            })
+            .remedy(hostile)
+            .render();
+        let hidden =
+            |c: char| c != '\n' && (c.is_control() || ('\u{202a}'..='\u{202e}').contains(&c));
+        assert!(!told.chars().any(hidden), "{told:?}");
+        assert!(!told.contains("\nfake"), "{told}");
+    }
+
+    #[test]
+    fn a_name_of_any_length_leaves_room_for_the_rest() {
+        let what = format!("unknown column `{}` in the table", "n".repeat(690_000));
+        let told = Message::bad_input(what).to_string();
+        assert!(told.starts_with("unknown column `nnn") && told.ends_with("` in the table"));
+        assert!(told.chars().count() < 1100);
     }
 }

@@ -3,19 +3,23 @@
 pub mod circle;
 pub mod diagonal;
 pub mod dialect;
+pub mod folder;
 pub mod fourier;
 pub mod machine;
 pub mod message;
 pub mod output;
 pub mod parts;
+pub mod printable;
 pub mod provenance;
 pub mod replicates;
 pub mod reversal;
 pub mod setup;
+pub mod source;
 pub mod table;
 pub mod units;
 
+pub use folder::OutFolder;
 pub use message::{Message, Status};
-pub use output::{CsvTable, OutFolder};
+pub use output::CsvTable;
 pub use setup::SetupFile;
 pub use table::{Column, Row, TableReader};

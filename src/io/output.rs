@@ -1,11 +1,6 @@
-//! Writing results: CSV tables, and a folder that is written whole or not at all.
+//! Writing results as CSV tables.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-
-use tempfile::TempDir;
-
-use super::Message;
+use std::borrow::Cow;
 
 /// One column of a written table.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,13 +76,18 @@ impl CsvTable {
         self
     }
 
-    /// Writes the table: UTF-8, LF, comma, decimal point. A shorter column ends in empty fields.
+    /// Writes the table: UTF-8, LF, comma, decimal point. A shorter column ends in empty fields. A
+    /// text that a spreadsheet would work out as a formula begins with an apostrophe.
     ///
     /// # Errors
     /// The writer's own.
     pub fn write(&self, writer: impl std::io::Write) -> Result<(), csv::Error> {
         let mut csv = csv::Writer::from_writer(writer);
-        csv.write_record(self.columns.iter().map(|(name, _)| name))?;
+        csv.write_record(
+            self.columns
+                .iter()
+                .map(|(name, _)| plain(name).into_owned()),
+        )?;
         let rows = self.columns.iter().map(|(_, v)| v.len()).max().unwrap_or(0);
         for row in 0..rows {
             for (_, values) in &self.columns {
@@ -100,7 +100,10 @@ impl CsvTable {
                         let word = v.get(row).and_then(|w| words.get(usize::from(*w)));
                         csv.write_field(word.copied().unwrap_or(""))?;
                     }
-                    Values::Texts(v) => csv.write_field(v.get(row).map_or("", String::as_str))?,
+                    Values::Texts(v) => {
+                        let text = v.get(row).map_or("", String::as_str);
+                        csv.write_field(plain(text).as_ref())?;
+                    }
                 }
             }
             csv.write_record(None::<&[u8]>)?;
@@ -110,115 +113,49 @@ impl CsvTable {
     }
 }
 
-/// A folder for results that is filled aside and put in place at the end, or leaves no trace.
-#[derive(Debug)]
-pub struct OutFolder {
-    place: PathBuf,
-    aside: TempDir,
-    existed: bool,
-}
-
-impl OutFolder {
-    /// Makes sure, before any work, that results can be written to `place`.
-    ///
-    /// # Errors
-    /// The folder cannot be made or written to.
-    pub fn reserve(place: &Path) -> Result<Self, Message> {
-        let refuse = |e: std::io::Error| {
-            Message::bad_input(format!("nothing can be written here: {e}"))
-                .in_file(place)
-                .remedy("give --out a folder that you may write to")
-        };
-        let existed = place.exists();
-        if existed && !place.is_dir() {
-            return Err(Message::bad_input("is a file, not a folder")
-                .in_file(place)
-                .remedy("give --out a folder that you may write to"));
-        }
-        let beside = if existed {
-            place.to_owned()
-        } else {
-            let parent = match place.parent() {
-                Some(p) if !p.as_os_str().is_empty() => p.to_owned(),
-                _ => PathBuf::from("."),
-            };
-            fs::create_dir_all(&parent).map_err(refuse)?;
-            parent
-        };
-        let aside = tempfile::Builder::new()
-            .prefix(".errsep-")
-            .tempdir_in(beside)
-            .map_err(refuse)?;
-        Ok(Self {
-            place: place.to_owned(),
-            aside,
-            existed,
-        })
-    }
-
-    /// Where the results will be.
-    pub fn place(&self) -> &Path {
-        &self.place
-    }
-
-    /// Writes one file aside.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub fn write(&self, name: &str, content: &[u8]) -> Result<(), Message> {
-        fs::write(self.aside.path().join(name), content).map_err(|e| self.failed(name, &e))
-    }
-
-    /// Writes one table aside.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub fn write_table(&self, table: &CsvTable) -> Result<(), Message> {
-        let name = &table.file_name;
-        let file =
-            fs::File::create(self.aside.path().join(name)).map_err(|e| self.failed(name, &e))?;
-        table
-            .write(std::io::BufWriter::new(file))
-            .map_err(|e| self.failed(name, &std::io::Error::other(e)))
-    }
-
-    /// Puts everything in place.
-    ///
-    /// # Errors
-    /// The files cannot be moved.
-    pub fn finish(self) -> Result<(), Message> {
-        let failed = |e: std::io::Error| {
-            Message::bad_input(format!("the results cannot be put in place: {e}"))
-                .in_file(&self.place)
-                .remedy("give --out a folder that you may write to")
-        };
-        if self.existed {
-            for entry in fs::read_dir(self.aside.path()).map_err(failed)? {
-                let entry = entry.map_err(failed)?;
-                fs::rename(entry.path(), self.place.join(entry.file_name())).map_err(failed)?;
-            }
-        } else {
-            readable_by_others(self.aside.path()).map_err(failed)?;
-            fs::rename(self.aside.path(), &self.place).map_err(failed)?;
-        }
-        Ok(())
-    }
-
-    fn failed(&self, name: &str, error: &std::io::Error) -> Message {
-        Message::bad_input(format!("{name} cannot be written: {error}"))
-            .in_file(&self.place)
-            .remedy("give --out a folder with room that you may write to")
+/// A text that no spreadsheet takes for a formula: one that begins like it, and is no number, gets an
+/// apostrophe in front.
+fn plain(text: &str) -> Cow<'_, str> {
+    let begins = text.starts_with(['=', '@', '+', '-', '\t', '\r', '\n']);
+    if begins && !text.parse::<f64>().is_ok_and(f64::is_finite) {
+        Cow::Owned(format!("'{text}"))
+    } else {
+        Cow::Borrowed(text)
     }
 }
 
-/// A temporary folder is made for its owner alone; a results folder is an ordinary one.
-fn readable_by_others(folder: &Path) -> std::io::Result<()> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        fs::set_permissions(folder, fs::Permissions::from_mode(0o755))?;
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_no_formulas() {
+        let table = CsvTable::new("t.csv")
+            .texts(
+                "=1+1",
+                ["=cmd|' /C calc'!A0", "@x", "-a", "-1.5"].map(str::to_owned),
+            )
+            .texts("name", ["+3", "\t=1", "a=b", "+x"].map(str::to_owned))
+            .numbers("y", [-1.0, 2.0, f64::NAN, -4e-300]);
+        let mut written = Vec::new();
+        table.write(&mut written).unwrap();
+        let mut read = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .from_reader(written.as_slice());
+        let rows: Vec<Vec<String>> = read
+            .records()
+            .map(|row| row.unwrap().iter().map(str::to_owned).collect())
+            .collect();
+        let expected: [[&str; 2]; 5] = [
+            ["'=1+1", "name"],
+            ["'=cmd|' /C calc'!A0", "+3"],
+            ["'@x", "'\t=1"],
+            ["'-a", "a=b"],
+            ["-1.5", "'+x"],
+        ];
+        for (row, expected) in rows.iter().zip(expected) {
+            assert_eq!(row[..2], expected);
+        }
+        assert_eq!([&rows[1][2], &rows[3][2]], ["-1", ""]);
     }
-    #[cfg(not(unix))]
-    let _ = folder;
-    Ok(())
 }

@@ -1,18 +1,16 @@
 //! Where a result comes from: the inputs' hashes, the program's version, the seed, the command.
 
-use std::fs::File;
-use std::io::{BufReader, Read};
 use std::path::Path;
 
-use serde::Serialize;
-use sha2::{Digest, Sha256};
+use serde::{Deserialize, Serialize};
 
 use super::Message;
+use super::source::{Read256, digest_of};
 
-/// One input file as it was when it was read.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Input {
-    /// Its name as given on the command line.
+/// A file and its content at one time.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Digested {
+    /// Its name: of an input as given on the command line, of a written file within its folder.
     pub file: String,
     /// Its SHA-256, in hexadecimal digits.
     pub sha256: String,
@@ -30,54 +28,47 @@ pub struct Provenance {
     /// The seed of anything random; absent where nothing is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// The input files.
-    pub inputs: Vec<Input>,
+    /// The input files, as they were when they were read.
+    pub inputs: Vec<Digested>,
+    /// The files written beside `result.json`; empty where there is no folder.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub files: Vec<Digested>,
 }
 
 impl Provenance {
-    /// Hashes the inputs and records the command.
+    /// Records the command and the digests of the inputs, taken while they were read.
     ///
     /// # Errors
-    /// An input that can no longer be read.
+    /// An input that was not read to its end, or was another when it was read again.
     pub fn of<'a>(
         inputs: impl IntoIterator<Item = &'a Path>,
         seed: Option<u64>,
     ) -> Result<Self, Message> {
         let inputs = inputs
             .into_iter()
-            .map(|path| {
-                Ok(Input {
+            .map(|path| match digest_of(path) {
+                Read256::Digest(sha256) => Ok(Digested {
                     file: path.display().to_string(),
-                    sha256: sha256(path)?,
-                })
+                    sha256,
+                }),
+                Read256::Changed => Err(Message::bad_input("the file changed while it was read")
+                    .in_file(path)
+                    .remedy("run the command again when nothing writes to the file")),
+                Read256::Unread => Err(Message::bad_input("the file was not read to its end")
+                    .in_file(path)
+                    .remedy("give each file only once")),
             })
             .collect::<Result<_, Message>>()?;
         Ok(Self {
             program: env!("CARGO_PKG_NAME"),
             version: env!("CARGO_PKG_VERSION"),
-            command: std::env::args().skip(1).collect(),
+            command: std::env::args_os()
+                .skip(1)
+                .map(|argument| argument.to_string_lossy().into_owned())
+                .collect(),
             seed,
             inputs,
+            files: Vec::new(),
         })
     }
-}
-
-/// The SHA-256 of a file, in hexadecimal digits.
-///
-/// # Errors
-/// The file cannot be read.
-pub fn sha256(path: &Path) -> Result<String, Message> {
-    let unreadable =
-        |e: std::io::Error| Message::bad_input(format!("cannot be read: {e}")).in_file(path);
-    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
-    let mut hash = Sha256::new();
-    let mut block = vec![0; 1 << 16];
-    loop {
-        let n = file.read(&mut block).map_err(unreadable)?;
-        if n == 0 {
-            break;
-        }
-        hash.update(&block[..n]);
-    }
-    Ok(hash.finalize().iter().map(|b| format!("{b:02x}")).collect())
 }

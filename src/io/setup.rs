@@ -4,12 +4,17 @@
 //! The struct derives `serde::Deserialize` with `#[serde(deny_unknown_fields)]`; a value that must
 //! be checked is a [`toml::Spanned`], so that [`SetupFile::bad`] can point at it.
 
+use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
 use super::message::{Message, Place, list, nearest, nearest_first};
+use super::source::Source;
+
+/// A longer file is no set-up, bytes.
+const LONGEST: u64 = 1 << 24;
 
 /// A set-up file as read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,11 +29,21 @@ impl SetupFile {
     /// # Errors
     /// The file cannot be read or is no text.
     pub fn read(path: &Path) -> Result<Self, Message> {
-        let text = std::fs::read_to_string(path).map_err(|e| {
+        let unreadable = |e: std::io::Error| {
             Message::bad_input(format!("the set-up cannot be read: {e}"))
                 .in_file(path)
                 .remedy("give a readable TOML file")
-        })?;
+        };
+        let mut bytes = Vec::new();
+        Source::open(path)
+            .and_then(|source| source.take(LONGEST + 1).read_to_end(&mut bytes))
+            .map_err(unreadable)?;
+        if bytes.len() as u64 > LONGEST {
+            return Err(Message::bad_input("the set-up is longer than 16 MiB")
+                .in_file(path)
+                .remedy("give a TOML file of a set-up; readings belong into a table (CSV)"));
+        }
+        let text = String::from_utf8(bytes).map_err(|e| not_text(path, &e))?;
         Ok(Self {
             path: path.to_owned(),
             text,
@@ -63,7 +78,7 @@ impl SetupFile {
                 None => self.bad(
                     span,
                     message.lines().collect::<Vec<_>>().join("; "),
-                    "see the command's --help and the documentation of the set-up",
+                    remedy(message),
                 ),
             }
         })
@@ -98,6 +113,56 @@ impl SetupFile {
     pub fn path(&self) -> &Path {
         &self.path
     }
+}
+
+/// What to do about a fault, in the words of serde and of the TOML reader.
+fn remedy(message: &str) -> String {
+    let quoted = || message.split('`').nth(1).unwrap_or_default();
+    if message.starts_with("missing field") {
+        return format!("add `{} = …`", quoted());
+    }
+    if message.starts_with("duplicate") {
+        return "keep one of the two".to_owned();
+    }
+    if let Some((found, expected)) = message.split_once(", expected ")
+        && found.starts_with("invalid ")
+    {
+        let expected = match expected {
+            "f32" | "f64" => "a number, such as 1.5",
+            "i64" | "u8" | "u32" | "u64" | "usize" => "a whole number",
+            "a boolean" => "true or false",
+            "a string" => "a text in double quotes",
+            "a sequence" => "a list, such as [1.0, 2.0]",
+            "a map" => "a table, such as { key = 1 }",
+            other if other.starts_with("struct ") => "a table, such as { key = 1 }",
+            other => other,
+        };
+        return format!("write {expected} here");
+    }
+    "write TOML: `key = value` a line, texts in double quotes, `[table]` in brackets".to_owned()
+}
+
+/// Where a set-up stops being text.
+fn not_text(path: &Path, error: &std::string::FromUtf8Error) -> Message {
+    let (bytes, place) = (error.as_bytes(), error.utf8_error().valid_up_to());
+    let before = String::from_utf8_lossy(&bytes[..place]);
+    let line = before.rsplit('\n').next().unwrap_or_default();
+    let number = before.matches('\n').count() + 1;
+    let utf16 = bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF");
+    let what = match bytes.get(place) {
+        _ if utf16 => "the set-up is UTF-16".to_owned(),
+        Some(byte) => format!("byte 0x{byte:02X} is not text"),
+        None => "the set-up is not text".to_owned(),
+    };
+    Message::bad_input(what)
+        .at(Place {
+            file: path.to_owned(),
+            line: number,
+            column: line.chars().count() + 1,
+            text: String::new(),
+            length: 0,
+        })
+        .remedy("save the file as plain text (TOML, UTF-8)")
 }
 
 /// What is unknown, its name and the known names, in serde's words for an unknown field or variant:

@@ -19,6 +19,11 @@ impl Folder {
         folder
     }
 
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        self.0.path()
+    }
+
     /// Writes a file.
     pub fn write(&self, name: &str, content: &str) {
         std::fs::write(self.0.path().join(name), content).unwrap();

@@ -55,15 +55,15 @@ pub enum NoTraces {
     },
     /// A speed at which a turn has too few samples, or the run too few turns.
     #[error(
-        "{samples} samples are {turns:.1} turns at {per_second} turns a second: a run of three turns with 12 samples a turn is needed"
+        "at {rpm:?} turns a minute the {samples} samples make {turns:?} turns: a run of three turns with 12 samples a turn is needed"
     )]
     Speed {
         /// How many there are.
         samples: usize,
         /// Turns in the run at that speed.
         turns: f64,
-        /// The speed, turns a second.
-        per_second: f64,
+        /// The speed, turns a minute.
+        rpm: f64,
     },
     /// Times do not grow.
     #[error("sample {index}: times must grow")]
@@ -105,8 +105,8 @@ pub fn find_turning(samples: &[Sample], about: Option<f64>) -> Result<Turning, N
         Some(f) if !(FEWEST_TURNS..=n as f64 / FEWEST_PER_TURN).contains(&(1.05 * f * span)) => {
             return Err(NoTraces::Speed {
                 samples: n,
-                turns: f * span,
-                per_second: f,
+                turns: (10.0 * f * span).round() / 10.0,
+                rpm: 60.0 * f,
             });
         }
         Some(f) => (0.95 * f, 1.05 * f),

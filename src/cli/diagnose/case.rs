@@ -109,9 +109,12 @@ fn catalogue<M: FittedModel>(args: &Args, model: &M) -> Result<Vec<Box<dyn Effec
     let Some(path) = &args.effects else {
         return Ok(catalogue);
     };
-    let own: TabulatedEffects = SetupFile::read(path)?.parse()?;
+    let file = SetupFile::read(path)?;
+    let own: TabulatedEffects = file.parse()?;
     let channels = model.channel_names();
     for effect in own.effect {
+        let place = effect.span();
+        let effect = effect.into_inner();
         let known = catalogue.iter().any(|e| e.name() == effect.name);
         let fault = if known {
             Some(format!("`{}` is in the catalogue already", effect.name))
@@ -119,7 +122,9 @@ fn catalogue<M: FittedModel>(args: &Args, model: &M) -> Result<Vec<Box<dyn Effec
             effect.fault(&channels, model.places())
         };
         if let Some(what) = fault {
-            return Err(Message::bad_input(what).in_file(path).remedy(
+            return Err(file.bad(
+                place,
+                what,
                 "give every effect a new name, growing positions or a formula, and known channels",
             ));
         }

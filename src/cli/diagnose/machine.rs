@@ -6,7 +6,7 @@ use super::Args;
 use super::case::Case;
 use crate::cli::Answer;
 use crate::io::Message;
-use crate::io::machine::{read_machine, read_points};
+use crate::io::machine::{read_filed, read_points};
 use crate::io::parts::read_parts;
 
 pub(super) fn run(args: &Args) -> Result<Answer, Message> {
@@ -22,15 +22,12 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         .points
         .as_ref()
         .ok_or_else(|| needed("the table of the points", "--points POINTS.csv"))?;
-    let machine = read_machine(machine_file, None)?;
+    let filed = read_filed(machine_file, None)?;
     let points = read_points(points_file)?;
     let readings = read_parts(&args.data, &points)?;
     let count = readings.len();
-    let model = MeasuredParts::new(&machine, readings).map_err(|e| {
-        Message::bad_input(e.to_string())
-            .in_file(machine_file)
-            .remedy("keep the points within the tables of the machine")
-    })?;
+    let model = MeasuredParts::new(&filed.machine, readings)
+        .map_err(|e| filed.wrong(&e, "keep the points within the tables of the machine"))?;
     Case {
         readings: format!(
             "{count} readings of {} parts, against {}",

@@ -17,6 +17,9 @@ use crate::report::number;
 /// Greatest number of trials: their results are kept.
 const MOST_TRIALS: usize = 20_000_000;
 
+/// Greatest number of points of a circle.
+const MOST_POINTS: usize = 100_000;
+
 /// Errors of lengths between points.
 #[derive(Debug, clap::Args)]
 #[command(
@@ -143,7 +146,7 @@ pub(super) fn length(context: &Context, args: &LengthArgs) -> Result<Answer, Mes
         let a = named(&points, from, &args.points)?;
         let b = named(&points, to, &args.points)?;
         let wrong = |error: MachineError| context.wrong(&error);
-        let functional = match features::length(&context.machine, &a, &b) {
+        let functional = match features::length(context.machine, &a, &b) {
             Err(error @ MachineError::BadFeature { .. }) => {
                 return Err(Message::bad_input(format!("--between {pair}: {error}"))
                     .in_file(&args.points)
@@ -153,7 +156,7 @@ pub(super) fn length(context: &Context, args: &LengthArgs) -> Result<Answer, Mes
         };
         let p = context.propagation;
         let budget = propagate(
-            &context.machine,
+            context.machine,
             &functional,
             p.independence(),
             p.prediction(),
@@ -201,10 +204,10 @@ pub(super) fn squareness(context: &Context, args: &SquarenessArgs) -> Result<Ans
                 .in_file(&args.points)
                 .remedy("name two or more points a row, and their direction by --along")
         })?;
-    let functional = rows.functional(&context.machine).map_err(wrong)?;
+    let functional = rows.functional(context.machine).map_err(wrong)?;
     let p = context.propagation;
     let budget = propagate(
-        &context.machine,
+        context.machine,
         &functional,
         p.independence(),
         p.prediction(),
@@ -235,6 +238,12 @@ pub(super) fn squareness(context: &Context, args: &SquarenessArgs) -> Result<Ans
 
 pub(super) fn circularity(context: &Context, args: &CircularityArgs) -> Result<Answer, Message> {
     let wrong = |error: MachineError| context.wrong(&error);
+    if args.count > MOST_POINTS {
+        return Err(
+            Message::bad_input(format!("--count {} points are too many", args.count))
+                .remedy(format!("give at most {MOST_POINTS}; 36 are usual")),
+        );
+    }
     let circle =
         Circle::new(args.plane, args.centre, args.radius, args.count).map_err(|error| {
             Message::bad_input(error.to_string()).remedy("correct --radius, --count or --plane")
@@ -299,7 +308,7 @@ fn simulated(
     }
     let wrong = |error: MachineError| context.wrong(&error);
     let p = context.propagation;
-    let sampler = Sampler::new(&context.machine, points, p.independence(), p.prediction());
+    let sampler = Sampler::new(context.machine, points, p.independence(), p.prediction());
     let result = sample_features(&sampler.map_err(wrong)?, trials, 1, seed, |d, out| {
         out[0] = feature(d)
     });

@@ -12,7 +12,7 @@ use errsep_models::machine::{Independence, Machine, MachineError, Prediction};
 
 use super::{Answer, CommonArgs};
 use crate::io::Message;
-use crate::io::machine::read_machine;
+use crate::io::machine::{FiledMachine, read_filed};
 
 /// Predicts errors of points and features from the component errors of a machine.
 #[derive(Debug, clap::Args)]
@@ -113,7 +113,8 @@ impl PropagationArgs {
 
 /// A machine as a command works with it.
 struct Context<'a> {
-    machine: Machine,
+    machine: &'a Machine,
+    filed: &'a FiledMachine,
     args: &'a Args,
     propagation: &'a PropagationArgs,
 }
@@ -127,9 +128,8 @@ impl Context<'_> {
 
     /// What the model could not answer, as a message about the machine's file.
     fn wrong(&self, error: &MachineError) -> Message {
-        Message::bad_input(error.to_string())
-            .in_file(&self.args.model)
-            .remedy("correct the machine, or ask for points within its tables")
+        let remedy = "correct the machine, or ask for points within its tables";
+        self.filed.wrong(error, remedy)
     }
 }
 
@@ -163,9 +163,10 @@ impl Args {
 pub fn run(args: &Args) -> Result<Answer, Message> {
     let propagation = args.propagation();
     propagation.check()?;
-    let machine = read_machine(&args.model, args.components.as_deref())?;
+    let filed = read_filed(&args.model, args.components.as_deref())?;
     let context = Context {
-        machine,
+        machine: &filed.machine,
+        filed: &filed,
         args,
         propagation,
     };

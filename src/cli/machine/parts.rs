@@ -67,7 +67,7 @@ pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
     let points = read_points(&args.points)?;
     let readings: Vec<PartReading> = read_parts(&args.readings, &points)?;
     let residuals =
-        part_residuals(&context.machine, &readings).map_err(|error| context.wrong(&error))?;
+        part_residuals(context.machine, &readings).map_err(|error| context.wrong(&error))?;
     let mut features: Vec<Feature> = Vec::new();
     for residual in &residuals {
         let r = &residual.reading;

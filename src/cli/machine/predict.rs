@@ -114,9 +114,9 @@ pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
 fn predict(context: &Context, name: String, position: Position) -> Result<Predicted, MachineError> {
     let p = context.propagation;
     let budget = |axis| {
-        let functional = features::point(&context.machine, &position, axis)?;
+        let functional = features::point(context.machine, &position, axis)?;
         propagate(
-            &context.machine,
+            context.machine,
             &functional,
             p.independence(),
             p.prediction(),

@@ -6,9 +6,6 @@ use serde_json::json;
 use crate::cli::{Answer, CommonArgs};
 use crate::io::{CsvTable, Message};
 
-/// Most readings that are simulated.
-const MOST_READINGS: usize = 10_000_000;
-
 /// Replicates of parts with known components of variance.
 #[derive(Debug, clap::Args)]
 #[command(
@@ -46,14 +43,8 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     let most = args
         .replicates
         .max(args.replicates_of_first_four.unwrap_or(0));
-    if args
-        .parts
-        .checked_mul(most)
-        .is_none_or(|n| n > MOST_READINGS)
-    {
-        return Err(Message::bad_input("that many readings are not simulated")
-            .remedy("give at most ten million: --parts times --replicates"));
-    }
+    super::few_enough(&[args.parts, most], "--parts or --replicates")?;
+    super::standard_deviations(&[("--between", args.between), ("--within", args.within)])?;
     let mut replicates = vec![args.replicates; args.parts];
     if let Some(first) = args.replicates_of_first_four {
         replicates.iter_mut().take(4).for_each(|n| *n = first);

@@ -47,19 +47,17 @@ pub struct Args {
     pub(in crate::cli) common: CommonArgs,
 }
 
-/// Most readings that are simulated.
-const MOST_READINGS: usize = 10_000_000;
-
 /// Makes the readings.
 ///
 /// # Errors
 /// Figures that make no calibration, an unknown effect.
 pub fn run(args: &Args) -> Result<Answer, Message> {
-    let readings = args.loads.saturating_mul(args.sets as usize);
-    let sizes = [args.intercept, args.slope, args.full_scale, args.noise];
-    if readings == 0 || readings > MOST_READINGS || sizes.iter().any(|s| !s.is_finite()) {
+    super::few_enough(&[args.loads, args.sets as usize], "--loads or --sets")?;
+    super::standard_deviations(&[("--noise", args.noise)])?;
+    let sizes = [args.intercept, args.slope, args.full_scale];
+    if args.loads == 0 || args.sets == 0 || sizes.iter().any(|s| !s.is_finite()) {
         return Err(Message::bad_input("these figures make no calibration")
-            .remedy("give one or more --loads and --sets, ten million readings at most, and finite sizes"));
+            .remedy("give one or more --loads and --sets, and finite sizes"));
     }
     if args.full_scale <= 0.0 {
         return Err(

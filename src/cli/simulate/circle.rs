@@ -61,6 +61,8 @@ fn parse_lobe(text: &str) -> Result<(u32, f64), String> {
 /// # Errors
 /// A radius that is not positive, fewer than three points.
 pub fn run(args: &Args) -> Result<Answer, Message> {
+    super::few_enough(&[args.points], "--points")?;
+    super::standard_deviations(&[("--noise", args.noise)])?;
     let what = CircleSimulation {
         centre: Point::new(args.centre_x, args.centre_y),
         radius: args.radius,

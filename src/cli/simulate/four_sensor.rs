@@ -73,6 +73,8 @@ pub struct Args {
 /// # Errors
 /// A geometry without room for the sensors; a disturbance that is not finite or has the wrong count.
 pub fn run(args: &Args) -> Result<Answer, Message> {
+    super::few_enough(&[4, args.points], "--points")?;
+    super::standard_deviations(&[("--noise", args.noise)])?;
     let spacing: [usize; 3] = exactly(&args.spacing, "--spacing")?;
     let reach = spacing
         .iter()
@@ -148,5 +150,7 @@ fn exactly<T: Copy, const N: usize>(values: &[T], option: &str) -> Result<[T; N]
 }
 
 fn refuse(error: FourSensorError) -> Message {
-    Message::bad_input(error.to_string()).remedy("see errsep simulate four-sensor --help")
+    Message::bad_input(error.to_string()).remedy(
+        "give --points more than the sum of --spacing, and every other option a finite number",
+    )
 }

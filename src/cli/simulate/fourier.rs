@@ -61,6 +61,12 @@ pub struct Args {
 /// Spacings outside the section, too few samples.
 pub fn run(args: &Args) -> Result<Answer, Message> {
     let defaults = FourierSimulation::default();
+    let spacings = args.spacing.len().max(defaults.spacings.len());
+    super::few_enough(
+        &[3, spacings, args.samples, args.repeats as usize],
+        "--samples or --repeats",
+    )?;
+    super::standard_deviations(&[("--noise", args.noise)])?;
     let what = FourierSimulation {
         length: args.length,
         samples: args.samples,

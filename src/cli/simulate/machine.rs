@@ -9,7 +9,7 @@ use errsep_models::machine::{
 use serde_json::json;
 
 use crate::cli::{Answer, CommonArgs};
-use crate::io::machine::{read_machine, read_points};
+use crate::io::machine::{read_filed, read_points};
 use crate::io::{CsvTable, Message};
 
 /// Most readings that are simulated.
@@ -67,11 +67,12 @@ pub struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Answer, Message> {
-    let machine = read_machine(&args.model, None)?;
+    super::standard_deviations(&[("--noise", args.noise)])?;
+    let filed = read_filed(&args.model, None)?;
+    let machine = &filed.machine;
     let wrong = |error: MachineError| {
-        Message::bad_input(error.to_string())
-            .in_file(&args.model)
-            .remedy("keep the stations and points within the tables of the machine")
+        let remedy = "keep the stations and points within the tables of the machine";
+        filed.wrong(&error, remedy)
     };
     let points = args
         .points
@@ -102,7 +103,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         stations,
         repeats: args.repeats,
     };
-    let readings = simulate_characterization(&machine, &plan, args.common.seed).map_err(wrong)?;
+    let readings = simulate_characterization(machine, &plan, args.common.seed).map_err(wrong)?;
     let components = CsvTable::new("components.csv")
         .texts(
             "component",
@@ -134,7 +135,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     if !points.is_empty() {
         let (parts, noise) = (args.parts, args.noise);
         let made = simulate_parts_disturbed(
-            &machine,
+            machine,
             &points,
             parts,
             args.replicates,

@@ -113,6 +113,33 @@ fn known_in_a_line(truth: &Value) -> String {
     parts.join(", ")
 }
 
+/// Most readings that a kind without a bound of its own simulates.
+const MOST_READINGS: usize = 10_000_000;
+
+/// Refuses a standard deviation that is none: `sizes` are options with their values.
+pub(super) fn standard_deviations(sizes: &[(&str, f64)]) -> Result<(), Message> {
+    for (option, value) in sizes {
+        if !(value.is_finite() && *value >= 0.0) {
+            return Err(
+                Message::bad_input(format!("{option} {value} is no standard deviation"))
+                    .remedy(format!("give {option} a finite number, zero or greater")),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Refuses more readings than are simulated: their number is the product of `counts`, which
+/// `options` set.
+pub(super) fn few_enough(counts: &[usize], options: &str) -> Result<(), Message> {
+    let product = counts.iter().fold(1_usize, |n, c| n.saturating_mul(*c));
+    if product <= MOST_READINGS {
+        return Ok(());
+    }
+    Err(Message::bad_input("that many readings are not simulated")
+        .remedy(format!("give ten million at most: lower {options}")))
+}
+
 /// The effects that are switched on, by what `make` knows of a name and a size.
 pub(super) fn effects<E>(
     texts: &[String],
@@ -151,6 +178,10 @@ pub(super) fn effects<E>(
         .collect()
 }
 
+/// Columns in which a reading may be missing: the time where none is told, and what the second and
+/// third probe cannot reach.
+const MAY_BE_MISSING: [&str; 3] = ["time", "m2", "m3"];
+
 /// A simulation as every kind answers: the data as text in the form that the commands read, with its
 /// truth in comments; data and truth as JSON.
 pub(super) fn answer(
@@ -159,6 +190,20 @@ pub(super) fn answer(
     truth: Value,
     seed: u64,
 ) -> Result<Answer, Message> {
+    let beyond = data.columns.iter().find(|(name, values)| match values {
+        Values::Numbers(v) => {
+            let may_be_missing = MAY_BE_MISSING.contains(&name.as_str());
+            !v.iter()
+                .all(|x| x.is_finite() || (may_be_missing && x.is_nan()))
+        }
+        Values::Texts(_) | Values::Words(..) => false,
+    });
+    if let Some((name, _)) = beyond {
+        return Err(Message::bad_input(format!(
+            "these sizes make a {name} that is no finite number"
+        ))
+        .remedy("give sizes nearer to those of a machine"));
+    }
     let unwritable = |e: String| Message::bad_input(format!("the data cannot be written: {e}"));
     let mut bytes = Vec::new();
     data.write(&mut bytes)

@@ -17,6 +17,9 @@ use crate::io::{CsvTable, Message};
 /// Most readings that are simulated.
 const MOST_READINGS: usize = 20_000_000;
 
+/// Most cells of a form.
+const MOST_CELLS: usize = 100_000;
+
 /// Positions at which the truth of the forms is given.
 const TRUTH_POSITIONS: usize = 201;
 
@@ -164,6 +167,9 @@ fn plan(args: &Args) -> Result<Plan, Message> {
             "give --length in mm",
         );
     }
+    for value in &args.noise {
+        super::standard_deviations(&[("--noise", *value)])?;
+    }
     if ![1, 4].contains(&args.noise.len()) {
         return refuse(
             "noise is one figure or four",
@@ -176,6 +182,18 @@ fn plan(args: &Args) -> Result<Plan, Message> {
             "give it as 1,0.5: slide, artefact",
         );
     };
+    if !args.forms.iter().all(|rms| rms.is_finite() && *rms >= 0.0) {
+        return refuse(
+            "--forms takes root mean squares in um",
+            "give finite numbers, zero or greater, such as 1,0.5",
+        );
+    }
+    if args.spline.is_some_and(|cells| cells > MOST_CELLS) {
+        return refuse(
+            "a form of so many cells is not simulated",
+            "give --spline 100000 cells at most",
+        );
+    }
     let mut rng = ChaCha8Rng::seed_from_u64(args.common.seed);
     let mut form = |rms: f64| -> Result<TrueForm, Message> {
         match args.spline {

@@ -98,14 +98,16 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         return Err(Message::bad_input("--travel needs three numbers").remedy("--travel X Y Z"));
     };
     let travel = [x, y, z];
-    let sizes = [
-        args.translation,
-        args.rotation,
-        args.mirror,
-        args.noise,
-        args.reversal,
-        args.reversal_rotation,
-    ];
+    // Three moves a step, four diagonals, two targets, both directions.
+    let sequences = args.sequence.len().max(Sequence::STEPS.len());
+    super::few_enough(&[3, 4, 2, 2, sequences, args.steps], "--steps")?;
+    super::standard_deviations(&[
+        ("--translation", args.translation),
+        ("--rotation", args.rotation),
+        ("--mirror", args.mirror),
+        ("--noise", args.noise),
+    ])?;
+    let sizes = [args.reversal, args.reversal_rotation];
     let back = |size: f64| if args.backward { size } else { 0.0 };
     if args.steps == 0
         || travel.iter().any(|t| !(*t > 0.0 && t.is_finite()))

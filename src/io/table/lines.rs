@@ -6,7 +6,7 @@ use csv_core::ReadRecordResult;
 
 use super::TableReader;
 use super::trouble::cannot_read;
-use crate::io::dialect::{LineEnd, is_skipped};
+use crate::io::dialect::{LineEnd, is_binary, is_skipped};
 use crate::io::message::{Message, Place};
 
 /// A longer line is not that of a table, in bytes.
@@ -43,7 +43,7 @@ impl TableReader {
         }
         let wrong = match std::str::from_utf8(&self.line) {
             Err(e) => Some(e.valid_up_to()),
-            Ok(_) => self.line.iter().position(|&b| b == 0),
+            Ok(_) => self.line.iter().position(|&b| is_binary(b)),
         };
         if let Some(byte) = wrong {
             return Err(self

@@ -8,12 +8,12 @@ mod row;
 mod trouble;
 
 use std::cell::Cell;
-use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use super::dialect::{BYTE_ORDER_MARK, Decimal, Delimiter, Dialect, NotATable};
 use super::message::{Message, Place, list, nearest};
+use super::source::Source;
 pub use row::Row;
 use trouble::{cannot_read, count, not_a_table, place_of_field};
 
@@ -58,7 +58,7 @@ impl TableReader {
     /// A file that cannot be read, is empty, is no text, or whose first line does not name columns.
     pub fn open(path: &Path) -> Result<Self, Message> {
         let unreadable = |e: std::io::Error| cannot_read(path, &e);
-        let mut file = File::open(path).map_err(unreadable)?;
+        let mut file = Source::open(path).map_err(unreadable)?;
         let mut head = Vec::new();
         (&mut file)
             .take(HEAD)

@@ -1,0 +1,230 @@
+//! Inputs as they are read: once, with their digest taken from the very bytes that are worked with.
+//!
+//! A command that records where its answer comes from begins a record; every input that is then read
+//! to its end leaves its digest there. A pipe gives its bytes only once: what was read of it is kept,
+//! so that a command may look at the first line before it chooses a reader.
+
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use sha2::{Digest, Sha256};
+
+/// The name that stands for standard input.
+pub const STANDARD_INPUT: &str = "-";
+
+/// What is kept of a pipe at most, bytes: longer ones are read on, but only once.
+const KEPT: usize = 1 << 26;
+
+thread_local! {
+    static RECORD: RefCell<Option<Record>> = const { RefCell::new(None) };
+}
+
+/// What has been read since the record began.
+struct Record {
+    hashing: bool,
+    digests: Vec<(PathBuf, String)>,
+    pipes: Vec<(PathBuf, Arc<Mutex<Pipe>>)>,
+}
+
+/// Begins the record of what this thread reads, with digests where they are wanted; an earlier one
+/// ends.
+pub fn begin_record(hashing: bool) {
+    RECORD.with_borrow_mut(|record| {
+        *record = Some(Record {
+            hashing,
+            digests: Vec::new(),
+            pipes: Vec::new(),
+        });
+    });
+}
+
+/// What a record says of an input.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Read256 {
+    /// Its SHA-256, in hexadecimal digits.
+    Digest(String),
+    /// It was read twice and was another the second time.
+    Changed,
+    /// It was not read to its end.
+    Unread,
+}
+
+/// The digest of an input as it was read since the record began.
+pub fn digest_of(path: &Path) -> Read256 {
+    RECORD.with_borrow(|record| {
+        let digests = record.iter().flat_map(|r| &r.digests);
+        let mut of_it = digests.filter(|(p, _)| p == path).map(|(_, digest)| digest);
+        match of_it.next() {
+            None => Read256::Unread,
+            Some(first) if of_it.all(|other| other == first) => Read256::Digest(first.clone()),
+            Some(_) => Read256::Changed,
+        }
+    })
+}
+
+/// SHA-256 in hexadecimal digits.
+pub fn hexadecimal(hash: Sha256) -> String {
+    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// A file, a pipe or standard input, being read.
+pub struct Source {
+    path: PathBuf,
+    bytes: Bytes,
+    hash: Option<Sha256>,
+}
+
+enum Bytes {
+    File(File),
+    Pipe(Arc<Mutex<Pipe>>, usize),
+}
+
+/// What can be read only once, and what was read of it.
+struct Pipe {
+    rest: Box<dyn Read + Send>,
+    kept: Option<Vec<u8>>,
+    given: usize,
+}
+
+impl Source {
+    /// Opens an input; `-` is standard input.
+    ///
+    /// # Errors
+    /// The system's own.
+    pub fn open(path: &Path) -> io::Result<Self> {
+        let known = RECORD.with_borrow(|record| {
+            let pipes = record.iter().flat_map(|r| &r.pipes);
+            let mut of_it = pipes.filter(|(p, _)| p == path);
+            of_it.next().map(|(_, pipe)| Arc::clone(pipe))
+        });
+        let bytes = match known {
+            Some(pipe) => Bytes::Pipe(pipe, 0),
+            None if path == Path::new(STANDARD_INPUT) => piped(path, Box::new(io::stdin())),
+            None => {
+                let file = File::open(path)?;
+                if file.metadata()?.is_file() {
+                    Bytes::File(file)
+                } else {
+                    piped(path, Box::new(file))
+                }
+            }
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            bytes,
+            hash: RECORD
+                .with_borrow(|record| record.as_ref().is_some_and(|r| r.hashing))
+                .then(Sha256::new),
+        })
+    }
+}
+
+fn piped(path: &Path, rest: Box<dyn Read + Send>) -> Bytes {
+    let pipe = Arc::new(Mutex::new(Pipe {
+        rest,
+        kept: Some(Vec::new()),
+        given: 0,
+    }));
+    RECORD.with_borrow_mut(|record| {
+        if let Some(record) = record {
+            record.pipes.push((path.to_owned(), Arc::clone(&pipe)));
+        }
+    });
+    Bytes::Pipe(pipe, 0)
+}
+
+impl Pipe {
+    fn read_at(&mut self, place: usize, buffer: &mut [u8]) -> io::Result<usize> {
+        if place < self.given {
+            let kept = self.kept.as_deref().ok_or_else(|| {
+                io::Error::other("it can be read only once, and is too long to be kept")
+            })?;
+            return (&kept[place..]).read(buffer);
+        }
+        let n = self.rest.read(buffer)?;
+        self.given += n;
+        if let Some(kept) = &mut self.kept {
+            kept.extend_from_slice(&buffer[..n]);
+        }
+        if self.given > KEPT {
+            self.kept = None;
+        }
+        Ok(n)
+    }
+}
+
+impl Read for Source {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let n = match &mut self.bytes {
+            Bytes::File(file) => file.read(buffer)?,
+            Bytes::Pipe(pipe, place) => {
+                let mut pipe = pipe.lock().unwrap_or_else(PoisonError::into_inner);
+                let n = pipe.read_at(*place, buffer)?;
+                *place += n;
+                n
+            }
+        };
+        if n > 0 {
+            if let Some(hash) = &mut self.hash {
+                hash.update(&buffer[..n]);
+            }
+        } else if !buffer.is_empty()
+            && let Some(hash) = self.hash.take()
+        {
+            RECORD.with_borrow_mut(|record| {
+                if let Some(record) = record {
+                    let read = (self.path.clone(), hexadecimal(hash));
+                    record.digests.push(read);
+                }
+            });
+        }
+        Ok(n)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    fn whole(path: &Path) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        Source::open(path).unwrap().read_to_end(&mut bytes).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn the_digest_is_that_of_what_was_read() {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(b"abc").unwrap();
+        begin_record(true);
+        assert_eq!(digest_of(file.path()), Read256::Unread);
+        assert_eq!(whole(file.path()), b"abc");
+        // The SHA-256 of "abc" in FIPS 180-2, appendix B.1.
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(digest_of(file.path()), Read256::Digest(abc.to_owned()));
+        // What happens to the file afterwards does not matter; what a second reading finds does.
+        file.write_all(b"d").unwrap();
+        assert_eq!(digest_of(file.path()), Read256::Digest(abc.to_owned()));
+        assert_eq!(whole(file.path()), b"abcd");
+        assert_eq!(digest_of(file.path()), Read256::Changed);
+        begin_record(true);
+        assert_eq!(digest_of(file.path()), Read256::Unread);
+    }
+
+    #[test]
+    fn a_reading_that_stops_early_has_no_digest() {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(b"abc").unwrap();
+        begin_record(true);
+        let mut two = [0; 2];
+        let mut source = Source::open(file.path()).unwrap();
+        source.read_exact(&mut two).unwrap();
+        drop(source);
+        assert_eq!(digest_of(file.path()), Read256::Unread);
+    }
+}

@@ -6,7 +6,9 @@
 //! what), solves them as the command does and counts how often the truth lies within the intervals of
 //! nominally 68.27 % and 95 %. The tables stand in `docs/validation/coverage.md`.
 
+mod calibration_line;
 mod circle;
+mod diagnosis;
 mod tally;
 
 use std::process::ExitCode;
@@ -17,7 +19,11 @@ use tally::Row;
 type Room = (&'static str, u64, fn(u64) -> Vec<Row>);
 
 /// One line a model.
-const ROOMS: &[Room] = &[("circle", 2000, circle::rows)];
+const ROOMS: &[Room] = &[
+    ("circle", 2000, circle::rows),
+    ("calibration-line", 2000, calibration_line::rows),
+    ("diagnosis", 60, diagnosis::rows),
+];
 
 fn main() -> ExitCode {
     let mut seeds = None;

@@ -15,6 +15,19 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         None => (DiagonalSetup::default(), Vec::new()),
     };
     super::positive(setup.test.noise, "[test] noise", args)?;
+    for measured in &setup.measured {
+        let what = format!("[[measured]] std of {}", measured.axis.letter());
+        super::positive(Some(measured.std), &what, args)?;
+        if !measured.slope.is_finite() {
+            let what = format!(
+                "[[measured]] slope of {} = {} is no number",
+                measured.axis.letter(),
+                measured.slope
+            );
+            return Err(super::in_setup(Message::bad_input(what), args)
+                .remedy("give the slope in um/mm, or leave the table out"));
+        }
+    }
     let (zone, readings) = read_readings(&args.data, setup.test.target)?;
     let model = DiagonalRuns::new(&zone, &readings, &zero, setup.test.noise)
         .map_err(|e| Message::bad_input(e.to_string()).in_file(&args.data))?;

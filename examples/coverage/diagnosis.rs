@@ -109,14 +109,14 @@ fn counted<M: FittedModel>(
     let bare = diagnose(&make(&[], 1, 1.0), &options());
     let jobs: Vec<(Option<(&str, f64)>, u64)> = (0..cases)
         .flat_map(|case| {
-            let seen = effects.iter().filter_map(|effect| {
+            let seen = effects.iter().enumerate().filter_map(|(k, effect)| {
                 let hidden = bare.hidden.iter().find(|h| h.effect == *effect)?;
-                let mut random = ChaCha8Rng::seed_from_u64(case);
+                let mut random = ChaCha8Rng::seed_from_u64(100 * case + k as u64);
                 let size = hidden.detectable? * (1.5 + 4.5 * random.random::<f64>());
-                Some((Some((*effect, size)), 1000 + case))
+                Some((Some((*effect, size)), 1000 * (k as u64 + 1) + case))
             });
             let mut jobs: Vec<_> = seen.collect();
-            jobs.push((None, 5000 + case));
+            jobs.push((None, 500_000 + case));
             jobs
         })
         .collect();

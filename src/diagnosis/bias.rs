@@ -14,6 +14,9 @@ use super::noise::NoiseLaw;
 use super::sizes::{Sizes, Unknown, beside, first_amplitude};
 use super::verdict::Bias;
 
+/// A quantity that moves by less than this part of its uncertainty does not move: that is rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// A profile's name, its values without and its values with the effects.
 type MovedProfile = (String, Vec<f64>, Vec<f64>);
 
@@ -46,6 +49,12 @@ pub(super) fn biases<M: FittedModel>(
                 let after = std * std + moved - 2.0 * common;
                 (moved.sqrt(), after.max(0.0).sqrt())
             });
+            let still = (after - before).abs() <= ROUNDING * std && moved_std <= ROUNDING * std;
+            let (after, after_std, moved_std) = if still {
+                (before, std, 0.0)
+            } else {
+                (after, after_std, moved_std)
+            };
             Bias {
                 quantity: quantity.name,
                 before,

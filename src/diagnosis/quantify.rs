@@ -25,8 +25,8 @@ pub(super) struct GapMeter {
     /// Draws of the scatter that the model expects.
     scatter: DMatrix<f64>,
     expected: f64,
+    /// Variance that noise alone gives to the mean square of the residual less its expected value.
     spread: f64,
-    noise_freedom: f64,
     sigma: f64,
 }
 
@@ -48,13 +48,21 @@ impl GapMeter {
         let expected = sums.iter().sum::<f64>() / DRAWS as f64;
         let variance =
             sums.iter().map(|s| (s - expected).powi(2)).sum::<f64>() / (DRAWS - 1) as f64;
+        // A noise that comes from repeats is a part of the same residual: what the two share is not
+        // in their difference. With κ = ν_c/ν the share of the repeats' contrasts, RSS/ν − σ̂² is
+        // (1 − κ) times the difference of two independent mean squares, that of the rest and σ̂².
+        let estimate = 2.0 * expected * expected / law.freedom.max(1.0);
+        let shared = match law.source {
+            NoiseSource::Repeats => (law.freedom / freedom).min(1.0),
+            NoiseSource::Stated | NoiseSource::Neighbours => 0.0,
+        };
+        let rest = 1.0 - shared;
         Self {
             space,
             noise,
             scatter,
             expected,
-            spread: variance,
-            noise_freedom: law.freedom.max(1.0),
+            spread: rest * variance + rest * rest * estimate,
             sigma: law.sigma(),
         }
     }
@@ -66,10 +74,8 @@ impl GapMeter {
         let freedom = (all - causes as f64).max(1.0);
         let rss = self.space.forward_vector(readings).norm_squared();
         let square = rss / freedom - self.expected;
-        // Spread of the residual's own noise, of its product with the gap, of the noise estimate.
-        let variance = self.spread
-            + 4.0 * square.max(0.0) * self.expected / freedom
-            + 2.0 * self.expected * self.expected / self.noise_freedom;
+        // And what the product of noise and gap adds.
+        let variance = self.spread + 4.0 * square.max(0.0) * self.expected / freedom;
         let reach = 1.96 * variance.sqrt();
         let root = |v: f64| v.max(0.0).sqrt();
         Size {

@@ -358,3 +358,81 @@ fn a_calibration_with_sets_is_recognised() {
     let answer = diagnosed(&["calibration-line"], "# nothing stated\n", &[]);
     assert_eq!(answer["model"], "calibration line");
 }
+
+/// Slopes, uncertainties and weights that are no numbers are refused, and so is a proof without end.
+#[test]
+fn what_is_no_number_is_refused() {
+    let folder = Folder::with(&[]);
+    let made = run(&folder, &["simulate", "step-diagonal"]);
+    folder.write("d.csv", &made.stdout);
+    let steps = [
+        "diagnose",
+        "d.csv",
+        "--model",
+        "step-diagonal",
+        "--setup",
+        "s.toml",
+    ];
+    for (slope, std, what) in [
+        ("nan", "0.001", "slope of X = NaN"),
+        ("inf", "0.001", "slope of X = inf"),
+        ("0.004", "-1.0", "std of X = -1"),
+        ("0.004", "0.0", "std of X = 0"),
+        ("0.004", "nan", "std of X = NaN"),
+    ] {
+        let setup = format!("[[measured]]\naxis = \"X\"\nslope = {slope}\nstd = {std}\n");
+        folder.write("s.toml", &setup);
+        bad_input(&folder, &steps, &["s.toml", what]);
+    }
+    let made = run(&folder, &["simulate", "reversal", "--positions", "13"]);
+    folder.write("r.csv", &made.stdout);
+    for (weights, what) in [
+        ("{ 1A = nan }", "gives the channel `1A` the weight NaN"),
+        ("{ 1A = 1.0, 2B = inf }", "`2B`"),
+        ("{ 1A = 0.0 }", "changes no reading"),
+        ("{ 1A = 1e300 }", "no finite number"),
+    ] {
+        let effect = format!(
+            "[[effect]]\nname = \"own\"\nformula = \"1e30 * x^2 * 1e10\"\nchannels = {weights}\n"
+        );
+        folder.write("e.toml", &effect);
+        bad_input(
+            &folder,
+            &["diagnose", "r.csv", "--effects", "e.toml"],
+            &["e.toml", what],
+        );
+    }
+    let endless = ["diagnose", "r.csv", "--prove", "18446744073709551615"];
+    bad_input(&folder, &endless, &["--prove", "at most"]);
+}
+
+/// A reading of 1e308 is refused whatever the model: its square is no number.
+#[test]
+fn readings_beyond_reach_are_refused() {
+    let sensors = "[sensors]\nspacing = [5.0, 5.0, 25.0]\nnoise = 0.1\n";
+    let section = "[section]\nlength = 100.0\n";
+    for (model, setup, column) in [
+        ("reversal", "", 5),
+        ("calibration-line", "", 1),
+        ("circle", "", 0),
+        ("four-sensor", sensors, 2),
+        ("fourier", section, 3),
+        ("step-diagonal", "", 7),
+    ] {
+        let folder = Folder::with(&[("s.toml", setup)]);
+        let made = run(&folder, &["simulate", model]);
+        let lines = made.stdout.lines().enumerate();
+        let spoilt: Vec<String> = lines
+            .map(|(k, line)| {
+                let mut fields: Vec<&str> = line.split(',').collect();
+                if k == 9 && fields.len() > column {
+                    fields[column] = "1e308";
+                }
+                fields.join(",")
+            })
+            .collect();
+        folder.write("d.csv", &spoilt.join("\n"));
+        let arguments = ["diagnose", "d.csv", "--model", model, "--setup", "s.toml"];
+        bad_input(&folder, &arguments, &["d.csv", "1e308"]);
+    }
+}

@@ -6,8 +6,11 @@
 //! what), solves them as the command does and counts how often the truth lies within the intervals of
 //! nominally 68.27 % and 95 %. The tables stand in `docs/validation/coverage.md`.
 
+<<<<<<< HEAD
 mod anova;
+mod calibration_line;
 mod circle;
+mod diagnosis;
 mod machine;
 mod step_diagonal;
 mod tally;
@@ -25,6 +28,8 @@ const ROOMS: &[Room] = &[
     ("step-diagonal", 2000, step_diagonal::rows),
     ("machine", 2000, machine::rows),
     ("anova", 2000, anova::rows),
+    ("calibration-line", 2000, calibration_line::rows),
+    ("diagnosis", 60, diagnosis::rows),
 ];
 
 fn main() -> ExitCode {

@@ -48,6 +48,11 @@ impl Tally {
         self.inside_95 += u64::from(inside_95);
     }
 
+    /// Whether anything was counted.
+    pub fn any(&self) -> bool {
+        self.values > 0
+    }
+
     /// Both counts together.
     #[must_use]
     pub fn and(self, other: Self) -> Self {

@@ -37,6 +37,10 @@ pub(super) fn attribute<M: FittedModel>(
         if answer.complete {
             return Some(answer);
         }
+        // Causes that have come to coincide cannot be fitted together: those before stand.
+        if bench.amplitudes(readings, &answer.causes).is_none() {
+            break;
+        }
         causes.clone_from(&answer.causes);
         partial = Some(answer);
     }

@@ -47,6 +47,13 @@ pub(super) struct Cause {
     pub projected: DMatrix<f64>,
 }
 
+impl Cause {
+    /// Number of its amplitudes and free shape parameters.
+    pub fn unknowns(&self) -> usize {
+        self.projected.ncols() + self.shape.free()
+    }
+}
+
 /// What remains beside some causes.
 pub(super) struct Remainder {
     pub residual: DVector<f64>,
@@ -143,6 +150,14 @@ impl<'a, M: FittedModel> Bench<'a, M> {
             return plain;
         }
         self.scores(readings, &basis, &doubt)
+    }
+
+    /// Probability that as much would stand out with nothing there: in any effect, at any place or
+    /// in the misfit as a whole.
+    pub fn detection(&self, first: &Remainder) -> f64 {
+        let surprises: Vec<f64> = first.best.iter().map(|(s, _)| *s).collect();
+        self.null
+            .detection(&surprises, first.residual.norm_squared())
     }
 
     fn scores(&self, readings: &DVector<f64>, basis: &DMatrix<f64>, doubt: &Doubt) -> Remainder {

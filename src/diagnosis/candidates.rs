@@ -6,7 +6,7 @@ use errsep_models::model::{FittedModel, Shape};
 use nalgebra::DVector;
 
 use super::bench::{Bench, Cause, Remainder};
-use super::confidence::{Answer, possible, without};
+use super::confidence::{Alternative, possible, without};
 use super::dictionary::statistic;
 use super::sizes::Sizes;
 use super::verdict::{Candidate, Elsewhere};
@@ -15,13 +15,13 @@ use super::verdict::{Candidate, Elsewhere};
 /// 95 %.
 const AS_LIKELY: f64 = 5.99;
 
-/// What each effect explains, by that.
+/// What each effect explains, by that. `groups` are those of the causes, where they are named.
 pub(super) fn candidates<M: FittedModel>(
     bench: &Bench<'_, M>,
     readings: &DVector<f64>,
     first: &Remainder,
     excess: f64,
-    found: Option<&Answer>,
+    groups: &[Vec<Alternative>],
     causes: &[Cause],
 ) -> Vec<Candidate> {
     let readings_count = bench.space.readings() as f64;
@@ -33,12 +33,25 @@ pub(super) fn candidates<M: FittedModel>(
         };
         let about = description.about();
         let named = causes.iter().position(|c| c.effect == effect);
-        let (cause, parameters) = match named {
-            Some(which) => (
+        let member = groups.iter().enumerate().find_map(|(k, group)| {
+            let own = group.iter().find(|a| a.cause.effect == effect)?;
+            Some((k, own))
+        });
+        let (cause, parameters) = match (named, member) {
+            (Some(which), _) => (
                 Some(causes[which].clone()),
                 fitted.as_ref().map(|f| f.of(bench, causes, which)),
             ),
-            None => {
+            (None, Some((k, own))) => {
+                let mut trial = causes.to_vec();
+                trial[k] = own.cause.clone();
+                let sizes = Sizes::fitted(bench, readings, &trial);
+                (
+                    Some(own.cause.clone()),
+                    sizes.map(|sizes| sizes.of(bench, &trial, k)),
+                )
+            }
+            (None, None) => {
                 let start = bench.start(first, effect).cloned();
                 let cause = start.map(|shape| bench.cause(bench.model, effect, shape));
                 let parameters = cause.as_ref().and_then(|cause| {
@@ -51,11 +64,9 @@ pub(super) fn candidates<M: FittedModel>(
         let (t, unknowns) = cause.as_ref().map_or((0.0, 0), |c| {
             let gram = c.projected.tr_mul(&c.projected);
             let score = c.projected.tr_mul(&first.residual);
-            let unknowns = c.projected.ncols() + c.shape.free();
-            (statistic(&gram, &score, false), unknowns)
+            (statistic(&gram, &score, false), c.unknowns())
         });
-        let in_set =
-            found.is_some_and(|a| a.complete && a.groups.iter().any(|g| g.contains(&effect)));
+        let alone = 0.5 * (t - unknowns as f64 * readings_count.ln());
         list.push((
             t,
             Candidate {
@@ -63,9 +74,9 @@ pub(super) fn candidates<M: FittedModel>(
                 // No negative zero.
                 explained: ((t - unknowns as f64) / excess).clamp(0.0, 1.0) + 0.0,
                 p_value: bench.p_value(first, effect),
-                evidence: 0.5 * (t - unknowns as f64 * readings_count.ln()),
+                evidence: member.map_or(alone, |(_, own)| own.evidence),
                 visible: bench.dictionary.families[family].visible,
-                in_set,
+                in_set: member.is_some(),
                 variant: cause
                     .as_ref()
                     .and_then(|c| description.variant_name(bench.model, &c.shape)),
@@ -78,9 +89,12 @@ pub(super) fn candidates<M: FittedModel>(
         ));
     }
     list.sort_by(|a, b| {
-        (b.1.in_set, b.0)
-            .partial_cmp(&(a.1.in_set, a.0))
-            .unwrap_or(std::cmp::Ordering::Equal)
+        let by_set = b.1.in_set.cmp(&a.1.in_set);
+        by_set.then(if a.1.in_set {
+            b.1.evidence.total_cmp(&a.1.evidence)
+        } else {
+            b.0.total_cmp(&a.0)
+        })
     });
     list.into_iter().map(|(_, c)| c).collect()
 }

@@ -20,15 +20,24 @@ pub(super) const HOPELESS: f64 = 80.0;
 /// Part of the strongest cause's change, squared, that a further one must reach. What is less may be
 /// the remainder of a cause taken for another whose signature is off by a seventh of its size.
 const WEIGHTY: f64 = 0.02;
-/// Causes whose misfits differ by less fit equally well: the one of more usual size goes first.
-const TIED: f64 = 9.2;
+/// Evidence that differs by less is equal: of exact aliases the one of more usual size goes first.
+const EQUAL: f64 = 1e-3;
+
+/// An effect that explains the gap in the place of one of the causes.
+pub(super) struct Alternative {
+    /// The cause, the others beside it.
+    pub cause: Cause,
+    /// Logarithm of the evidence for it against nothing in its place (Schwarz's approximation).
+    pub evidence: f64,
+}
 
 /// Causes that together explain the gap, and those that do it as well.
 pub(super) struct Answer {
     /// The causes, by what each adds.
     pub causes: Vec<Cause>,
-    /// For each cause the effects that these data cannot tell from it, itself first.
-    pub groups: Vec<Vec<usize>>,
+    /// For each cause the effects that these data cannot tell from it and itself, the greatest
+    /// evidence first: that one is the cause.
+    pub groups: Vec<Vec<Alternative>>,
     /// What remains beside them.
     pub remainder: Remainder,
     /// Whether the remainder is adequate.
@@ -37,9 +46,8 @@ pub(super) struct Answer {
 
 /// One way to explain the gap: causes with one of them varied.
 struct Member {
-    effect: usize,
     causes: Vec<Cause>,
-    misfit: f64,
+    evidence: f64,
     left: Remainder,
     /// Size as a part of what is physically plausible.
     size: f64,
@@ -56,16 +64,24 @@ pub(super) fn confidence_set<M: FittedModel>(
     let mut groups = Vec::new();
     for k in 0..causes.len() {
         let members = alternatives(bench, readings, &best, k);
-        let group = if members.is_empty() {
-            vec![best[k].effect]
-        } else {
-            members.iter().map(|m| m.effect).collect()
-        };
-        groups.push(group);
+        let mut group: Vec<Alternative> = members
+            .iter()
+            .map(|m| Alternative {
+                cause: m.causes[k].clone(),
+                evidence: m.evidence,
+            })
+            .collect();
         if let Some(first) = members.into_iter().next() {
             best = first.causes;
             remainder = first.left;
+        } else {
+            let misfit = bench.misfit(readings, &best);
+            group.push(Alternative {
+                cause: best[k].clone(),
+                evidence: evidence(bench, readings, &best, k, misfit),
+            });
         }
+        groups.push(group);
     }
     let needed = best.len() == 1
         || weighty(bench, readings, &best)
@@ -198,31 +214,36 @@ fn alternatives<M: FittedModel>(
                 bench.relinearised(readings, &trial, least)
             };
             let left = bench.judged(readings, &trial);
+            let misfit = left.residual.norm_squared();
             adequate(&trial, &left).then(|| Member {
-                effect,
                 size: part_of_plausible(bench, readings, &trial, k),
+                evidence: evidence(bench, readings, &trial, k, misfit),
                 causes: trial,
-                misfit: left.residual.norm_squared(),
                 left,
             })
         });
-        members.extend(judged.min_by(|a, b| a.misfit.total_cmp(&b.misfit)));
+        members.extend(judged.max_by(|a, b| a.evidence.total_cmp(&b.evidence)));
     }
-    let least = members
-        .iter()
-        .map(|m| m.misfit)
-        .fold(f64::INFINITY, f64::min);
+    let rounded = |m: &Member| (m.evidence / EQUAL).round();
     members.sort_by(|a, b| {
-        let behind = |m: &Member| m.misfit > least + TIED;
-        let by_fit = a.misfit.total_cmp(&b.misfit);
-        let by_size = a.size.total_cmp(&b.size);
-        behind(a).cmp(&behind(b)).then(if behind(a) {
-            by_fit
-        } else {
-            by_size.then(by_fit)
-        })
+        let by_evidence = rounded(b).total_cmp(&rounded(a));
+        by_evidence.then(a.size.total_cmp(&b.size))
     });
     members
+}
+
+/// Logarithm of the evidence for cause `k` beside the others against nothing in its place, by the
+/// misfit that all of them leave (Schwarz, Ann. Statist. 6 (1978) 461).
+fn evidence<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    k: usize,
+    misfit: f64,
+) -> f64 {
+    let beside = bench.misfit(readings, &without(causes, k));
+    let unknowns = causes[k].unknowns() as f64;
+    0.5 * (beside - misfit - unknowns * (bench.space.readings() as f64).ln())
 }
 
 /// The shape of a cause in the other of two variants, which a state bent by the first may hide.

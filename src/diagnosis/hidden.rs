@@ -4,8 +4,8 @@ use errsep_models::model::FittedModel;
 
 use super::Options;
 use super::bench::Bench;
+use super::bias::weighted_std;
 use super::geometry::greatest_plausible;
-use super::quantify::weighted_std;
 use super::verdict::{Harm, Hidden, INVISIBLE};
 
 /// Normal quantile of 80 % power.

@@ -6,7 +6,9 @@
 
 mod attribute;
 mod bench;
+mod bias;
 mod candidates;
+mod conclusion;
 mod confidence;
 mod contrasts;
 mod dictionary;
@@ -35,6 +37,7 @@ mod splitting;
 mod statement;
 mod steps;
 mod tabulated;
+mod told;
 mod verdict;
 mod whitening;
 
@@ -49,11 +52,11 @@ pub use geometry::{Diagnosability, certificate};
 pub use noise::{NoiseLaw, NoiseSource};
 pub use prove::{Trials, prove};
 use spikes::Spikes;
-pub use statement::for_people;
 pub use tabulated::{Tabulated, TabulatedEffects};
+pub use told::{Told, for_people, scaled};
 pub use verdict::{
     Bias, Candidate, Detail, Diagnosis, Elsewhere, Fingerprint, Gap, Harm, HeldOut, Hidden, Kind,
-    Nearest, NoiseOut, ParameterOut, Size, Verdict, Where,
+    Linear, Nearest, NoiseOut, ParameterOut, Size, Verdict, Where,
 };
 
 /// How a diagnosis is made.
@@ -131,7 +134,7 @@ fn examined<M: FittedModel, R>(
     then: impl FnOnce(Examined<'_, M>) -> R,
 ) -> R {
     let first = bench.remainder(readings, &[]);
-    let detected = first.global;
+    let detected = bench.detection(&first);
     if detected > false_alarm {
         return then(Examined {
             bench,

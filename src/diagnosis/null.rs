@@ -20,11 +20,17 @@ use super::spikes::Spikes;
 /// Draws handled at once.
 const BATCH: usize = 64;
 
-/// The law of the greatest score of every family, and of the smallest tail probability.
+/// The law of the greatest score of every family, of the misfit as a whole, and of the smallest tail
+/// probability among them.
 #[derive(Debug, Clone)]
 pub struct NullLaw {
     families: Vec<Tail>,
+    /// Of the sum of squares that the fit leaves, in units of the noise.
+    misfit: Tail,
+    /// Over the families.
     smallest: Tail,
+    /// Over the families and the misfit.
+    any: Tail,
 }
 
 /// A sorted sample with an exponential tail fitted to its upper tenth.
@@ -81,19 +87,34 @@ impl NullLaw {
         let mut rows: Vec<Vec<f64>> = all.into_iter().flatten().collect();
         // Two samples: tails judged by the draws that made them would look better than they are.
         let others = rows.split_off(rows.len() / 2);
-        let families: Vec<Tail> = (0..dictionary.families.len())
-            .map(|family| Tail::new(rows.iter().map(|row| row[family]).collect()))
-            .collect();
+        let count = dictionary.families.len();
+        let of = |place: usize| Tail::new(rows.iter().map(|row| row[place]).collect());
         let mut null = Self {
-            families,
+            families: (0..count).map(of).collect(),
+            misfit: of(count),
             smallest: Tail::new(vec![0.0]),
+            any: Tail::new(vec![0.0]),
         };
-        let smallest = others
+        // A row holds the families' greatest scores and, last, the misfit.
+        let least = |row: &Vec<f64>| null.smallest_of(&row[..count]);
+        let smallest = others.iter().map(|row| -2.0 * least(row).ln());
+        let any = others
             .iter()
-            .map(|row| -2.0 * null.smallest_of(row).ln())
-            .collect();
+            .map(|row| -2.0 * least(row).min(null.misfit.beyond(row[count])).ln());
+        let (smallest, any) = (smallest.collect(), any.collect());
         null.smallest = Tail::new(smallest);
+        null.any = Tail::new(any);
         null
+    }
+
+    /// Probability that any family or the misfit as a whole would stand out as much with nothing
+    /// there: the one test of whether there is a gap.
+    pub fn detection(&self, surprises: &[f64], misfit: f64) -> f64 {
+        let least = self
+            .smallest_of(surprises)
+            .min(self.misfit.beyond(misfit))
+            .max(f64::MIN_POSITIVE);
+        self.any.beyond(-2.0 * least.ln())
     }
 
     /// Probability that the greatest score of a family would be as great with nothing there.
@@ -117,12 +138,12 @@ impl NullLaw {
         high
     }
 
-    /// The tail probability of one family at which any family stands out with a probability.
+    /// The tail probability of one family at which a gap is detected with a probability.
     pub fn level(&self, probability: f64) -> f64 {
         let (mut low, mut high) = (-700.0, 0.0);
         for _ in 0..60 {
             let middle: f64 = 0.5 * (low + high);
-            if self.smallest.beyond(-2.0 * middle) > probability {
+            if self.any.beyond(-2.0 * middle) > probability {
                 high = middle;
             } else {
                 low = middle;
@@ -147,7 +168,7 @@ impl NullLaw {
     }
 }
 
-/// The greatest score of each family in each draw of one batch.
+/// The greatest score of each family, and last the misfit, in each draw of one batch.
 fn greatest<M: FittedModel>(
     model: &M,
     dictionary: &Dictionary,
@@ -163,8 +184,9 @@ fn greatest<M: FittedModel>(
         let noise = law.draw_possible(model, spikes, batch * BATCH + k, &mut random);
         column.copy_from(&(noise + draw_scatter(model, &mut random)));
     }
-    space.whiten(&mut draws);
-    let adjoint = dictionary.places.batch_sums::<BATCH>(&space.adjoint(draws));
+    let (left, _) = space.forward(draws);
+    let misfits: Vec<f64> = left.column_iter().map(|c| c.norm_squared()).collect();
+    let adjoint = dictionary.places.batch_sums::<BATCH>(&space.adjoint(left));
     let mut rows: Vec<Vec<f64>> = vec![vec![0.0; dictionary.families.len()]; BATCH];
     for (place, family) in dictionary.families.iter().enumerate() {
         for entry in &dictionary.entries[family.entries.clone()] {
@@ -190,6 +212,9 @@ fn greatest<M: FittedModel>(
         for row in &mut rows {
             row[place] = surprise(row[place], freedom);
         }
+    }
+    for (row, misfit) in rows.iter_mut().zip(misfits) {
+        row.push(misfit);
     }
     rows
 }

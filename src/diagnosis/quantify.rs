@@ -1,16 +1,15 @@
-//! How far the gap shrinks: in the readings, on held-out repeats, and in the answers.
+//! How far the gap shrinks: in the readings and on held-out repeats.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use errsep_models::model::{FittedModel, Profile};
+use errsep_models::model::FittedModel;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::bench::{Bench, Cause, raw_signatures};
 use super::noise::{NoiseLaw, NoiseSource, draw_scatter};
 use super::space::Space;
-use super::verdict::{Bias, HeldOut, Size};
+use super::verdict::{HeldOut, Size};
 
 /// Draws of the noise for its expected part in a sum of squares.
 const DRAWS: usize = 48;
@@ -26,8 +25,8 @@ pub(super) struct GapMeter {
     /// Draws of the scatter that the model expects.
     scatter: DMatrix<f64>,
     expected: f64,
+    /// Variance that noise alone gives to the mean square of the residual less its expected value.
     spread: f64,
-    noise_freedom: f64,
     sigma: f64,
 }
 
@@ -49,13 +48,21 @@ impl GapMeter {
         let expected = sums.iter().sum::<f64>() / DRAWS as f64;
         let variance =
             sums.iter().map(|s| (s - expected).powi(2)).sum::<f64>() / (DRAWS - 1) as f64;
+        // A noise that comes from repeats is a part of the same residual: what the two share is not
+        // in their difference. With κ = ν_c/ν the share of the repeats' contrasts, RSS/ν − σ̂² is
+        // (1 − κ) times the difference of two independent mean squares, that of the rest and σ̂².
+        let estimate = 2.0 * expected * expected / law.freedom.max(1.0);
+        let shared = match law.source {
+            NoiseSource::Repeats => (law.freedom / freedom).min(1.0),
+            NoiseSource::Stated | NoiseSource::Neighbours => 0.0,
+        };
+        let rest = 1.0 - shared;
         Self {
             space,
             noise,
             scatter,
             expected,
-            spread: variance,
-            noise_freedom: law.freedom.max(1.0),
+            spread: rest * variance + rest * rest * estimate,
             sigma: law.sigma(),
         }
     }
@@ -67,10 +74,8 @@ impl GapMeter {
         let freedom = (all - causes as f64).max(1.0);
         let rss = self.space.forward_vector(readings).norm_squared();
         let square = rss / freedom - self.expected;
-        // Spread of the residual's own noise, of its product with the gap, of the noise estimate.
-        let variance = self.spread
-            + 4.0 * square.max(0.0) * self.expected / freedom
-            + 2.0 * self.expected * self.expected / self.noise_freedom;
+        // And what the product of noise and gap adds.
+        let variance = self.spread + 4.0 * square.max(0.0) * self.expected / freedom;
         let reach = 1.96 * variance.sqrt();
         let root = |v: f64| v.max(0.0).sqrt();
         Size {
@@ -374,115 +379,4 @@ fn scatter_draws<M: FittedModel>(model: &M, seed: u64) -> DMatrix<f64> {
         column.copy_from(&draw_scatter(model, &mut random));
     }
     draws
-}
-
-/// A profile by name, before and after.
-type MovedProfile = (String, Vec<f64>, Vec<f64>);
-
-/// How the quantities move when causes of some amplitudes, with their covariance, are taken out of
-/// readings, and the profiles with them.
-pub(super) fn biases<M: FittedModel>(
-    bench: &Bench<'_, M>,
-    observed: &DVector<f64>,
-    causes: &[Cause],
-    fit: Option<&(DVector<f64>, DMatrix<f64>)>,
-) -> (Vec<Bias>, Vec<MovedProfile>) {
-    let (model, law) = (bench.model, &bench.law);
-    let nothing = (DVector::zeros(0), DMatrix::zeros(0, 0));
-    let (amplitudes, covariance) = fit.unwrap_or(&nothing);
-    // The part of each amplitude, and how far it is in doubt.
-    let mut parts = raw_signatures(bench, causes);
-    for (mut part, amplitude) in parts.column_iter_mut().zip(amplitudes.iter()) {
-        part *= *amplitude;
-    }
-    let relative = covariance.map_with_location(|i, j, v| {
-        let product = amplitudes[i] * amplitudes[j];
-        if product == 0.0 { 0.0 } else { v / product }
-    });
-    let std_of = |gradient: DVector<f64>| gradient.dot(&(&relative * &gradient)).max(0.0).sqrt();
-    let corrected = observed - parts.column_sum();
-    let mut profiles = Vec::new();
-    let mut biases: Vec<Bias> = model
-        .quantities()
-        .into_iter()
-        .map(|quantity| {
-            let before = quantity.weights.dot(observed);
-            let after = quantity.weights.dot(&corrected);
-            Bias {
-                quantity: quantity.name,
-                before,
-                after,
-                moved: after - before,
-                std: weighted_std(model, law, &quantity.weights),
-                moved_std: std_of(parts.tr_mul(&quantity.weights)),
-                unit: quantity.unit.to_owned(),
-            }
-        })
-        .collect();
-    let rms = |v: &DVector<f64>| v.norm() / (v.len().max(1) as f64).sqrt();
-    let profiles_of = |readings: DVector<f64>| model.refit(readings).profiles();
-    let before = profiles_of(observed.clone());
-    let after = profiles_of(corrected);
-    let without: Vec<Vec<Profile>> = parts
-        .column_iter()
-        .map(|part| profiles_of(observed - part))
-        .collect();
-    for (k, (b, a)) in before.into_iter().zip(after).enumerate() {
-        profiles.push((
-            b.name.clone(),
-            b.values.as_slice().to_vec(),
-            a.values.as_slice().to_vec(),
-        ));
-        let moved = &a.values - &b.values;
-        // The derivative of a norm is the product with its direction.
-        let direction = &moved / (moved.norm() * (moved.len().max(1) as f64).sqrt());
-        let gradient = without
-            .iter()
-            .map(|own| direction.dot(&(&own[k].values - &b.values)));
-        let gradient = DVector::from_iterator(without.len(), gradient);
-        biases.push(Bias {
-            quantity: b.name,
-            before: rms(&b.values),
-            after: rms(&a.values),
-            moved: rms(&moved),
-            std: b.noise_gain * law.sigma(),
-            moved_std: if moved.norm() > 0.0 {
-                std_of(gradient)
-            } else {
-                0.0
-            },
-            unit: b.unit.to_owned(),
-        });
-    }
-    (biases, profiles)
-}
-
-/// √(wᵀ V w).
-pub(super) fn weighted_std<M: FittedModel>(
-    model: &M,
-    law: &NoiseLaw,
-    weights: &DVector<f64>,
-) -> f64 {
-    let mut variance = 0.0;
-    for trace in model.traces() {
-        let w = weights.rows(trace.start, trace.len());
-        let x: Vec<f64> = model.places()[trace.clone()].iter().map(|p| p.x).collect();
-        variance += law.white * w.norm_squared() + law.shift * w.sum().powi(2);
-        if law.correlated > 0.0 {
-            // Σ wᵢ wⱼ exp(−|xᵢ − xⱼ|/ℓ) by its recursion along the trace.
-            let mut behind = 0.0;
-            for k in 0..w.len() {
-                if k > 0 {
-                    behind *= (-(x[k] - x[k - 1]).abs() / law.length).exp();
-                }
-                variance += law.correlated * w[k] * (w[k] + 2.0 * behind);
-                behind += w[k];
-            }
-        }
-    }
-    for column in model.expected_scatter() {
-        let pairs = column.rows.iter().zip(&column.values);
-        variance += pairs.map(|(&k, v)| weights[k] * v).sum::<f64>().powi(2);
-    }
-    variance.max(0.0).sqrt()
 }

@@ -4,21 +4,22 @@ use errsep_models::model::FittedModel;
 use nalgebra::DVector;
 
 use super::bench::{Bench, Cause, raw_signatures};
+use super::bias::biases;
 use super::candidates::candidates;
+use super::conclusion::{Conclusion, Measured};
+use super::confidence::Alternative;
 use super::hidden::hidden;
 use super::noise::{NoiseSource, neighbour_scatter, of_repeats};
 use super::places::places;
-use super::quantify::{GapMeter, biases, shrink};
+use super::quantify::GapMeter;
 use super::shape::fingerprint;
 use super::spikes::Calmed;
 use super::splitting::splits;
-use super::statement::{for_people, separating, statement};
-use super::verdict::{Candidate, Detail, Diagnosis, Gap, Kind, NoiseOut, Verdict};
+use super::statement::{separating, statement};
+use super::told::for_people;
+use super::verdict::{Candidate, Detail, Diagnosis, Kind, NoiseOut, Verdict};
 use super::{Examined, Options};
 use crate::report::number::plain;
-
-/// Part of the predicted shrinking that a named cause must reach.
-const PROMISE: f64 = 0.5;
 
 pub(super) fn compose<M: FittedModel>(
     examined: &Examined<'_, M>,
@@ -33,72 +34,62 @@ pub(super) fn compose<M: FittedModel>(
         ref found,
     } = *examined;
     let alarmed = detected <= options.false_alarm;
-    let causes: &[Cause] = match found {
-        Some(answer) if alarmed => &answer.causes,
-        _ => &[],
-    };
-    let fit = bench.amplitudes(readings, causes);
-    let change = fit.as_ref().map_or_else(
-        || DVector::zeros(readings.len()),
-        |(amplitudes, _)| bench.change(causes, amplitudes),
+    let found = found.as_ref().filter(|_| alarmed);
+    // What cannot be fitted is no cause.
+    let fit = found.and_then(|answer| {
+        let (amplitudes, _) = bench.amplitudes(readings, &answer.causes)?;
+        Some((answer.causes.as_slice(), amplitudes))
+    });
+    let (causes, change) = fit.map_or_else(
+        || (&[][..], DVector::zeros(readings.len())),
+        |(causes, amplitudes)| (causes, bench.change(causes, &amplitudes)),
     );
     let meter = GapMeter::new(bench.model, &bench.law, options.seed);
-    let unknowns: usize = causes
-        .iter()
-        .map(|c| c.projected.ncols() + c.shape.free())
-        .sum();
-    let before = meter.size(readings, 0);
-    let after = meter.size(&(readings - &change), unknowns);
+    let unknowns: usize = causes.iter().map(Cause::unknowns).sum();
     let signatures = raw_signatures(bench, causes);
     let square = first.residual.norm_squared() - bench.space.degrees_of_freedom() as f64;
     let excess = square.max(f64::MIN_POSITIVE);
     let explained =
         first.residual.norm_squared() - bench.remainder(readings, causes).residual.norm_squared();
-    let predicted_shrink = if before.rms > 0.0 {
-        1.0 - (1.0 - explained / excess).max(0.0).sqrt()
-    } else {
-        0.0
-    };
-    let shrunk = shrink(before.rms, after.rms);
-    // A gap that stands clear and does not shrink as its score promised has another cause.
-    let kept_promise = before.ci95[0] == 0.0 || shrunk > PROMISE * predicted_shrink;
-    let kind = match found {
-        _ if !alarmed => Kind::None,
-        Some(answer) if answer.complete && kept_promise => Kind::Effect,
-        _ => Kind::Unknown,
-    };
-    let gap = Gap {
-        unit: bench.model.reading_unit(),
-        noise: bench.law.sigma(),
-        before,
-        after,
-        shrink: shrunk,
-        predicted_shrink,
-        held_out: meter.held_out(bench.model, readings, &signatures),
-    };
+    let before = meter.size(readings, 0);
+    let Conclusion { kind, gap } = Conclusion::of(
+        alarmed,
+        found,
+        Measured {
+            unit: bench.model.reading_unit(),
+            noise: bench.law.sigma(),
+            before,
+            after: meter.size(&(readings - &change), unknowns),
+            predicted_shrink: if before.rms > 0.0 {
+                1.0 - (1.0 - explained / excess).max(0.0).sqrt()
+            } else {
+                0.0
+            },
+            held_out: meter.held_out(bench.model, readings, &signatures),
+        },
+    );
     // Without a gap there is nothing to explain.
     let whole = if alarmed && square > 0.0 {
         excess
     } else {
         f64::INFINITY
     };
-    let candidates = candidates(bench, readings, first, whole, found.as_ref(), causes);
-    let names = |effects: &[usize]| -> Vec<String> {
-        effects
-            .iter()
-            .map(|e| bench.catalogue[*e].name().to_owned())
+    let names = |causes: &mut dyn Iterator<Item = &Cause>| -> Vec<String> {
+        causes
+            .map(|c| bench.catalogue[c.effect].name().to_owned())
             .collect()
     };
-    let own: Vec<usize> = causes.iter().map(|c| c.effect).collect();
-    let groups: Vec<Vec<String>> = match (found, kind) {
-        (Some(answer), Kind::Effect) => answer
-            .groups
-            .iter()
-            .filter(|g| g.len() > 1)
-            .map(|g| names(g))
-            .collect(),
-        _ => Vec::new(),
+    let own = names(&mut causes.iter());
+    let groups: &[Vec<Alternative>] = match (found, kind) {
+        (Some(answer), Kind::Effect) => &answer.groups,
+        _ => &[],
     };
+    let candidates = candidates(bench, readings, first, whole, groups, causes);
+    let indistinguishable: Vec<Vec<String>> = groups
+        .iter()
+        .filter(|group| group.len() > 1)
+        .map(|group| names(&mut group.iter().map(|a| &a.cause)))
+        .collect();
     let places = if alarmed {
         places(bench, first, excess)
     } else {
@@ -107,21 +98,22 @@ pub(super) fn compose<M: FittedModel>(
     let mut verdict = Verdict {
         kind,
         effects: if kind == Kind::Effect {
-            names(&own)
+            own.clone()
         } else {
             Vec::new()
         },
-        indistinguishable: groups,
+        indistinguishable,
         partial: if kind == Kind::Unknown {
-            names(&own)
+            own
         } else {
             Vec::new()
         },
         separate: Vec::new(),
-        shape: (kind == Kind::Unknown).then(|| fingerprint(bench, readings, first, excess)),
+        shape: (kind == Kind::Unknown && square > 0.0)
+            .then(|| fingerprint(bench, readings, first, excess)),
         statement: String::new(),
         p_value: detected,
-        adequacy: found.as_ref().map_or(first.global, |a| a.remainder.global),
+        adequacy: found.map_or(first.global, |a| a.remainder.global),
     };
     let splits = match (found, kind) {
         (Some(answer), Kind::Effect) => splits(bench, readings, answer),
@@ -130,7 +122,7 @@ pub(super) fn compose<M: FittedModel>(
     verdict.separate = separating(&verdict.indistinguishable, &candidates, &splits);
     let hidden = hidden(bench, &verdict.effects, options);
     verdict.statement = statement(&verdict, &gap, &places, &candidates, &hidden);
-    let (bias, profiles) = biases(bench, readings, causes, fit.as_ref());
+    let (bias, profiles) = biases(bench, readings, causes);
     Diagnosis {
         schema: "errsep.diagnosis/1",
         model: bench.model.name(),
@@ -226,7 +218,7 @@ fn disagreement<M: FittedModel>(bench: &Bench<'_, M>, clean: &DVector<f64>) -> O
         return None;
     }
     let scatter = neighbour_scatter(bench.model, &bench.law, clean)?;
-    let unit = bench.model.reading_unit();
+    let unit = for_people(bench.model.reading_unit());
     let (seen, expected) = (plain(scatter.seen, 2), plain(scatter.expected, 2));
     // Beyond three standard deviations of the comparison, and by a part that matters.
     let reach = 0.15 + 3.0 * scatter.relative_std;

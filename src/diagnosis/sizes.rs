@@ -17,10 +17,23 @@ const LEAST: f64 = -0.5;
 
 /// Amplitudes and shapes of causes fitted together.
 pub(super) struct Sizes {
-    amplitudes: DVector<f64>,
-    covariance: DMatrix<f64>,
-    /// For each cause its first amplitude and its first parameter.
-    own: Vec<(usize, usize)>,
+    /// The amplitudes, cause by cause.
+    pub amplitudes: DVector<f64>,
+    /// Covariance of the parameters.
+    pub covariance: DMatrix<f64>,
+    /// How noise of whitened, projected readings moves the parameters.
+    pub gain: DMatrix<f64>,
+    /// What the parameters are: those that readings determine at all.
+    pub parameters: Vec<Unknown>,
+}
+
+/// One parameter of several causes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unknown {
+    /// An amplitude: the cause, and its place among the cause's own.
+    Amplitude(usize, usize),
+    /// A shape parameter, likewise.
+    Shape(usize, usize),
 }
 
 impl Sizes {
@@ -31,7 +44,7 @@ impl Sizes {
         causes: &[Cause],
     ) -> Option<Self> {
         let (amplitudes, _) = bench.amplitudes(readings, causes)?;
-        let (columns, own) = instruments(bench, causes, &amplitudes);
+        let (columns, parameters) = instruments(bench, causes, &amplitudes);
         let gram = columns.tr_mul(&columns);
         let covariance = gram
             .clone()
@@ -40,8 +53,9 @@ impl Sizes {
             .or_else(|| gram.pseudo_inverse(1e-12).ok())?;
         Some(Self {
             amplitudes,
+            gain: &covariance * columns.transpose(),
             covariance,
-            own,
+            parameters,
         })
     }
 
@@ -57,18 +71,20 @@ impl Sizes {
         };
         let (columns, _) = instruments(bench, causes, &plain.amplitudes);
         let mut derivatives = columns.clone();
-        for (cause, (first, parameter)) in causes.iter().zip(&plain.own) {
-            for k in 0..cause.columns.len() {
-                let step = 0.5 * plain.covariance[(parameter + k, parameter + k)].sqrt();
-                let predicted = |sign: f64| {
-                    let mut moved = plain.amplitudes.clone();
-                    moved[first + k] += sign * step;
-                    predicted(bench, readings, causes, &moved)
-                };
-                let slope = (predicted(1.0) - predicted(-1.0)) / (2.0 * step);
-                if slope.iter().all(|v| v.is_finite()) {
-                    derivatives.set_column(parameter + k, &slope);
-                }
+        for (parameter, unknown) in plain.parameters.iter().enumerate() {
+            let Unknown::Amplitude(cause, k) = *unknown else {
+                continue;
+            };
+            let at = first_amplitude(causes, cause) + k;
+            let step = 0.5 * plain.covariance[(parameter, parameter)].sqrt();
+            let predicted = |sign: f64| {
+                let mut moved = plain.amplitudes.clone();
+                moved[at] += sign * step;
+                predicted(bench, readings, causes, &moved)
+            };
+            let slope = (predicted(1.0) - predicted(-1.0)) / (2.0 * step);
+            if slope.iter().all(|v| v.is_finite()) {
+                derivatives.set_column(parameter, &slope);
             }
         }
         let Some(inverse) = columns.tr_mul(&derivatives).try_inverse() else {
@@ -78,6 +94,7 @@ impl Sizes {
         let added = draws.added(&gain);
         Some(Self {
             covariance: with_state(&gain * gain.transpose(), &added),
+            gain,
             ..plain
         })
     }
@@ -91,20 +108,20 @@ impl Sizes {
     ) -> Vec<Estimate> {
         let cause = &causes[which];
         let (effect, shape) = (&bench.catalogue[cause.effect], &cause.shape);
-        let (first, parameter) = self.own[which];
+        let first = first_amplitude(causes, which);
         let count = cause.projected.ncols();
-        let size = count + shape.values.len();
-        let next = self
-            .own
-            .get(which + 1)
-            .map_or(self.covariance.nrows(), |n| n.1);
-        let covariance = DMatrix::from_fn(size, size, |i, j| {
-            let (i, j) = (parameter + i, parameter + j);
-            if i < next && j < next {
-                self.covariance[(i, j)]
+        let place = |i: usize| {
+            let unknown = if i < count {
+                Unknown::Amplitude(which, i)
             } else {
-                f64::NAN
-            }
+                Unknown::Shape(which, i - count)
+            };
+            self.parameters.iter().position(|p| *p == unknown)
+        };
+        let size = count + shape.values.len();
+        let covariance = DMatrix::from_fn(size, size, |i, j| match (place(i), place(j)) {
+            (Some(i), Some(j)) => self.covariance[(i, j)],
+            _ => f64::NAN,
         });
         let mut estimates = effect.estimates(
             shape,
@@ -127,40 +144,58 @@ impl Sizes {
     }
 }
 
-/// Signatures and their derivatives by the shapes, and where each cause's own begin.
+/// The place of a cause's first amplitude among those of all.
+pub(super) fn first_amplitude(causes: &[Cause], which: usize) -> usize {
+    causes[..which].iter().map(|c| c.projected.ncols()).sum()
+}
+
+/// Signatures and their derivatives by the shapes, and what they belong to.
 fn instruments<M: FittedModel>(
     bench: &Bench<'_, M>,
     causes: &[Cause],
     amplitudes: &DVector<f64>,
-) -> (DMatrix<f64>, Vec<(usize, usize)>) {
+) -> (DMatrix<f64>, Vec<Unknown>) {
     let mut columns: Vec<DVector<f64>> = Vec::new();
-    let mut own = Vec::new();
-    let mut at = 0;
-    for cause in causes {
+    let mut parameters = Vec::new();
+    for (which, cause) in causes.iter().enumerate() {
         let count = cause.projected.ncols();
-        let used = amplitudes.rows(at, count).clone_owned();
-        own.push((at, columns.len()));
-        columns.extend(cause.projected.column_iter().map(|c| c.clone_owned()));
-        for (j, step) in cause.shape.steps.iter().enumerate() {
-            if *step == 0.0 {
+        let used = amplitudes
+            .rows(first_amplitude(causes, which), count)
+            .clone_owned();
+        for (k, column) in cause.projected.column_iter().enumerate() {
+            parameters.push(Unknown::Amplitude(which, k));
+            columns.push(column.clone_owned());
+        }
+        for j in 0..cause.shape.values.len() {
+            let Some((low, high, apart)) = beside(cause, j) else {
                 continue;
-            }
-            let moved = |sign: f64| {
-                let mut shape: Shape = cause.shape.clone();
-                shape.values[j] += sign * 0.1 * step;
-                bench.cause(bench.model, cause.effect, shape).projected * &used
             };
-            let slope = (moved(1.0) - moved(-1.0)) / (0.2 * step);
+            let at = |shape: Shape| bench.cause(bench.model, cause.effect, shape).projected * &used;
+            let slope = (at(high) - at(low)) / apart;
             if slope.norm() > 0.0 {
+                parameters.push(Unknown::Shape(which, j));
                 columns.push(slope);
             }
         }
-        at += count;
     }
     if columns.is_empty() {
-        return (DMatrix::zeros(bench.space.readings(), 0), own);
+        return (DMatrix::zeros(bench.space.readings(), 0), parameters);
     }
-    (DMatrix::from_columns(&columns), own)
+    (DMatrix::from_columns(&columns), parameters)
+}
+
+/// The shapes on either side of a cause's along one of its free parameters, and how far apart.
+pub(super) fn beside(cause: &Cause, parameter: usize) -> Option<(Shape, Shape, f64)> {
+    let step = *cause.shape.steps.get(parameter)?;
+    if step == 0.0 {
+        return None;
+    }
+    let moved = |sign: f64| {
+        let mut shape = cause.shape.clone();
+        shape.values[parameter] += sign * 0.1 * step;
+        shape
+    };
+    Some((moved(-1.0), moved(1.0), 0.2 * step))
 }
 
 /// The whitened, projected change by causes of given amplitudes, at the state that is left without

@@ -9,7 +9,7 @@ use errsep_models::model::FittedModel;
 use nalgebra::{DMatrix, DVector};
 
 use super::bench::{Bench, Cause};
-use super::confidence::Answer;
+use super::confidence::{Alternative, Answer};
 use super::space::{Space, orthonormal};
 
 /// Standard deviations apart at which the wrong one of two is taken once in a hundred times:
@@ -64,7 +64,7 @@ fn split<M: FittedModel>(
     readings: &DVector<f64>,
     causes: &[Cause],
     k: usize,
-    group: &[usize],
+    group: &[Alternative],
     further: &[(String, M, Space)],
 ) -> Option<Split> {
     let (amplitudes, _) = bench.amplitudes(readings, causes)?;
@@ -72,18 +72,10 @@ fn split<M: FittedModel>(
     let own = amplitudes.rows(from, causes[k].columns.len()).clone_owned();
     let mut others = causes.to_vec();
     let named = others.remove(k);
-    let remainder = bench.remainder(readings, &others);
-    let rivals: Vec<Cause> = group
+    let rivals: Vec<&Cause> = group
         .iter()
-        .filter(|effect| **effect != named.effect)
-        .filter_map(|effect| {
-            let start = bench.start(&remainder, *effect)?;
-            Some(
-                bench
-                    .refine(bench.model, readings, *effect, start, &others)
-                    .0,
-            )
-        })
+        .map(|alternative| &alternative.cause)
+        .filter(|rival| rival.effect != named.effect)
         .collect();
     let apart = |extra: Option<&(String, M, Space)>| -> Option<f64> {
         let signatures = |cause: &Cause| {
@@ -103,7 +95,7 @@ fn split<M: FittedModel>(
         rivals
             .iter()
             .map(|rival| {
-                let all: Vec<DVector<f64>> = std::iter::once(rival)
+                let all: Vec<DVector<f64>> = std::iter::once(*rival)
                     .chain(&others)
                     .flat_map(|c| {
                         let columns = signatures(c);

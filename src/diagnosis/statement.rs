@@ -1,8 +1,9 @@
 //! The verdict in a sentence that a person can act on.
 
 use super::splitting::Split;
+use super::told::for_people;
 use super::verdict::{Candidate, Fingerprint, Gap, Hidden, Kind, ParameterOut, Verdict, Where};
-use crate::report::number::{measured, plain};
+use crate::report::number::{percent, plain, probability};
 
 /// The sentence.
 pub(super) fn statement(
@@ -12,103 +13,140 @@ pub(super) fn statement(
     candidates: &[Candidate],
     hidden: &[Hidden],
 ) -> String {
-    let unit = for_people(gap.unit);
-    let unseen = |implausible: bool| -> Vec<&str> {
-        hidden
-            .iter()
-            .filter(|h| h.detectable.is_none() && h.implausible() == implausible)
-            .map(|h| h.effect.as_str())
-            .collect()
-    };
     let place = places.first().map_or(String::new(), |p| {
         let range = p
             .range()
             .map_or(String::new(), |range| format!(" from {range}"));
-        format!(", most of it in {} {}{range}", p.axis, p.value)
+        let part = if p.share > 0.5 {
+            "most of it".to_owned()
+        } else {
+            format!("the greatest part ({}) of it", percent(p.share))
+        };
+        format!(", {part} in {} {}{range}", p.axis, p.value)
     });
     match verdict.kind {
-        Kind::None => {
-            let said = |names: Vec<&str>, what: &str| {
-                if names.is_empty() {
-                    String::new()
-                } else {
-                    format!("; {} would {what}", names.join(", "))
-                }
-            };
-            let blind = said(
-                unseen(false),
-                "not show in such readings whatever their size",
-            ) + &said(unseen(true), "show only at sizes that are not plausible");
-            format!(
-                "The model misses nothing that stands out of the noise of {} {unit}{blind}.",
-                plain(gap.noise, 3)
-            )
-        }
+        Kind::None => nothing(gap, hidden),
         Kind::Unknown => {
+            let missed = if gap.before.rms > 0.0 {
+                format!("The model misses {}{place}", gap.before.in_words(gap.unit))
+            } else {
+                format!(
+                    "Something stands out of the noise (p {}){place}, though the model misses {}",
+                    probability(verdict.p_value),
+                    gap.before.in_words(gap.unit)
+                )
+            };
             let partial = match verdict.partial[..] {
                 [] => String::new(),
                 ref some => format!(
-                    "; {} would leave {} {unit} of it",
+                    "; {} would leave {} but {}",
                     some.join(" and "),
-                    plain(gap.after.rms, 3)
+                    gap.after.in_words(gap.unit),
+                    if some.len() > 1 {
+                        "do not pass as its causes"
+                    } else {
+                        "does not pass as its cause"
+                    }
                 ),
             };
             format!(
-                "The model misses {} {unit} RMS{place}, and no effect of the catalogue explains it{partial}.{}",
-                plain(gap.before.rms, 3),
+                "{missed}, and no effect of the catalogue explains it{partial}.{}",
                 verdict.shape.as_ref().map_or(String::new(), described)
             )
         }
-        Kind::Effect => {
-            let named: Vec<String> = verdict
-                .effects
-                .iter()
-                .map(|name| {
-                    let detail = candidates
-                        .iter()
-                        .find(|c| c.effect == *name)
-                        .map_or(String::new(), describe);
-                    format!("{name}{detail}")
-                })
-                .collect();
-            let doubt = if verdict.indistinguishable.is_empty() {
-                let confirm: Vec<&str> = candidates
-                    .iter()
-                    .filter(|c| verdict.effects.contains(&c.effect))
-                    .map(|c| c.confirm.as_str())
-                    .collect();
-                format!("To confirm: {}.", confirm.join("; "))
-            } else {
-                let groups: Vec<String> = verdict
-                    .indistinguishable
-                    .iter()
-                    .map(|g| g.join(" or "))
-                    .collect();
-                format!(
-                    "These readings cannot tell apart {}. To tell them apart: {}.",
-                    groups.join(", nor "),
-                    verdict.separate.join("; ")
-                )
-            };
-            let named = named.join(" and ");
-            if gap.before.rms > 0.0 {
-                format!(
-                    "The model misses {} {unit} RMS because of {named}; with it {} {unit} remain. {doubt}",
-                    plain(gap.before.rms, 3),
-                    plain(gap.after.rms, 3)
-                )
-            } else {
-                format!(
-                    "The model misses less than {} {unit} RMS, but {named} stands out of it. {doubt}",
-                    plain(gap.before.ci95[1], 3)
-                )
-            }
-        }
+        Kind::Effect => named(verdict, gap, candidates),
     }
+}
+
+/// No gap, and what would not have shown.
+fn nothing(gap: &Gap, hidden: &[Hidden]) -> String {
+    let said = |implausible: bool, what: &str| {
+        let names: Vec<&str> = hidden
+            .iter()
+            .filter(|h| h.detectable.is_none() && h.implausible() == implausible)
+            .map(|h| h.effect.as_str())
+            .collect();
+        if names.is_empty() {
+            String::new()
+        } else {
+            format!("; {} would {what}", names.join(", "))
+        }
+    };
+    format!(
+        "No significant misfit at a noise of {} {}{}{}.",
+        gap.noise_figure(),
+        for_people(gap.unit),
+        said(false, "not show in such readings whatever their size"),
+        said(true, "show only at sizes that are not plausible")
+    )
+}
+
+/// One or several causes, each alone or one of a group.
+fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
+    let described = |effect: &str| {
+        let candidate = candidates.iter().find(|c| c.effect == effect);
+        format!("{effect}{}", candidate.map_or(String::new(), describe))
+    };
+    let causes = verdict.causes();
+    let open = causes.iter().any(|group| group.len() > 1);
+    let said: Vec<String> = causes
+        .iter()
+        .map(|group| match group[..] {
+            [only] => described(only),
+            ref several => {
+                let each: Vec<String> = several.iter().map(|e| described(e)).collect();
+                format!("one of: {}", each.join("; "))
+            }
+        })
+        .collect();
+    let said = said.join(" and ");
+    let doubt = if open {
+        format!(
+            "These readings cannot tell {} apart. To tell them apart: {}.",
+            if causes.len() > 1 {
+                "the members of a group"
+            } else {
+                "them"
+            },
+            verdict.separate.join("; ")
+        )
+    } else {
+        let confirm: Vec<&str> = candidates
+            .iter()
+            .filter(|c| verdict.effects.contains(&c.effect))
+            .map(|c| c.confirm.as_str())
+            .collect();
+        format!("To confirm: {}.", confirm.join("; "))
+    };
+    let missed = gap.before.in_words(gap.unit);
+    let beginning = if gap.before.rms > 0.0 {
+        format!("The model misses {missed} because of {said}")
+    } else {
+        format!("The model misses {missed}, but what stands out of the noise is {said}")
+    };
+    let with = if open {
+        verdict.effects.join(" and ")
+    } else if causes.len() > 1 {
+        "them".to_owned()
+    } else {
+        "it".to_owned()
+    };
+    let more = if gap.after.is_clear() {
+        ", more than the noise explains"
+    } else {
+        ""
+    };
+    format!(
+        "{beginning}; with {with} {} remain{more}. {doubt}",
+        gap.after.in_words(gap.unit)
+    )
 }
 
 fn describe(candidate: &Candidate) -> String {
     let own = detail(candidate.variant.as_deref(), &candidate.parameters);
+    if own.is_empty() {
+        return String::new();
+    }
     let others = candidate.elsewhere.iter().map(|other| {
         let there = detail(Some(&other.variant), &other.parameters);
         format!("; as likely {there}")
@@ -118,15 +156,7 @@ fn describe(candidate: &Candidate) -> String {
 
 fn detail(variant: Option<&str>, parameters: &[ParameterOut]) -> String {
     let mut parts: Vec<String> = variant.iter().map(|v| (*v).to_owned()).collect();
-    parts.extend(parameters.iter().map(|p| {
-        let (scale, unit) = if p.unit == "rad" {
-            (1e6, "µrad")
-        } else {
-            (1.0, for_people(&p.unit))
-        };
-        let value = measured(scale * p.value, Some(scale * p.std));
-        format!("{} {value} {unit}", p.name).trim_end().to_owned()
-    }));
+    parts.extend(parameters.iter().map(|p| p.told().in_words()));
     parts.join(", ")
 }
 
@@ -206,13 +236,4 @@ fn described(shape: &Fingerprint) -> String {
     letters.next().map_or(String::new(), |first| {
         format!(" {}{}.", first.to_uppercase(), letters.as_str())
     })
-}
-
-/// A unit as people write it.
-pub fn for_people(unit: &str) -> &str {
-    match unit {
-        "um" => "µm",
-        "1" => "",
-        unit => unit,
-    }
 }

@@ -51,6 +51,27 @@ fn circumstances(place: &Place) -> Circumstances {
 }
 
 impl Tabulated {
+    /// The weight of each channel.
+    fn weights(&self, channels: &[String]) -> Vec<f64> {
+        let missing = if self.channels.is_empty() { 1.0 } else { 0.0 };
+        channels
+            .iter()
+            .map(|name| self.channels.get(name).copied().unwrap_or(missing))
+            .collect()
+    }
+
+    /// The change of one reading, with the weights of the channels.
+    fn change(&self, place: &Place, weights: &[f64]) -> f64 {
+        let here = self.repeats.is_empty() || self.repeats.contains(&place.repeat);
+        let sign = if self.turns_with_direction {
+            place.direction
+        } else {
+            1.0
+        };
+        let weight = weights.get(place.channel).copied().unwrap_or(0.0);
+        f64::from(u8::from(here)) * sign * weight * self.at(place)
+    }
+
     fn at(&self, place: &Place) -> f64 {
         if let Some(formula) = &self.formula {
             return formula.at(&circumstances(place));
@@ -109,9 +130,23 @@ impl Tabulated {
                 self.name
             ));
         }
+        if let Some((channel, weight)) = self.channels.iter().find(|(_, w)| !w.is_finite()) {
+            return Some(format!(
+                "`{}` gives the channel `{channel}` the weight {weight}, which is no finite number",
+                self.name
+            ));
+        }
+        let weights = self.weights(channels);
+        let endless = |place: &&Place| !self.change(place, &weights).is_finite();
+        if let Some(place) = places.iter().find(endless) {
+            return Some(format!(
+                "`{}` changes the reading at {} by no finite number",
+                self.name, place.x
+            ));
+        }
         places
             .iter()
-            .all(|place| self.at(place) == 0.0)
+            .all(|place| self.change(place, &weights) == 0.0)
             .then(|| format!("`{}` changes no reading", self.name))
     }
 }
@@ -139,22 +174,9 @@ impl<M: FittedModel> Effect<M> for Tabulated {
     }
 
     fn columns(&self, model: &M, _shape: &Shape) -> Vec<Column> {
-        let names = model.channel_names();
-        let weights: Vec<f64> = names
-            .iter()
-            .map(|name| {
-                let missing = if self.channels.is_empty() { 1.0 } else { 0.0 };
-                self.channels.get(name).copied().unwrap_or(missing)
-            })
-            .collect();
+        let weights = self.weights(&model.channel_names());
         vec![Column::from_places(model.places(), |_, place| {
-            let here = self.repeats.is_empty() || self.repeats.contains(&place.repeat);
-            let sign = if self.turns_with_direction {
-                place.direction
-            } else {
-                1.0
-            };
-            f64::from(u8::from(here)) * sign * weights[place.channel] * self.at(place)
+            self.change(place, &weights)
         })]
     }
 }

@@ -5,14 +5,14 @@ use serde::Serialize;
 
 use super::localise::Item;
 use super::noise::NoiseLaw;
-use super::statement::for_people;
+use super::told::for_people;
 use crate::report::number::plain;
 
 /// The kind of verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// Nothing stands out of the noise.
+    /// No gap is detected; its interval holds zero.
     None,
     /// One or several effects of the catalogue explain the gap.
     Effect,
@@ -25,9 +25,9 @@ pub enum Kind {
 pub struct Verdict {
     /// Its kind.
     pub kind: Kind,
-    /// The effects, by what each adds.
+    /// The effects, by what each adds; of a group the one of greatest evidence.
     pub effects: Vec<String>,
-    /// Groups of effects that these data cannot tell apart, the named one first.
+    /// Groups of effects that these data cannot tell apart, the greatest evidence first.
     pub indistinguishable: Vec<Vec<String>>,
     /// Effects that explain a part of an unknown gap.
     pub partial: Vec<String>,
@@ -43,6 +43,34 @@ pub struct Verdict {
     pub p_value: f64,
     /// Probability of what remains.
     pub adequacy: f64,
+}
+
+impl Verdict {
+    /// For each effect named those that stand for it: its group, or itself alone.
+    #[must_use]
+    pub fn causes(&self) -> Vec<Vec<&str>> {
+        self.effects
+            .iter()
+            .map(|effect| {
+                let mut groups = self.indistinguishable.iter();
+                let own = groups.find(|group| group.first() == Some(effect));
+                let alone = std::slice::from_ref(effect);
+                let members = own.map_or(alone, Vec::as_slice);
+                members.iter().map(String::as_str).collect()
+            })
+            .collect()
+    }
+
+    /// The effects whose change is taken out of the readings for all that is said of afterwards:
+    /// those named, or those that explain a part.
+    #[must_use]
+    pub fn taken_out(&self) -> &[String] {
+        match self.kind {
+            Kind::None => &[],
+            Kind::Effect => &self.effects,
+            Kind::Unknown => &self.partial,
+        }
+    }
 }
 
 /// What an unknown gap looks like, beside its places.
@@ -181,7 +209,8 @@ pub struct Candidate {
     pub explained: f64,
     /// Corrected for every shape tried.
     pub p_value: f64,
-    /// Log Bayes factor against no effect (Schwarz's approximation).
+    /// Log Bayes factor against no effect (Schwarz's approximation); of an effect that is named, alone
+    /// or in a group, beside the other causes.
     pub evidence: f64,
     /// Part of the effect that the fit cannot absorb.
     pub visible: f64,
@@ -221,15 +250,38 @@ pub struct ParameterOut {
     pub std: f64,
     /// Unit.
     pub unit: String,
+    /// Of a parameter that is told by its logarithm the quantity itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub linear: Option<Linear>,
+}
+
+/// A quantity whose logarithm is a parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Linear {
+    /// Name.
+    pub name: String,
+    /// Value.
+    pub value: f64,
+    /// Standard uncertainty, to first order.
+    pub std: f64,
+    /// Unit.
+    pub unit: String,
 }
 
 impl From<Estimate> for ParameterOut {
     fn from(estimate: Estimate) -> Self {
+        let linear = estimate.unit.strip_prefix("ln ").map(|unit| Linear {
+            name: estimate.name.trim_start_matches("log-").to_owned(),
+            value: estimate.value.exp(),
+            std: estimate.value.exp() * estimate.std,
+            unit: unit.to_owned(),
+        });
         Self {
             name: estimate.name,
             value: estimate.value,
             std: estimate.std,
             unit: estimate.unit,
+            linear,
         }
     }
 }
@@ -245,8 +297,10 @@ pub struct Bias {
     pub after: f64,
     /// Root mean square of the difference of profiles, or the difference.
     pub moved: f64,
-    /// Standard uncertainty of a value.
+    /// Standard uncertainty of the value without the effects; of a profile, that of one of its values.
     pub std: f64,
+    /// Likewise of the value with them.
+    pub after_std: f64,
     /// Standard uncertainty of the move.
     pub moved_std: f64,
     /// Unit.
@@ -356,6 +410,9 @@ pub struct NoiseOut {
     pub shift: f64,
     /// `repeats`, `stated` or `neighbours`.
     pub source: &'static str,
+    /// How well it is known, and with it every standard uncertainty of the diagnosis; none where it
+    /// is stated.
+    pub degrees_of_freedom: Option<f64>,
 }
 
 impl From<&NoiseLaw> for NoiseOut {
@@ -371,6 +428,7 @@ impl From<&NoiseLaw> for NoiseOut {
                 NoiseSource::Stated => "stated",
                 NoiseSource::Neighbours => "neighbours",
             },
+            degrees_of_freedom: Some(law.freedom).filter(|freedom| freedom.is_finite()),
         }
     }
 }

@@ -82,25 +82,35 @@ pub const MAKERS: [Maker; 6] = [
 const REPEATS: u32 = 4;
 
 fn calibration_line(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    diagnose(&calibration_line_made(put, seed, 1.0), options)
+}
+
+/// A calibration of four sets, its noise a number of times the usual.
+pub fn calibration_line_made(put: Put<'_>, seed: u64, noise: f64) -> CalibrationLine {
     let what = line::CalibrationSimulation {
         line: [0.5, 2e-3],
         full_scale: 1000.0,
         loads: 20,
         sets: REPEATS,
-        noise: 1e-3,
+        noise: 1e-3 * noise,
         disturbances: put
             .iter()
             .filter_map(|(name, size)| line::Disturbance::named(name, *size, REPEATS))
             .collect(),
     };
     let readings = line::simulate(&what, seed).unwrap();
-    diagnose(&CalibrationLine::new(&readings, None).unwrap(), options)
+    CalibrationLine::new(&readings, None).unwrap()
 }
 
 fn circle(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    diagnose(&circle_made(put, seed, 1.0), options)
+}
+
+/// Four passes over a circle, likewise.
+pub fn circle_made(put: Put<'_>, seed: u64, noise: f64) -> CirclePoints {
     let what = CircleSimulation {
         count: 72,
-        noise_um: 1.0,
+        noise_um: noise,
         ..CircleSimulation::default()
     };
     let mut points = Vec::new();
@@ -115,28 +125,38 @@ fn circle(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
         let pass = circle::simulate_disturbed(&what, &disturbances, pass_seed).unwrap();
         points.extend(pass.into_iter().map(|p| (p, repeat)));
     }
-    diagnose(&CirclePoints::new(&points, None).unwrap(), options)
+    CirclePoints::new(&points, None).unwrap()
 }
 
 fn four_sensor(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    diagnose(&four_sensor_made(put, seed, 1.0), options)
+}
+
+/// Four runs of four sensors, likewise.
+pub fn four_sensor_made(put: Put<'_>, seed: u64, noise: f64) -> FourSensors {
     let geometry = Geometry::new(5.0, [1, 1, 5], 62).unwrap();
     let truth = Example::of(&geometry);
-    let mut disturbances = Disturbances::noise(0.1);
+    let mut disturbances = Disturbances::noise(0.1 * noise);
     for (name, size) in put {
         assert!(disturbances.add(name, *size), "{name}");
     }
     let repeats: Vec<_> = (0..u64::from(REPEATS))
         .map(|repeat| simulate(&geometry, &truth, &disturbances, seed * 100 + repeat).unwrap())
         .collect();
-    diagnose(&FourSensors::new(&repeats, None).unwrap(), options)
+    FourSensors::new(&repeats, None).unwrap()
 }
 
 fn fourier(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    diagnose(&fourier_made(put, seed, 1.0), options)
+}
+
+/// Four scans of each spacing, likewise.
+pub fn fourier_made(put: Put<'_>, seed: u64, noise: f64) -> FourierScans {
     let what = FourierSimulation {
         samples: 100,
         orders: 20,
         repeats: REPEATS,
-        noise: 1.0,
+        noise,
         ..FourierSimulation::default()
     };
     let disturbances: Vec<_> = put
@@ -148,15 +168,22 @@ fn fourier(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
         length: what.length,
         orders: what.orders,
     };
-    diagnose(&FourierScans::new(&scans, section, None).unwrap(), options)
+    FourierScans::new(&scans, section, None).unwrap()
 }
 
 fn step_diagonal(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    diagnose(&step_diagonal_made(put, seed, 1.0), options)
+}
+
+/// Four runs of each sequence, likewise.
+pub fn step_diagonal_made(put: Put<'_>, seed: u64, noise: f64) -> DiagonalRuns {
+    let usual = DiagonalSimulation::default();
     let what = DiagonalSimulation {
+        noise: noise * usual.noise,
         sequences: vec![Sequence::XYZ, Sequence::YZX, Sequence::ZXY],
         repeats: REPEATS,
         rotation: 0.0,
-        ..DiagonalSimulation::default()
+        ..usual
     };
     let disturbances: Vec<_> = put
         .iter()
@@ -164,12 +191,16 @@ fn step_diagonal(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
         .collect();
     let (readings, _, _) = diagonal::simulate_disturbed(&what, &disturbances, seed);
     let rotations: Vec<Component> = Component::all().filter(|c| c.rotation).collect();
-    let model = DiagonalRuns::new(&what.zone, &readings, &rotations, None).unwrap();
-    diagnose(&model, options)
+    DiagonalRuns::new(&what.zone, &readings, &rotations, None).unwrap()
 }
 
-/// A machine without scatter: what differs between parts is what was put in.
 fn machine(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+    diagnose(&machine_made(put, seed, 1.0), options)
+}
+
+/// A machine without scatter: what differs between parts is what was put in. Its noise is a number of
+/// times the usual.
+pub fn machine_made(put: Put<'_>, seed: u64, noise: f64) -> MeasuredParts {
     let error = |name: &str, coefficients: Vec<f64>| ComponentError {
         component: name.parse().unwrap(),
         function: ErrorFunction::polynomial(coefficients),
@@ -193,9 +224,17 @@ fn machine(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
         .iter()
         .filter_map(|(name, size)| PartDisturbance::named(name, *size))
         .collect();
-    let readings =
-        simulate_parts_disturbed(&machine, &points, 6, REPEATS, 0.5, &disturbances, seed).unwrap();
-    diagnose(&MeasuredParts::new(&machine, readings).unwrap(), options)
+    let readings = simulate_parts_disturbed(
+        &machine,
+        &points,
+        6,
+        REPEATS,
+        0.5 * noise,
+        &disturbances,
+        seed,
+    )
+    .unwrap();
+    MeasuredParts::new(&machine, readings).unwrap()
 }
 
 /// Whether the size that was found is within two standard uncertainties of the true one, and of the

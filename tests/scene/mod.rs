@@ -1,4 +1,5 @@
 //! A small reversal with known truth, and its diagnosis.
+#![allow(dead_code, reason = "tests and campaigns each use their part")]
 
 use errsep::diagnosis::{Diagnosis, Options, diagnose};
 use errsep_models::reversal::Observations;

@@ -43,6 +43,11 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         .in_file(&args.data)
         .remedy("take every n-th point"));
     }
+    for (point, _) in &points {
+        let at = format!("x = {:e}, y = {:e}", point.x, point.y);
+        super::within_reach("a coordinate", point.x, &at, args)?;
+        super::within_reach("a coordinate", point.y, &at, args)?;
+    }
     let model = CirclePoints::new(&points, setup.circle.noise).map_err(|e| {
         let message = match e {
             CircleError::StraighterThanAnyCircle | CircleError::NotConverged { .. } => {

@@ -29,6 +29,12 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         .in_file(&args.data)
         .remedy("diagnose a part of the travel"));
     }
+    for (k, reading) in measured.outputs.readings().iter().enumerate() {
+        let at = format!("slide position {}", k + 1);
+        for value in reading {
+            super::within_reach("a reading", *value, &at, args)?;
+        }
+    }
     let model = FourSensors::new(&measured.each, setup.settings.noise)
         .map_err(|e| Message::not_solved(e.to_string()).in_file(&args.data))?;
     Case {

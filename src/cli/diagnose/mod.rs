@@ -73,6 +73,9 @@ pub struct Args {
     pub(super) common: CommonArgs,
 }
 
+/// Most blind trials: each is a diagnosis of its own.
+const MOST_TRIALS: usize = 100_000;
+
 /// Diagnoses the readings.
 ///
 /// # Errors
@@ -86,9 +89,15 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         ))
         .remedy("give a number between 0 and 0.5, such as 0.01"));
     }
-    if args.prove == Some(0) {
-        return Err(Message::bad_input("--prove 0 proves nothing")
-            .remedy("give the number of sealed effects, such as --prove 200"));
+    if let Some(count) = args.prove.filter(|n| !(1..=MOST_TRIALS).contains(n)) {
+        return Err(Message::bad_input(if count == 0 {
+            "--prove 0 proves nothing".to_owned()
+        } else {
+            format!("--prove {count} would not come to an end")
+        })
+        .remedy(format!(
+            "give the number of sealed effects, such as --prove 200, at most {MOST_TRIALS}"
+        )));
     }
     let model = recognise::model(args)?;
     if args.points.is_some() && model.name != "machine" {
@@ -107,11 +116,33 @@ fn positive(value: Option<f64>, what: &str, args: &Args) -> Result<(), Message> 
         Some(v) if !(v > 0.0 && v.is_finite()) => {
             let message = Message::bad_input(format!("{what} = {v} is no standard deviation"))
                 .remedy("give a number greater than zero, or leave it out to estimate it");
-            Err(match &args.setup {
-                Some(path) => message.in_file(path),
-                None => message,
-            })
+            Err(in_setup(message, args))
         }
         _ => Ok(()),
+    }
+}
+
+/// Greatest reading, position and time: the square of a sum of squares of them must be finite.
+const GREATEST: f64 = 1e60;
+
+/// Refuses a number whose squares and products no longer fit into a double.
+fn within_reach(what: &str, value: f64, at: &str, args: &Args) -> Result<(), Message> {
+    if value.abs() <= GREATEST {
+        return Ok(());
+    }
+    Err(Message::bad_input(format!(
+        "{what} of {value:e} (at {at}) cannot be diagnosed: its square overflows"
+    ))
+    .in_file(&args.data)
+    .remedy(format!(
+        "correct it: readings, positions and times stay below {GREATEST:e}"
+    )))
+}
+
+/// A message about the set-up, with its file where there is one.
+fn in_setup(message: Message, args: &Args) -> Message {
+    match &args.setup {
+        Some(path) => message.in_file(path),
+        None => message,
     }
 }

@@ -2,10 +2,9 @@
 
 use errsep_models::model::{FittedModel, Place};
 
-use super::words::shown;
+use super::words::{harm_in_words, moved, shown};
 use crate::diagnosis::{Diagnosis, Kind, for_people};
 use crate::report::diagnosis as sheet;
-use crate::report::number::plain;
 
 pub(super) fn view<M: FittedModel>(
     data: String,
@@ -29,6 +28,7 @@ pub(super) fn view<M: FittedModel>(
             Kind::Unknown => sheet::Finding::Unknown,
         },
         statement: diagnosis.verdict.statement.clone(),
+        taken_out: diagnosis.verdict.taken_out().to_vec(),
         gap: sheet::Gap {
             unit: for_people(gap.unit).to_owned(),
             noise: gap.noise,
@@ -133,13 +133,13 @@ fn candidate(candidate: &crate::diagnosis::Candidate) -> sheet::Candidate {
             .parameters
             .iter()
             .map(|p| {
-                let (value, unit) = shown(p.value, &p.unit);
+                let told = p.told();
                 // Of several variants that fit as well the figure is that of one.
                 let name = match &candidate.variant {
-                    Some(own) if !candidate.elsewhere.is_empty() => format!("{}, {own}", p.name),
-                    _ => p.name.clone(),
+                    Some(own) if !candidate.elsewhere.is_empty() => format!("{}, {own}", told.name),
+                    _ => told.name,
                 };
-                (name, value, shown(p.std, &p.unit).0, unit.to_owned())
+                (name, told.value, told.std, told.unit)
             })
             .collect(),
         physics: candidate.physics.clone(),
@@ -161,13 +161,17 @@ fn groups(diagnosis: &Diagnosis) -> Vec<sheet::Group> {
 }
 
 fn shift(bias: &crate::diagnosis::Bias) -> sheet::Shift {
-    let (before, unit) = shown(bias.before, &bias.unit);
+    let value = |value: f64, std: f64| {
+        let told = |v| shown(v, &bias.unit).0;
+        (told(value), told(std))
+    };
+    let moved = moved(bias);
     sheet::Shift {
         quantity: bias.quantity.clone(),
-        before,
-        after: shown(bias.after, &bias.unit).0,
-        std: shown(bias.std, &bias.unit).0,
-        unit: unit.to_owned(),
+        before: value(bias.before, bias.std),
+        after: value(bias.after, bias.after_std),
+        moved: (moved.value, moved.std),
+        unit: moved.unit,
     }
 }
 
@@ -179,14 +183,9 @@ fn hidden(hidden: &crate::diagnosis::Hidden) -> sheet::Hidden {
             let (value, unit) = shown(d, &hidden.unit);
             (value, unit.to_owned())
         }),
-        harm: hidden.harm.as_ref().map_or(String::new(), |h| {
-            let (value, unit) = shown(h.per_unit, &h.unit);
-            format!(
-                "{} {unit} in {} per {}",
-                plain(value, 3),
-                h.quantity,
-                for_people(&hidden.unit)
-            )
-        }),
+        harm: hidden
+            .harm
+            .as_ref()
+            .map_or(String::new(), |harm| harm_in_words(harm, hidden)),
     }
 }

@@ -2,34 +2,45 @@
 
 use std::fmt::Write;
 
-use crate::diagnosis::{Diagnosis, Kind, Trials, for_people};
-use crate::report::number::{measured, plain, probability};
+use crate::diagnosis::{Bias, Diagnosis, Harm, Hidden, Told, Trials, for_people, scaled};
+use crate::report::number::{plain, probability};
 
 /// µrad for people; other units as they are.
 pub(super) fn shown(value: f64, unit: &str) -> (f64, &str) {
-    if unit == "rad" {
-        (value * 1e6, "µrad")
+    let (scale, unit) = scaled(unit);
+    (scale * value, unit)
+}
+
+/// What an unseen effect does to a quantity, per unit of its size.
+pub(super) fn harm_in_words(harm: &Harm, hidden: &Hidden) -> String {
+    let (value, unit) = shown(harm.per_unit, &harm.unit);
+    let (scale, per) = scaled(&hidden.unit);
+    let per = if per.is_empty() {
+        "unit of its size"
     } else {
-        (value, for_people(unit))
-    }
+        per
+    };
+    let value = plain(value / scale, 3);
+    format!("{value} {unit} in {} per {per}", harm.quantity)
 }
 
 pub(super) fn in_words(diagnosis: &Diagnosis) -> String {
     let gap = &diagnosis.gap;
+    let taken_out = !diagnosis.verdict.taken_out().is_empty();
     let mut text = format!("{}\n\n", diagnosis.verdict.statement);
+    let after = if taken_out {
+        format!(" -> {}", gap.after.figures())
+    } else {
+        String::new()
+    };
     let _ = writeln!(
         text,
-        "Gap, {} RMS           {} [{}, {}] -> {} [{}, {}]   noise of one reading {}",
+        "Gap, {} RMS           {}{after}   noise of one reading {}",
         for_people(gap.unit),
-        number(gap.before.rms),
-        number(gap.before.ci95[0]),
-        number(gap.before.ci95[1]),
-        number(gap.after.rms),
-        number(gap.after.ci95[0]),
-        number(gap.after.ci95[1]),
-        number(gap.noise)
+        gap.before.figures(),
+        gap.noise_figure()
     );
-    if let Some(held) = gap.held_out {
+    if let Some(held) = gap.held_out.filter(|_| taken_out) {
         let _ = writeln!(
             text,
             "On held-out repeats   {} -> {}   (a perfect model: {})",
@@ -64,14 +75,7 @@ pub(super) fn in_words(diagnosis: &Diagnosis) -> String {
         let parameters: Vec<String> = candidate
             .parameters
             .iter()
-            .map(|p| {
-                let (value, unit) = shown(p.value, &p.unit);
-                format!(
-                    "{} {} {unit}",
-                    p.name,
-                    measured(value, Some(shown(p.std, &p.unit).0))
-                )
-            })
+            .map(|p| p.told().in_words())
             .collect();
         let mark = if candidate.in_set { "*" } else { " " };
         let shown = if candidate.p_value < 0.05 {
@@ -88,19 +92,18 @@ pub(super) fn in_words(diagnosis: &Diagnosis) -> String {
             100.0 * candidate.visible
         );
     }
-    if diagnosis.verdict.kind == Kind::Effect {
+    if taken_out {
         let _ = writeln!(text, "\nBias of the answer        without        with");
         for bias in &diagnosis.bias {
             let (before, unit) = shown(bias.before, &bias.unit);
             let (after, _) = shown(bias.after, &bias.unit);
-            let (moved, _) = shown(bias.moved, &bias.unit);
             let _ = writeln!(
                 text,
-                "  {:<12} {:>14} {:>14} {unit}   moved {}",
+                "  {:<12} {:>14} {:>14} {unit}   {}",
                 bias.quantity,
                 number(before),
                 number(after),
-                measured(moved, Some(shown(bias.moved_std, &bias.unit).0)).replace('\u{2212}', "-")
+                moved(bias).in_words().replace('\u{2212}', "-")
             );
         }
     }
@@ -130,6 +133,17 @@ pub(super) fn in_words(diagnosis: &Diagnosis) -> String {
         let _ = writeln!(text, "\nNote: {note}");
     }
     text
+}
+
+/// How far a quantity moves, as it is shown.
+pub(super) fn moved(bias: &Bias) -> Told {
+    let (value, unit) = shown(bias.moved, &bias.unit);
+    Told {
+        name: "moved".to_owned(),
+        value,
+        std: shown(bias.moved_std, &bias.unit).0,
+        unit: unit.to_owned(),
+    }
 }
 
 /// Four digits with a hyphen for a minus, as terminals show it.

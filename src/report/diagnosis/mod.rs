@@ -42,19 +42,19 @@ fn gap(view: &View) -> Section {
     let unit = || gap.unit.clone();
     let size = |name: &str, size: &Size| {
         KeyFigure::new(name, size.rms, unit())
-            .digits(2)
+            .digits(3)
             .meaning(format!(
                 "95 % interval {} to {}",
-                number::plain(size.ci95[0], 2),
-                number::plain(size.ci95[1], 2)
+                number::plain(size.ci95[0], 3),
+                number::plain(size.ci95[1], 3)
             ))
     };
     let mut figures = vec![
         size("Gap before", &gap.before),
         size("Gap after", &gap.after),
-        KeyFigure::new("Noise of one reading", gap.noise, unit()),
+        KeyFigure::new("Noise of one reading", gap.noise, unit()).digits(3),
     ];
-    if view.finding == Finding::None {
+    if view.taken_out.is_empty() {
         figures.remove(1);
     }
     let bar =
@@ -77,7 +77,7 @@ fn gap(view: &View) -> Section {
             );
     }
     let section = noted.key_figures(figures);
-    if view.finding == Finding::None {
+    if view.taken_out.is_empty() {
         return section;
     }
     section.figure(Figure::new(
@@ -115,7 +115,7 @@ fn residuals(view: &View) -> Section {
                     after.add(row, r.x, r.after);
                 }
             }
-            if view.finding == Finding::None {
+            if view.taken_out.is_empty() {
                 vec![before]
             } else {
                 vec![before, after]
@@ -146,6 +146,13 @@ fn causes(view: &View) -> Section {
     if view.candidates.is_empty() {
         return section;
     }
+    for group in &view.groups {
+        section = section.note(format!(
+            "One of: {}. These readings cannot tell them apart. To tell them apart: {}.",
+            group.effects.join(", "),
+            group.separate
+        ));
+    }
     for candidate in view.candidates.iter().filter(|c| c.named) {
         let variant = candidate.variant.as_deref();
         section = section.paragraph(format!(
@@ -161,13 +168,6 @@ fn causes(view: &View) -> Section {
                     KeyFigure::new(name.clone(), *value, unit.clone()).std(*std)
                 }));
         }
-    }
-    for group in &view.groups {
-        section = section.note(format!(
-            "These data cannot tell apart: {}. {}",
-            group.effects.join(", "),
-            group.separate
-        ));
     }
     let mut ladder: Vec<&Candidate> = view.candidates.iter().collect();
     ladder.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
@@ -225,19 +225,30 @@ fn places(view: &View) -> Section {
 
 fn shifts(view: &View) -> Section {
     let mut section = Section::new("What the gap had done to the answer");
+    if view.taken_out.is_empty() {
+        return section;
+    }
     if !view.shifts.is_empty() {
         let rows = view.shifts.iter().map(|shift| {
-            let value = |value| Cell::Measured {
-                value,
-                std: shift.std,
+            let cell = |(value, std)| Cell::measured(value, std);
+            let name = if shift.unit.is_empty() {
+                shift.quantity.clone()
+            } else {
+                format!("{} ({})", shift.quantity, shift.unit)
             };
             [
-                format!("{} ({})", shift.quantity, shift.unit).into(),
-                value(shift.before),
-                value(shift.after),
-                Cell::number(shift.after - shift.before),
+                name.into(),
+                cell(shift.before),
+                cell(shift.after),
+                cell(shift.moved),
             ]
         });
+        if view.finding == Finding::Unknown || !view.groups.is_empty() {
+            section = section.paragraph(format!(
+                "With {}, which the readings do not establish.",
+                view.taken_out.join(" and ")
+            ));
+        }
         section = section.table(
             Table::new(
                 "The model's quantities without and with the effects",
@@ -286,8 +297,8 @@ fn hidden(view: &View) -> Section {
     });
     section
         .paragraph(
-            "An effect with no visible share looks to these data exactly like other values of the \
-             fitted parameters. That nothing is seen says nothing about it.",
+            "An effect with no visible share looks to these readings exactly like other values of the \
+             fitted parameters: whether it is there cannot be told from them.",
         )
         .table(
             Table::new(

@@ -3,7 +3,7 @@
 /// What was found, which sets how the summary is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Finding {
-    /// Nothing stands out of the noise.
+    /// No gap is detected.
     #[default]
     None,
     /// One or several effects explain the gap.
@@ -22,13 +22,16 @@ pub struct View {
     pub finding: Finding,
     /// The sentence a person acts on.
     pub statement: String,
+    /// The effects whose change is taken out for all that is called `after`.
+    pub taken_out: Vec<String>,
     /// How large the gap is and how far it shrinks.
     pub gap: Gap,
     /// Where it lies.
     pub places: Vec<Place>,
     /// The candidates, in any order.
     pub candidates: Vec<Candidate>,
-    /// Groups that these data cannot tell apart, and the measurement that would.
+    /// Groups that these data cannot tell apart, the greatest evidence first, and the measurement
+    /// that would.
     pub groups: Vec<Group>,
     /// Residuals before and after.
     pub residuals: Vec<Residual>,
@@ -139,12 +142,12 @@ pub struct Residual {
 pub struct Shift {
     /// The quantity.
     pub quantity: String,
-    /// Without the effects.
-    pub before: f64,
+    /// Without the effects, with its standard uncertainty.
+    pub before: (f64, f64),
     /// With them.
-    pub after: f64,
-    /// Standard uncertainty of the value after.
-    pub std: f64,
+    pub after: (f64, f64),
+    /// The difference, or the root mean square of the difference of profiles.
+    pub moved: (f64, f64),
     /// Unit, as people write it.
     pub unit: String,
 }

@@ -1,0 +1,234 @@
+//! How far the answers move when the causes are taken out of the readings.
+//!
+//! With w the weights of a quantity, Σ the covariance of the readings and c the causes' change, the
+//! quantity is wᵀy before and wᵀ(y − c) after. To first order c moves by D δ with errors δ of the
+//! causes' amplitudes and shapes, and those are G ν̃ in noise ν̃ that is white, so that with
+//! g = Dᵀw and w̃ = W Σ w (W the whitening) the variances are |w̃|² before, gᵀCg of the move and
+//! |w̃|² + gᵀCg − 2 w̃ᵀGᵀg after, C the covariance of amplitudes and shapes.
+
+use errsep_models::model::{FittedModel, Profile};
+use nalgebra::{DMatrix, DVector};
+
+use super::bench::{Bench, Cause, raw_signatures};
+use super::noise::NoiseLaw;
+use super::sizes::{Sizes, Unknown, beside, first_amplitude};
+use super::verdict::Bias;
+
+/// A quantity that moves by less than this part of its uncertainty does not move: that is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// A profile's name, its values without and its values with the effects.
+type MovedProfile = (String, Vec<f64>, Vec<f64>);
+
+/// How the quantities move when the causes are taken out of readings, and the profiles with them.
+pub(super) fn biases<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    observed: &DVector<f64>,
+    causes: &[Cause],
+) -> (Vec<Bias>, Vec<MovedProfile>) {
+    let (model, law) = (bench.model, &bench.law);
+    let taken = Taken::out_of(bench, observed, causes);
+    let corrected = match &taken {
+        Some(taken) => observed - &taken.change,
+        None => observed.clone(),
+    };
+    let mut biases: Vec<Bias> = model
+        .quantities()
+        .into_iter()
+        .map(|quantity| {
+            let before = quantity.weights.dot(observed);
+            let after = quantity.weights.dot(&corrected);
+            let spread = covariance_times(model, law, &quantity.weights);
+            let std = quantity.weights.dot(&spread).max(0.0).sqrt();
+            let (moved_std, after_std) = taken.as_ref().map_or((0.0, std), |taken| {
+                let gradient = taken.derivatives.tr_mul(&quantity.weights);
+                let mut whitened = DMatrix::from_column_slice(spread.len(), 1, spread.as_slice());
+                bench.space.whiten(&mut whitened);
+                let common = (&taken.sizes.gain * whitened.column(0)).dot(&gradient);
+                let moved = taken.variance(&gradient);
+                let after = std * std + moved - 2.0 * common;
+                (moved.sqrt(), after.max(0.0).sqrt())
+            });
+            let still = (after - before).abs() <= ROUNDING * std && moved_std <= ROUNDING * std;
+            let (after, after_std, moved_std) = if still {
+                (before, std, 0.0)
+            } else {
+                (after, after_std, moved_std)
+            };
+            Bias {
+                quantity: quantity.name,
+                before,
+                after,
+                moved: after - before,
+                std,
+                after_std,
+                moved_std,
+                unit: quantity.unit.to_owned(),
+            }
+        })
+        .collect();
+    let rms = |v: &DVector<f64>| v.norm() / (v.len().max(1) as f64).sqrt();
+    let profiles_of = |readings: DVector<f64>| model.refit(readings).profiles();
+    let before = profiles_of(observed.clone());
+    let after = profiles_of(corrected.clone());
+    // The profiles with each parameter of the causes moved by its standard uncertainty.
+    let moved_by: Vec<Vec<Profile>> = taken.as_ref().map_or_else(Vec::new, |taken| {
+        let columns = taken.derivatives.column_iter();
+        columns
+            .zip(&taken.stds)
+            .map(|(column, std)| profiles_of(&corrected - column * *std))
+            .collect()
+    });
+    let mut profiles = Vec::new();
+    for (k, (b, a)) in before.into_iter().zip(after).enumerate() {
+        let moved = &a.values - &b.values;
+        let std = b.noise_gain * law.sigma();
+        let (moved_std, after_std) = taken.as_ref().map_or((0.0, std), |taken| {
+            let mut slopes = DMatrix::zeros(moved.len(), moved_by.len());
+            for ((mut slope, own), by) in slopes.column_iter_mut().zip(&moved_by).zip(&taken.stds) {
+                let change = own.get(k).map(|own| (&own.values - &a.values) / *by);
+                if let Some(change) = change.filter(|c| c.iter().all(|v| v.is_finite())) {
+                    slope.copy_from(&change);
+                }
+            }
+            // The derivative of a norm is the product with its direction.
+            let count = moved.len().max(1) as f64;
+            let length = moved.norm() * count.sqrt();
+            let gradient = slopes.tr_mul(&moved) / length.max(f64::MIN_POSITIVE);
+            let spread = (&slopes * &taken.sizes.covariance).component_mul(&slopes);
+            (
+                taken.variance(&gradient).sqrt(),
+                std.hypot((spread.sum() / count).max(0.0).sqrt()),
+            )
+        });
+        biases.push(Bias {
+            quantity: b.name.clone(),
+            before: rms(&b.values),
+            after: rms(&a.values),
+            moved: rms(&moved),
+            std,
+            after_std,
+            moved_std,
+            unit: b.unit.to_owned(),
+        });
+        profiles.push((
+            b.name,
+            b.values.as_slice().to_vec(),
+            a.values.as_slice().to_vec(),
+        ));
+    }
+    (biases, profiles)
+}
+
+/// What causes change in the readings, and how that moves with their amplitudes and shapes.
+struct Taken {
+    change: DVector<f64>,
+    sizes: Sizes,
+    /// Readings × parameters of `sizes`.
+    derivatives: DMatrix<f64>,
+    /// Standard uncertainty of each parameter.
+    stds: Vec<f64>,
+}
+
+impl Taken {
+    fn out_of<M: FittedModel>(
+        bench: &Bench<'_, M>,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+    ) -> Option<Self> {
+        if causes.is_empty() {
+            return None;
+        }
+        let sizes = Sizes::fitted_with_state(bench, readings, causes)?;
+        let signatures = raw_signatures(bench, causes);
+        let derivative = |unknown: &Unknown| match *unknown {
+            Unknown::Amplitude(which, k) => signatures
+                .column(first_amplitude(causes, which) + k)
+                .clone_owned(),
+            Unknown::Shape(which, j) => {
+                let cause = &causes[which];
+                let first = first_amplitude(causes, which);
+                let used = sizes.amplitudes.rows(first, cause.columns.len());
+                let effect = &bench.catalogue[cause.effect];
+                let mut slope = DVector::zeros(readings.len());
+                if let Some((low, high, apart)) = beside(cause, j) {
+                    for (shape, sign) in [(low, -1.0), (high, 1.0)] {
+                        let columns = effect.columns(bench.model, &shape);
+                        for (column, amplitude) in columns.iter().zip(used.iter()) {
+                            slope += column.dense(readings.len()) * (sign * amplitude / apart);
+                        }
+                    }
+                }
+                slope
+            }
+        };
+        let columns: Vec<DVector<f64>> = sizes.parameters.iter().map(derivative).collect();
+        let variances = sizes.covariance.diagonal();
+        Some(Self {
+            change: bench.change(causes, &sizes.amplitudes),
+            derivatives: DMatrix::from_columns(&columns),
+            stds: variances
+                .iter()
+                .map(|v| v.max(0.0).sqrt())
+                .map(|std| if std.is_finite() { std } else { 0.0 })
+                .collect(),
+            sizes,
+        })
+    }
+
+    fn variance(&self, gradient: &DVector<f64>) -> f64 {
+        gradient.dot(&(&self.sizes.covariance * gradient)).max(0.0)
+    }
+}
+
+/// Σ w, the scatter that the model expects included.
+fn covariance_times<M: FittedModel>(
+    model: &M,
+    law: &NoiseLaw,
+    weights: &DVector<f64>,
+) -> DVector<f64> {
+    let mut spread = weights * law.white;
+    for trace in model.traces() {
+        let w = weights.rows(trace.start, trace.len());
+        let places = &model.places()[trace.clone()];
+        let mut own = spread.rows_mut(trace.start, trace.len());
+        own.add_scalar_mut(law.shift * w.sum());
+        if law.correlated <= 0.0 {
+            continue;
+        }
+        // Σ wⱼ exp(−|xᵢ − xⱼ|/ℓ) by its recursions from either end of the trace.
+        let decay = |k: usize| (-(places[k].x - places[k - 1].x).abs() / law.length).exp();
+        let mut behind = 0.0;
+        for k in 0..w.len() {
+            if k > 0 {
+                behind *= decay(k);
+            }
+            behind += w[k];
+            own[k] += law.correlated * behind;
+        }
+        let mut ahead = 0.0;
+        for k in (0..w.len()).rev() {
+            own[k] += law.correlated * ahead;
+            ahead += w[k];
+            if k > 0 {
+                ahead *= decay(k);
+            }
+        }
+    }
+    for column in model.expected_scatter() {
+        let pairs = || column.rows.iter().zip(&column.values);
+        let along: f64 = pairs().map(|(&k, v)| weights[k] * v).sum();
+        pairs().for_each(|(&k, v)| spread[k] += along * v);
+    }
+    spread
+}
+
+/// √(wᵀ Σ w).
+pub(super) fn weighted_std<M: FittedModel>(
+    model: &M,
+    law: &NoiseLaw,
+    weights: &DVector<f64>,
+) -> f64 {
+    let variance = weights.dot(&covariance_times(model, law, weights));
+    variance.max(0.0).sqrt()
+}

@@ -253,3 +253,117 @@ fn bad_input_is_named_with_its_place() {
         assert!(out.stdout.is_empty() && !report.exists());
     }
 }
+
+fn simulated(folder: &Path, options: &[&str], setup: &str) -> (PathBuf, PathBuf) {
+    let (data, toml) = (folder.join("data.csv"), folder.join("setup.toml"));
+    let mut args = vec!["simulate", "four-sensor"];
+    args.extend(options);
+    std::fs::write(&data, errsep(&args).stdout).expect("written");
+    std::fs::write(&toml, setup).expect("written");
+    (data, toml)
+}
+
+fn answered(data: &Path, setup: &Path) -> Value {
+    let out = errsep(&[
+        "four-sensor",
+        text(data),
+        "--setup",
+        text(setup),
+        "--format",
+        "json",
+    ]);
+    assert_eq!(
+        out.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
+    serde_json::from_slice(&out.stdout).expect("JSON and nothing else")
+}
+
+/// The headline names its reference line and its interval, and is no clean bill while the parabola is
+/// open; with the slope of the tilt stated it is.
+#[test]
+fn the_headline_is_a_minimum_zone_under_its_condition() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sensors = "[sensors]\nspacing = [5.0, 5.0, 25.0]\n";
+    let (data, open) = simulated(folder.path(), &["--seed", "3"], sensors);
+    let closed = folder.path().join("closed.toml");
+    let known = format!("{sensors}[parabola]\ntilt_slope = 0.0\n");
+    std::fs::write(&closed, known).expect("written");
+    for (setup, standing, condition) in [(&open, "caution", true), (&closed, "good", false)] {
+        let report = folder.path().join(standing);
+        let (data, setup) = (text(&data), text(setup));
+        let args = ["four-sensor", data, "--setup", setup, "--out", text(&report)];
+        let out = errsep(&args);
+        assert_eq!(out.status.code(), Some(0));
+        let said = String::from_utf8_lossy(&out.stdout).into_owned();
+        let headline = said
+            .lines()
+            .find(|line| line.trim_start().starts_with("straightness "))
+            .expect("a headline");
+        assert!(headline.contains("(minimum zone), 95 % interval"), "{said}");
+        assert_eq!(headline.contains("if the surface has no parabola"), condition);
+        let page = std::fs::read_to_string(report.join("report.html")).expect("a report");
+        assert!(page.contains(&format!("summary {standing}")), "{standing}");
+        let json = std::fs::read_to_string(report.join("result.json")).expect("JSON");
+        let json: Value = serde_json::from_str(&json).expect("JSON");
+        let zone = &json["straightness_error"];
+        assert_eq!(zone["reference"], "minimum_zone");
+        assert_eq!(zone["parabola_open"], condition);
+        let at = |value: &Value| value.as_f64().expect("a number");
+        assert!(at(&zone["interval"][0]) < at(&zone["value"]));
+        assert!(at(&zone["interval"][1]) > at(&zone["interval"][0]));
+    }
+}
+
+/// Exact limit: four repeats of the same readings are these readings with half their noise, whether λ
+/// follows from the noise or not; the answer says that the outputs were averaged.
+#[test]
+fn a_stated_noise_is_that_of_one_repeat() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let setup = |noise: f64| {
+        format!(
+            "[sensors]\nspacing = [5.0, 5.0, 25.0]\nnoise = {noise}\n[separation]\nchoice = \"discrepancy\"\n"
+        )
+    };
+    let (data, half) = simulated(folder.path(), &["--seed", "3"], &setup(0.1));
+    let once = answered(&data, &half);
+    assert_eq!(once["average"], Value::Null);
+    let lines: Vec<String> = std::fs::read_to_string(&data)
+        .expect("the data")
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(str::to_owned)
+        .collect();
+    let mut repeated = format!("{},repeat\n", lines[0]);
+    for repeat in 1..=4 {
+        for line in &lines[1..] {
+            repeated.push_str(&format!("{line},{repeat}\n"));
+        }
+    }
+    std::fs::write(&data, repeated).expect("written");
+    std::fs::write(&half, setup(0.2)).expect("written");
+    let averaged = answered(&data, &half);
+    for key in ["straightness", "tilt", "residual"] {
+        assert_eq!(once[key], averaged[key], "{key}");
+    }
+    assert_eq!(averaged["average"]["of"], "outputs");
+}
+
+/// Spacings of five steps each: the waves that repeat with them are named by their periods.
+#[test]
+fn waves_that_the_spacings_do_not_show_are_listed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (data, setup) = simulated(
+        folder.path(),
+        &["--seed", "3", "--spacing", "5,5,5"],
+        "[sensors]\nspacing = [25.0, 25.0, 25.0]\n",
+    );
+    let answer = answered(&data, &setup);
+    let periods = &answer["invisible_periods"]["value"];
+    assert_eq!(periods, &serde_json::json!([25.0, 12.5]));
+    let listed = answer["not_determined"].as_array().expect("sentences");
+    let named = |text: &Value| text.as_str().is_some_and(|t| t.contains("every 25.00, 12.50 mm"));
+    assert!(listed.iter().any(named), "{listed:?}");
+}

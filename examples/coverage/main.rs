@@ -11,6 +11,7 @@ mod anova;
 mod calibration_line;
 mod circle;
 mod diagnosis;
+mod four_sensor;
 mod machine;
 mod step_diagonal;
 mod tally;
@@ -25,6 +26,7 @@ type Room = (&'static str, u64, fn(u64) -> Vec<Row>);
 /// One line a model.
 const ROOMS: &[Room] = &[
     ("circle", 2000, circle::rows),
+    ("four-sensor", 400, four_sensor::rows),
     ("step-diagonal", 2000, step_diagonal::rows),
     ("machine", 2000, machine::rows),
     ("anova", 2000, anova::rows),

@@ -29,7 +29,7 @@ fn whole_curve(c: &mut Criterion) {
         };
         group.bench_with_input(BenchmarkId::new("band", points), &outputs, |b, outputs| {
             b.iter(|| {
-                let system = banded_system(outputs, Penalised::Profile, Line::EndPoints);
+                let system = banded_system(outputs, Penalised::Profile);
                 black_box(system.map(|system| l_curve(&system)))
             });
         });

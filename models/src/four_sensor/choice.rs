@@ -6,7 +6,7 @@ use errsep_solvers::regularization::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::FourSensorError;
+use super::{FourSensorError, Line};
 
 /// What is kept small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -31,6 +31,16 @@ impl Penalised {
             Self::Profile => Penalty::Identity,
             Self::Slope => Penalty::FirstDifference,
             Self::Curvature => Penalty::SecondDifference,
+        }
+    }
+
+    /// The line from which the penalised surface is counted: the one that makes the penalty least, so
+    /// that what is taken for small does not depend on the line from which the answer is stated.
+    pub const fn line(self) -> Line {
+        match self {
+            Self::Profile => Line::LeastSquares,
+            // The mean slope is that from end to end; second differences do not see a line.
+            Self::Slope | Self::Curvature => Line::EndPoints,
         }
     }
 

@@ -34,13 +34,18 @@ pub fn matrix(geometry: &Geometry) -> DMatrix<f64> {
 
 /// The right-hand side, µm, length 2K.
 pub fn data(outputs: &Outputs) -> DVector<f64> {
-    let free = outputs.geometry().slide_free();
-    let mut data = DVector::zeros(2 * outputs.readings().len());
-    for (n, readings) in outputs.readings().iter().enumerate() {
-        let combined = free.transpose() * Vector4::from(*readings);
-        data.rows_mut(2 * n, 2).copy_from(&combined);
+    slide_free_part(outputs.geometry(), outputs.readings())
+}
+
+/// The two slide-free combinations of readings, one slide position after the other, length 2K.
+pub(super) fn slide_free_part(geometry: &Geometry, readings: &[[f64; 4]]) -> DVector<f64> {
+    let free = geometry.slide_free().transpose();
+    let mut part = DVector::zeros(2 * readings.len());
+    for (n, row) in readings.iter().enumerate() {
+        part.rows_mut(2 * n, 2)
+            .copy_from(&(free * Vector4::from(*row)));
     }
-    data
+    part
 }
 
 /// The penalty as a matrix over all unknowns: the zero-adjustments are left free, as their size

@@ -2,6 +2,8 @@
 
 use errsep_solvers::regularization::RegularizationError;
 
+use crate::straightness::NoStraightness;
+
 /// Why four-sensor outputs have no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FourSensorError {
@@ -61,12 +63,6 @@ pub enum FourSensorError {
          uncertainty that zero-adjustments or a slope of the tilt bring is not local"
     )]
     ParabolaOfLongRecord,
-    /// A record too long for the dense fit, with a penalty on differences and a least-squares line.
-    #[error(
-        "in a record this long a penalty on slope or curvature needs the line through the end \
-         points: choose line = \"end-points\", or the penalty on the profile"
-    )]
-    LineOfLongRecord,
     /// Neither the L-curve nor cross-validation has an answer inside the range of λ.
     #[error(
         "no rule finds a regularization parameter: the surface does not stand out of the noise over \
@@ -79,4 +75,7 @@ pub enum FourSensorError {
     /// The regularized problem has no answer.
     #[error(transparent)]
     Regularization(#[from] RegularizationError),
+    /// The profile has no straightness.
+    #[error(transparent)]
+    Straightness(#[from] NoStraightness),
 }

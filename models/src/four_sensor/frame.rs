@@ -43,15 +43,20 @@ impl<'a> Frame<'a> {
     /// What a change of the unknowns changes in the frame, with the same outputs.
     pub(super) fn change(&self, change: &DVector<f64>) -> Settled {
         let silent = vec![[0.0; 4]; self.outputs.readings().len()];
-        self.place(change, &silent, None)
+        self.error(change, &silent)
     }
 
-    /// Derivatives of (f, S, γ) after settling with respect to the unknowns before,
-    /// (N + 2K) × (N + 2).
+    /// The error in the frame of unknowns and outputs that are both in error.
+    pub(super) fn error(&self, of_unknowns: &DVector<f64>, of_readings: &[[f64; 4]]) -> Settled {
+        self.place(of_unknowns, of_readings, None)
+    }
+
+    /// Derivatives of (f, S, γ, e) after settling with respect to the unknowns before,
+    /// (N + 2K + 4) × (N + 2).
     pub(super) fn map(&self) -> DMatrix<f64> {
         let unknowns = self.mode.profile.len() + direct::ZERO_UNKNOWNS;
         let count = self.outputs.readings().len();
-        let mut map = DMatrix::zeros(self.mode.profile.len() + 2 * count, unknowns);
+        let mut map = DMatrix::zeros(self.mode.profile.len() + 2 * count + 4, unknowns);
         let mut unit = DVector::zeros(unknowns);
         for column in 0..unknowns {
             unit[column] = 1.0;
@@ -61,25 +66,32 @@ impl<'a> Frame<'a> {
         map
     }
 
-    /// Variances of (f, S, γ) from the part of the outputs' noise that the direct system does not
+    /// Variances of (f, S, γ, e) from the part of the outputs' noise that the direct system does not
     /// see, for readings of unit variance. It is independent of the rest.
     pub(super) fn own_variances(&self) -> DVector<f64> {
         let points = self.mode.profile.len();
         let count = self.outputs.readings().len();
-        let own = (self.slide * self.slide.transpose()).diagonal();
-        let mut variances = DVector::zeros(points + 2 * count);
-        variances.rows_mut(points, count).fill(own[0]);
-        variances.rows_mut(points + count, count).fill(own[1]);
+        let own = self.slide * self.slide.transpose();
+        let mut variances = DVector::zeros(points + 2 * count + 4);
+        variances.rows_mut(points, count).fill(own[(0, 0)]);
+        variances.rows_mut(points + count, count).fill(own[(1, 1)]);
         if let Parabola::TiltSlope(_) = self.parabola {
             // The slope of the tilt's own noise becomes a parabola of everything.
-            let slope_variance = own[1] * self.slope_weights().norm_squared();
-            let share = ParabolaMode::CURVATURE_PER_TILT_SLOPE.powi(2) * slope_variance;
+            let weights = self.slope_weights();
+            let per_slope = ParabolaMode::CURVATURE_PER_TILT_SLOPE;
+            let share = per_slope.powi(2) * own[(1, 1)] * weights.norm_squared();
             let mut unknowns = DVector::zeros(points + direct::ZERO_UNKNOWNS);
             unknowns.rows_mut(0, points).copy_from(&self.mode.profile);
             unknowns[points] = self.mode.zero;
             let silent = vec![[0.0; 4]; count];
-            let moved = self.shifted(unknowns, &silent);
-            variances += stacked(&moved).map(|value| share * value * value);
+            let moved = stacked(&self.shifted(unknowns, &silent));
+            variances += moved.map(|value| share * value * value);
+            for n in 0..count {
+                for row in 0..2 {
+                    let at = points + row * count + n;
+                    variances[at] -= 2.0 * per_slope * weights[n] * own[(row, 1)] * moved[at];
+                }
+            }
         }
         variances
     }
@@ -194,11 +206,13 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// (f, S, γ) one below the other.
+/// (f, S, γ, e) one below the other.
 fn stacked(settled: &Settled) -> DVector<f64> {
-    let parts = [&settled.surface, &settled.straightness, &settled.tilt];
-    DVector::from_iterator(
-        parts.iter().map(|part| part.len()).sum(),
-        parts.into_iter().flat_map(|part| part.iter().copied()),
-    )
+    let parts = [
+        settled.surface.as_slice(),
+        settled.straightness.as_slice(),
+        settled.tilt.as_slice(),
+        settled.zero_adjustment.as_slice(),
+    ];
+    DVector::from_vec(parts.concat())
 }

@@ -141,9 +141,11 @@ pub(super) fn conditions(geometry: &Geometry, line: Line) -> DMatrix<f64> {
 /// An orthonormal basis of the unknowns (f, two combinations of e) that meet the conditions,
 /// (N + 2) × (N − 1).
 ///
-/// The penalty has to act on the surface as it will be stated. Left to itself ‖f‖² would choose a
-/// line and a parabola of its own, and the noise of the two end points, which one sensor alone
-/// sees, would then tilt everything.
+/// The penalty acts on the surface less the line that makes it least ([`Penalised::line`]) and less its
+/// parabola. Counted from its end points, ‖f‖² would take for granted that both lie near the surface's
+/// mean line; an estimate from that has no uncertainty that holds for other surfaces.
+///
+/// [`Penalised::line`]: super::Penalised::line
 pub(super) fn section(geometry: &Geometry, line: Line) -> DMatrix<f64> {
     let points = geometry.point_count();
     let conditions = conditions(geometry, line).resize_horizontally(points, 0.0);

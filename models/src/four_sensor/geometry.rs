@@ -88,6 +88,20 @@ impl Geometry {
     /// The four triples of sensors in the order of Δe₁ … Δe₄: (1,2,3), (1,2,4), (1,3,4), (2,3,4).
     pub const TRIPLES: [[usize; 3]; 4] = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
 
+    /// Periods of surface waves that the outputs do not show, mm, longest first; empty where the
+    /// multiples have no common divisor.
+    ///
+    /// A wave zⁿ is invisible where the four values z^(pᵢ/Δx) are a linear function of pᵢ. Being on a
+    /// circle and at four places of one line they are equal then, so that z^g = 1 for the greatest
+    /// common divisor g of the multiples: periods gΔx/k. Waves shorter than two steps look like longer
+    /// ones and are not listed. The size of such a wave may change linearly along the surface.
+    pub fn invisible_periods(&self) -> Vec<f64> {
+        let common = self.multiples.into_iter().fold(0, greatest_common_divisor);
+        (1..=common / 2)
+            .map(|k| common as f64 * self.step / k as f64)
+            .collect()
+    }
+
     /// Weights of the four outputs in each triple's combination, one row a triple: the weights of a
     /// triple sum to zero and so do their products with p, the middle one is −1.
     pub fn triple_weights(&self) -> Matrix4<f64> {
@@ -127,5 +141,13 @@ impl Geometry {
 
     fn reach(&self) -> usize {
         self.multiples.iter().sum()
+    }
+}
+
+fn greatest_common_divisor(a: usize, b: usize) -> usize {
+    if b == 0 {
+        a
+    } else {
+        greatest_common_divisor(b, a % b)
     }
 }

@@ -5,7 +5,7 @@ use crate::uncertainty::{Quantity, UncertaintyError};
 
 impl Separation {
     /// S and γ at every slide position, then f at every surface position of `outputs`, such as
-    /// `S at 15 mm`, µm, γ in rad. The penalty's pull is not in their uncertainties.
+    /// `S at 15 mm`, µm, γ in rad.
     ///
     /// # Errors
     /// A value or an uncertainty that is not finite.

@@ -2,11 +2,15 @@
 
 use errsep_solvers::regularization::{Decomposition, Penalty};
 use nalgebra::{DMatrix, DVector};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 use super::frame::Frame;
 use super::gauge::section;
+use super::zone::minimum_zone;
 use super::{
-    Choice, Chosen, FourSensorError, Geometry, Line, Outputs, Parabola, Penalised, choice, direct,
+    Choice, Chosen, FourSensorError, Geometry, Line, MinimumZone, Outputs, Parabola, Penalised,
+    Scatter, choice, direct, scatter,
 };
 use crate::uncertainty::DegreesOfFreedom;
 
@@ -36,8 +40,9 @@ impl Default for Settings {
 pub struct Profile {
     /// Values: µm, for a tilt rad.
     pub values: DVector<f64>,
-    /// Standard deviations from the noise of the readings; the penalty's pull is not in them, nor
-    /// is the parabola's where it was assumed.
+    /// Standard uncertainties from the noise of the readings and from the pull of the penalty on a
+    /// surface that scatters as [`Separation::scatter`] says. Of a parabola that was assumed
+    /// nothing is in them.
     pub std: DVector<f64>,
     /// The penalty's pull if the truth were the estimate.
     pub bias: DVector<f64>,
@@ -56,6 +61,10 @@ pub struct Separation {
     pub tilt: Profile,
     /// e of the four sensors, µm, with e₁ = e₄ = 0.
     pub zero_adjustment: [f64; 4],
+    /// Their standard uncertainties, µm, as [`Profile::std`].
+    pub zero_adjustment_std: [f64; 4],
+    /// By what the penalty's pull is judged.
+    pub scatter: Scatter,
     /// Output less model, µm, one row a slide position.
     pub residuals: Vec<[f64; 4]>,
     /// The standard deviation of one reading used, µm.
@@ -75,12 +84,13 @@ pub struct Separation {
 pub struct Separator {
     geometry: Geometry,
     line: Line,
+    /// (N + 2) × (N − 1).
     section: DMatrix<f64>,
     decomposition: Decomposition,
 }
 
 impl Separator {
-    /// Decomposes the direct system with a penalty on the surface counted from a line; N³
+    /// Decomposes the direct system with a penalty; `line` is what the answer is stated from. N³
     /// operations, for up to a thousand points or two.
     ///
     /// # Errors
@@ -90,7 +100,7 @@ impl Separator {
         penalised: Penalised,
         line: Line,
     ) -> Result<Self, FourSensorError> {
-        let section = section(geometry, line);
+        let section = section(geometry, penalised.line());
         let matrix = direct::matrix(geometry) * &section;
         let penalty = direct::penalty(geometry, penalised) * &section;
         Ok(Self {
@@ -116,12 +126,7 @@ impl Separator {
         outputs: &Outputs,
         settings: &Settings,
     ) -> Result<Separation, FourSensorError> {
-        if outputs.geometry() != &self.geometry {
-            return Err(FourSensorError::OutputCount {
-                found: outputs.readings().len(),
-                expected: self.geometry.output_count(),
-            });
-        }
+        self.check(outputs)?;
         let data = direct::data(outputs);
         let spectrum = self.decomposition.with_data(&data)?;
         let chosen = choice::choose(&spectrum, settings.choice, settings.noise)?;
@@ -141,9 +146,12 @@ impl Separator {
             .component_mul(&map)
             .column_sum();
         let bias = &map * &uncertainty.bias_estimate;
-        let pull = row_norms(&(&map * &uncertainty.pull)) * chosen.point.seminorm;
+        let pull = row_norms(&(&map * &uncertainty.pull));
         let own = frame.own_variances() * noise.powi(2);
-        let std = (spread + own).map(|variance| variance.max(0.0).sqrt());
+        let scatter = scatter::of_surface(&spectrum, &chosen, noise)?;
+        let pulled = pull.map(|pull| (scatter.held_back * pull).powi(2));
+        let std = (spread + own + pulled).map(|variance| variance.max(0.0).sqrt());
+        let pull = pull * chosen.point.seminorm;
         let points = self.geometry.point_count();
         let count = self.geometry.output_count();
         let profile = |values: DVector<f64>, from: usize| {
@@ -158,6 +166,8 @@ impl Separator {
         Ok(Separation {
             residuals: frame.residuals(&settled),
             zero_adjustment: settled.zero_adjustment.into(),
+            zero_adjustment_std: std::array::from_fn(|k| std[points + 2 * count + k]),
+            scatter,
             curvature: settled.curvature,
             surface: profile(settled.surface, 0),
             straightness: profile(settled.straightness, points),
@@ -168,6 +178,54 @@ impl Separator {
             chosen,
         })
     }
+
+    /// The minimum-zone straightness of S that was found of these outputs.
+    ///
+    /// # Errors
+    /// As [`separate`](Self::separate).
+    pub fn straightness_error(
+        &self,
+        outputs: &Outputs,
+        settings: &Settings,
+        found: &Separation,
+    ) -> Result<MinimumZone, FourSensorError> {
+        self.check(outputs)?;
+        let lambda = found.chosen.point.lambda;
+        let spectrum = self.decomposition.with_data(&direct::data(outputs))?;
+        let pull = spectrum.uncertainty(lambda, found.noise)?.pull;
+        let frame = Frame::new(outputs, self.line, settings.parabola);
+        let positions = outputs.slide_positions();
+        minimum_zone(&positions, &found.straightness.values, |random| {
+            let noise = random_readings(random, found.noise, positions.len());
+            let seen = self
+                .decomposition
+                .with_data(&direct::slide_free_part(&self.geometry, &noise))?;
+            let truth = DVector::from_fn(pull.ncols(), |_, _| normal(random));
+            let error = seen.solution(lambda)? - &pull * truth * found.scatter.held_back;
+            Ok(frame.error(&(&self.section * error), &noise).straightness)
+        })
+    }
+
+    fn check(&self, outputs: &Outputs) -> Result<(), FourSensorError> {
+        if outputs.geometry() != &self.geometry {
+            return Err(FourSensorError::OutputCount {
+                found: outputs.readings().len(),
+                expected: self.geometry.output_count(),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Noise of readings, one row a slide position.
+pub(super) fn random_readings(random: &mut impl Rng, noise: f64, count: usize) -> Vec<[f64; 4]> {
+    (0..count)
+        .map(|_| std::array::from_fn(|_| noise * normal(random)))
+        .collect()
+}
+
+pub(super) fn normal(random: &mut impl Rng) -> f64 {
+    StandardNormal.sample(random)
 }
 
 /// Of the noise of one reading: what the residuals of `rows` leave, unless it was stated.

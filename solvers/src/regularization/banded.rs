@@ -22,7 +22,7 @@ pub struct BandedSystem {
     pub(super) values: Vec<f64>,
     pub(super) stencil: &'static [f64],
     pub(super) conditions: Vec<Vec<f64>>,
-    held: usize,
+    pub(super) held: Vec<usize>,
 }
 
 impl BandedSystem {
@@ -57,7 +57,7 @@ impl BandedSystem {
             values: Vec::new(),
             stencil,
             conditions: Vec::new(),
-            held: 0,
+            held: Vec::new(),
         })
     }
 
@@ -129,7 +129,7 @@ impl BandedSystem {
         let mut row = vec![0.0; self.width];
         row[unknown - first] = 1.0;
         self.push(first, &row, &vec![0.0; self.border], 0.0)?;
-        self.held += 1;
+        self.held.push(self.firsts.len() - 1);
         self.require(weights)
     }
 
@@ -170,7 +170,7 @@ impl BandedSystem {
     }
 
     /// Number of rows of L.
-    pub(super) fn penalty_rows(&self) -> usize {
+    pub fn penalty_rows(&self) -> usize {
         self.band + 1 - self.stencil.len()
     }
 
@@ -183,7 +183,7 @@ impl BandedSystem {
 
 impl Family for BandedSystem {
     fn row_count(&self) -> usize {
-        self.firsts.len() - self.held
+        self.firsts.len() - self.held.len()
     }
 
     /// Five decades below the largest column norm of A over that of L.

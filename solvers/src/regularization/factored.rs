@@ -31,6 +31,14 @@ pub struct Combination {
     pub border: Vec<f64>,
 }
 
+impl Combination {
+    /// Its value for a vector of all unknowns, the border's last.
+    pub fn of(&self, unknowns: &[f64]) -> f64 {
+        let border = unknowns.len() - self.border.len();
+        dot(&self.band, &unknowns[self.first..]) + dot(&self.border, &unknowns[border..])
+    }
+}
+
 impl<'a> Factored<'a> {
     pub(super) fn new(system: &'a BandedSystem, lambda: f64) -> Result<Self, RegularizationError> {
         let (triangle, corner) = fold(system, lambda);
@@ -113,9 +121,7 @@ impl<'a> Factored<'a> {
     /// −λ²(AᵀA + λ²LᵀL)⁻¹LᵀLx of the solution: the bias if the truth were the estimate.
     pub fn bias_estimate(&self) -> Vec<f64> {
         let mut pulled = self.normal_of_penalty(&self.solution[..self.system.band]);
-        self.forward(&mut pulled);
-        self.project(&mut pulled);
-        self.backward(&mut pulled);
+        self.invert(&mut pulled);
         let scale = -self.lambda.powi(2);
         pulled.iter_mut().for_each(|v| *v *= scale);
         pulled
@@ -128,6 +134,60 @@ impl<'a> Factored<'a> {
             .iter()
             .map(|w| inverse.form(w.first, &w.band, &w.border))
             .collect()
+    }
+
+    /// (AᵀA + λ²LᵀL)⁻¹w for weights w of all band unknowns, under the conditions: band unknowns, then
+    /// the border's.
+    ///
+    /// # Errors
+    /// The wrong number of weights.
+    pub fn column(&self, weights: &[f64]) -> Result<Vec<f64>, RegularizationError> {
+        check(weights.len(), self.system.band, "weights")?;
+        let mut column = weights.to_vec();
+        column.resize(self.system.band + self.system.border, 0.0);
+        self.invert(&mut column);
+        Ok(column)
+    }
+
+    /// The change of the solution when `data` is added to the right-hand side of A, one value a row
+    /// in the order they were pushed (rows that hold an unknown left out), and λ·`penalised` to that of
+    /// λL.
+    ///
+    /// With noise as `data` and −Lx of a truth as `penalised` it is the error of the solution.
+    ///
+    /// # Errors
+    /// The wrong number of values.
+    pub fn change(&self, data: &[f64], penalised: &[f64]) -> Result<Vec<f64>, RegularizationError> {
+        let system = self.system;
+        check(data.len(), system.firsts.len() - system.held.len(), "data")?;
+        check(penalised.len(), system.penalty_rows(), "penalised values")?;
+        let mut right = vec![0.0; system.band + system.border];
+        let pushed = (0..system.firsts.len()).filter(|row| !system.held.contains(row));
+        for (index, value) in pushed.zip(data) {
+            let (first, band, border, _) = system.row(index);
+            let (c, y) = right.split_at_mut(system.band);
+            for (out, a) in c[first..]
+                .iter_mut()
+                .zip(band)
+                .chain(y.iter_mut().zip(border))
+            {
+                *out += a * value;
+            }
+        }
+        for (row, value) in penalised.iter().enumerate() {
+            for (out, s) in right[row..].iter_mut().zip(system.stencil) {
+                *out += self.lambda.powi(2) * s * value;
+            }
+        }
+        self.invert(&mut right);
+        Ok(right)
+    }
+
+    /// v ← (AᵀA + λ²LᵀL)⁻¹v under the conditions.
+    fn invert(&self, v: &mut [f64]) {
+        self.forward(v);
+        self.project(v);
+        self.backward(v);
     }
 
     /// λ.
@@ -148,15 +208,21 @@ impl<'a> Factored<'a> {
         &self,
         combinations: &[Combination],
     ) -> Result<(DVector<f64>, DVector<f64>), RegularizationError> {
+        self.variances_of(|factored| Ok(factored.forms(combinations)))
+    }
+
+    /// As [`variances`](Self::variances) for any v(μ) that `forms` finds of a factored system.
+    ///
+    /// # Errors
+    /// As [`variances`](Self::variances), or those of `forms`.
+    pub fn variances_of(
+        &self,
+        forms: impl Fn(&Factored<'_>) -> Result<Vec<f64>, RegularizationError>,
+    ) -> Result<(DVector<f64>, DVector<f64>), RegularizationError> {
         const STEP: f64 = 1e-3;
-        let at = |factor: f64| -> Result<Vec<f64>, RegularizationError> {
-            Ok(self
-                .system
-                .factor(self.lambda * factor)?
-                .forms(combinations))
-        };
+        let at = |factor: f64| forms(&self.system.factor(self.lambda * factor)?);
         let (above, below) = (at(STEP.exp())?, at((-STEP).exp())?);
-        let here = self.forms(combinations);
+        let here = forms(self)?;
         let mu = self.lambda.powi(2);
         let slopes = above
             .iter()
@@ -344,6 +410,18 @@ fn fold(system: &BandedSystem, lambda: f64) -> (BandTriangle, DMatrix<f64>) {
     compress(&mut pending, &mut corner);
     let corner = DMatrix::from_row_slice(columns, columns, &corner).upper_triangle();
     (triangle, corner)
+}
+
+fn check(found: usize, expected: usize, what: &'static str) -> Result<(), RegularizationError> {
+    if found == expected {
+        Ok(())
+    } else {
+        Err(RegularizationError::Shape {
+            what,
+            expected,
+            found,
+        })
+    }
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -4,8 +4,8 @@ use errsep_models::four_sensor::{Parabola, Profile};
 use serde_json::{Value, json};
 
 use super::Found;
-use super::words::{discrepancy_key, not_determined, status_key};
-use crate::cli::quantity::coverage_json;
+use super::words::{averaged, discrepancy_key, not_determined, status_key};
+use crate::cli::quantity::{COVERAGE, coverage_json, unexpandable};
 use crate::io::Message;
 
 pub(super) fn json(found: &Found) -> Result<Value, Message> {
@@ -15,6 +15,10 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
     let places = geometry.positions();
     let curve = &s.chosen.curve;
     let rows = 2 * outputs.readings().len();
+    let zone = &found.straightness_error;
+    let (low, high) = zone
+        .interval(COVERAGE, found.coverage_degrees())
+        .map_err(unexpandable)?;
     Ok(json!({
         "schema": "errsep.four-sensor/1",
         "method": "direct",
@@ -26,16 +30,35 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
             "surface_points": geometry.point_count(),
             "repeats": found.measured.repeats,
         },
+        "average": averaged(found).map(|text| json!({"of": "outputs", "text": text})),
+        "straightness_error": {
+            "reference": "minimum_zone",
+            "value": zone.value,
+            "std": zone.std,
+            "widening": zone.widening,
+            "interval": [low, high],
+            "coverage_probability": COVERAGE,
+            "unit": "um",
+            "parabola_open": found.parabola_is_open(),
+        },
         "straightness": profile(&s.straightness, "S", "um", outputs.slide_positions()),
         "tilt": profile(&s.tilt, "gamma", "rad", outputs.slide_positions()),
         "surface": profile(&s.surface, "f", "um", outputs.surface_positions()),
         "zero_adjustment": {"value": s.zero_adjustment, "unit": "um"},
+        "zero_adjustment_std": {"value": s.zero_adjustment_std, "unit": "um"},
         "parabola": {
             "determined": false,
             "from": parabola_key(found.setup.settings.parabola),
             "surface_curvature": {"value": s.curvature, "unit": "um/mm2"},
         },
+        "invisible_periods": {"value": geometry.invisible_periods(), "unit": "mm"},
         "not_determined": not_determined(found),
+        "surface_scatter": {
+            "even": s.scatter.even,
+            "held_back": s.scatter.held_back,
+            "uneven": s.scatter.is_uneven(),
+            "unit": "um",
+        },
         "regularization": {
             "penalty": found.setup.penalised.name(),
             "lambda": s.chosen.point.lambda,

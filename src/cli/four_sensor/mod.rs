@@ -9,8 +9,8 @@ mod words;
 use std::path::PathBuf;
 
 use errsep_models::four_sensor::{
-    Choice, FourSensorError, PublishedSeparation, PublishedSeparator, Separation, Separator,
-    separate_long,
+    Choice, FourSensorError, LongSeparator, MinimumZone, Parabola, PublishedSeparation,
+    PublishedSeparator, Separation, Separator,
 };
 use errsep_models::uncertainty::DegreesOfFreedom;
 
@@ -27,16 +27,17 @@ The file has one row a slide position with the outputs of the four sensors in um
     x,m1,m2,m3,m4
     0,1.25,-0.31,2.07,11.48
 
-or one row a reading (sensor,x,reading); a column `repeat` numbers repeats, which are averaged. The
-set-up gives the distance of each sensor to the one before and, if known, the noise of one reading:
+or one row a reading (sensor,x,reading); a column `repeat` numbers repeats, whose outputs are averaged
+before they are separated, so that lambda is chosen for the average. The set-up gives the distance of
+each sensor to the one before and, if known, the noise of one reading:
 
     [sensors]
     spacing = [5.0, 5.0, 25.0]   # mm, multiples of the step
-    noise = 0.1                  # um
+    noise = 0.1                  # um, of one reading of one repeat
     [separation]                 # all optional
     penalty = \"profile\"          # or slope, curvature
     choice = \"l-curve\"           # or likelihood, gcv, discrepancy; or lambda = 0.02
-    line = \"end-points\"          # or least-squares
+    line = \"end-points\"          # or least-squares: what surface and straightness are counted from
     [parabola]                   # optional, one of
     tilt_slope = 1e-8            # rad/mm; surface_curvature, um/mm2; zero_adjustment, um
 
@@ -60,7 +61,9 @@ const LONGEST_DENSE: usize = 400;
 struct Found {
     measured: Measured,
     setup: Setup,
+    noise_stated: bool,
     separation: Separation,
+    straightness_error: MinimumZone,
     published: Option<PublishedSeparation>,
     /// Condition number of the system that was solved, where it was decomposed.
     condition_number: Option<f64>,
@@ -69,8 +72,18 @@ struct Found {
 impl Found {
     /// Whether the noise is that of the scatter of the repeats.
     fn noise_from_repeats(&self) -> bool {
-        let noise = self.measured.noise;
-        noise.is_some() && noise == self.setup.settings.noise && !self.separation.noise_estimated
+        !self.noise_stated && !self.separation.noise_estimated
+    }
+
+    /// As [`Self::degrees_of_freedom`], infinite where there are none to tell.
+    fn coverage_degrees(&self) -> DegreesOfFreedom {
+        self.degrees_of_freedom()
+            .unwrap_or(DegreesOfFreedom::Infinite)
+    }
+
+    /// Whether the answer rests on the assumption that the surface has no parabola.
+    fn parabola_is_open(&self) -> bool {
+        self.setup.settings.parabola == Parabola::LeastNorm
     }
 
     /// How well the noise is known.
@@ -92,47 +105,52 @@ impl Found {
 pub fn run(args: &Args) -> Result<Answer, Message> {
     let mut setup = Setup::read(SetupFile::read(&args.setup)?)?;
     let measured = read::read(&args.data, &setup)?;
-    if setup.settings.noise.is_none() {
-        setup.settings.noise = measured.noise;
+    let noise_stated = setup.settings.noise.is_some();
+    let of_mean = |noise: f64| noise / (measured.repeats as f64).sqrt();
+    setup.settings.noise = setup.settings.noise.map(of_mean).or(measured.noise);
+    if let Choice::Discrepancy { noise } = &mut setup.settings.choice {
+        *noise = of_mean(*noise);
     }
     let unsolved =
         |error: FourSensorError| Message::not_solved(error.to_string()).in_file(&args.data);
     let geometry = measured.outputs.geometry();
-    let found = if geometry.point_count() <= LONGEST_DENSE {
+    let outputs = &measured.outputs;
+    let mut published = None;
+    let mut condition_number = None;
+    let (separation, straightness_error) = if geometry.point_count() <= LONGEST_DENSE {
         let separator = Separator::new(geometry, setup.penalised, setup.line).map_err(unsolved)?;
-        let separation = separator
-            .separate(&measured.outputs, &setup.settings)
-            .map_err(unsolved)?;
-        let published = PublishedSeparator::new(geometry)
-            .and_then(|way| way.separate(&measured.outputs, Choice::LCurve))
-            .map_err(unsolved)?;
-        Found {
-            published: Some(published),
-            condition_number: Some(separator.decomposition().condition_number()),
-            separation,
-            measured,
-            setup,
-        }
+        let way = PublishedSeparator::new(geometry).map_err(unsolved)?;
+        published = Some(way.separate(outputs, Choice::LCurve).map_err(unsolved)?);
+        condition_number = Some(separator.decomposition().condition_number());
+        separator
+            .separate(outputs, &setup.settings)
+            .and_then(|found| {
+                let error = separator.straightness_error(outputs, &setup.settings, &found)?;
+                Ok((found, error))
+            })
     } else {
-        let separation = separate_long(
-            &measured.outputs,
-            setup.penalised,
-            setup.line,
-            &setup.settings,
+        LongSeparator::new(outputs, setup.penalised, setup.line, &setup.settings).and_then(
+            |separator| {
+                let found = separator.separate()?;
+                let error = separator.straightness_error(&found)?;
+                Ok((found, error))
+            },
         )
-        .map_err(unsolved)?;
-        Found {
-            published: None,
-            condition_number: None,
-            separation,
-            measured,
-            setup,
-        }
+    }
+    .map_err(unsolved)?;
+    let found = Found {
+        published,
+        condition_number,
+        separation,
+        straightness_error,
+        noise_stated,
+        measured,
+        setup,
     };
     Ok(Answer {
         text: words::text(&found, &args.data)?,
         json: json::json(&found)?,
-        page: page::page(&found, &args.data),
+        page: page::page(&found, &args.data)?,
         tables: tables(&found),
         inputs: vec![args.data.clone(), args.setup.clone()],
         seed: None,

@@ -3,31 +3,33 @@
 use std::path::Path;
 
 use errsep_models::four_sensor::Profile;
-use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
+use errsep_models::uncertainty::coverage_factor;
 use errsep_solvers::regularization::Point;
 use nalgebra::DVector;
 
 use super::Found;
 use super::json::residual_rms;
-use super::words::{noise_source, not_determined, span, status};
+use super::words::{noise_source, not_determined, span, status, straightness, uneven};
 use crate::cli::quantity::COVERAGE;
+use crate::io::Message;
 use crate::io::units::URAD_PER_RAD;
 use crate::report::plot::{Axis, Chart, Mark, Series};
 use crate::report::{Cell, Figure, KeyFigure, Page, Section, Standing, Table};
 
-pub(super) fn page(found: &Found, data: &Path) -> Page {
+pub(super) fn page(found: &Found, data: &Path) -> Result<Page, Message> {
     let s = &found.separation;
     let summary = format!(
-        "The slide is straight to {:.2} µm and tilts by {:.1} µrad over its travel, a parabola apart \
-         that these outputs do not hold.",
-        span(&s.straightness.values),
+        "The slide is straight to {}; it tilts by {:.1} µrad over its travel.",
+        straightness(found)?,
         URAD_PER_RAD * span(&s.tilt.values)
     );
-    let standing = match s.chosen.instead {
-        Some(_) => Standing::Caution,
-        None => Standing::Good,
+    let doubtful = s.chosen.instead.is_some() || s.scatter.is_uneven();
+    let standing = if doubtful || found.parabola_is_open() {
+        Standing::Caution
+    } else {
+        Standing::Good
     };
-    Page::new(
+    Ok(Page::new(
         "Four-sensor straightness and tilt",
         data.display().to_string(),
     )
@@ -35,7 +37,7 @@ pub(super) fn page(found: &Found, data: &Path) -> Page {
     .section(result(found))
     .section(Section::new("What these outputs do not determine").list(not_determined(found)))
     .section(regularization(found))
-    .section(residuals(found))
+    .section(residuals(found)))
 }
 
 fn result(found: &Found) -> Section {
@@ -73,16 +75,16 @@ fn result(found: &Found) -> Section {
     }
     Section::new("Result")
         .key_figures([
-            KeyFigure::new("Straightness", span(&s.straightness.values), "µm")
-                .meaning("peak to valley"),
+            KeyFigure::new("Straightness", found.straightness_error.value, "µm")
+                .meaning("minimum zone of S"),
             KeyFigure::new("Tilt", URAD_PER_RAD * span(&s.tilt.values), "µrad")
                 .meaning("peak to valley"),
             KeyFigure::new("Noise", s.noise, "µm").meaning(noise_source(found)),
         ])
         .figure(Figure::new(
             "Straightness of the slide",
-            "With the expanded uncertainty (95 %) of the readings' noise as a band. The direct fit and the published way may \
-             differ by a line and a parabola.",
+            "With the expanded uncertainty (95 %) as a band: of the readings' noise and of the penalty's \
+             pull. The direct fit and the published way may differ by a line and a parabola.",
             straightness,
         ))
         .figure(Figure::new(
@@ -156,10 +158,15 @@ fn regularization(found: &Found) -> Section {
         .table(table)
         .paragraph(format!(
             "The penalty pulls S by up to {:.3} µm if the truth is the estimate, and by at most \
-             {:.3} µm for any surface of the same size. Neither is in the uncertainty bands.",
+             {:.3} µm for any surface of the same size. In the uncertainty bands is the pull that is to \
+             be expected of a surface that scatters by {:.3} µm, as these outputs show it.",
             s.bias.amax(),
-            s.bias_bound.amax()
+            s.bias_bound.amax(),
+            found.separation.scatter.held_back
         ));
+    if let Some(warning) = uneven(found) {
+        section = section.warning(warning);
+    }
     if let Some(reason) = chosen.instead {
         section = section.warning(format!(
             "{reason}; λ was taken from {} instead.",
@@ -196,11 +203,8 @@ fn axis_x() -> Axis {
 }
 
 fn curve(name: &str, profile: &Profile, x: &[f64], scale: f64, found: &Found) -> Series {
-    let degrees = found
-        .degrees_of_freedom()
-        .unwrap_or(DegreesOfFreedom::Infinite);
     // Degrees of freedom are positive, so that they have a coverage factor.
-    let k = coverage_factor(COVERAGE, degrees).unwrap_or(f64::NAN);
+    let k = coverage_factor(COVERAGE, found.coverage_degrees()).unwrap_or(f64::NAN);
     let scaled = |values: &DVector<f64>, by: f64| values.iter().map(|v| by * v).collect::<Vec<_>>();
     Series::line(name, x.to_vec(), scaled(&profile.values, scale))
         .half_band(scaled(&profile.std, k * scale))

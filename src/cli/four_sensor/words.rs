@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use errsep_models::four_sensor::Parabola;
+use errsep_models::four_sensor::{Parabola, Penalised};
 use errsep_models::uncertainty::coverage_factor;
 use errsep_solvers::regularization::{CornerStatus, Discrepancy};
 use nalgebra::DVector;
@@ -12,6 +12,7 @@ use super::Found;
 use crate::cli::quantity::{COVERAGE, coverage_words, unexpandable};
 use crate::io::Message;
 use crate::io::units::{arcsec_from_rad, urad_from_rad};
+use crate::report::number;
 
 pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
     let s = &found.separation;
@@ -21,9 +22,10 @@ pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
         found.measured.outputs.readings().len(),
         s.surface.values.len()
     );
+    let _ = writeln!(text, "  straightness     {}", straightness(found)?);
     let _ = writeln!(
         text,
-        "  straightness S   {:.3} µm peak to valley, u up to {:.3} µm",
+        "  profile S        {:.3} µm peak to valley from the line of the surface, u up to {:.3} µm",
         span(&s.straightness.values),
         s.straightness.std.max()
     );
@@ -46,6 +48,9 @@ pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
         s.noise,
         noise_source(found)
     );
+    if let Some(averaged) = averaged(found) {
+        let _ = writeln!(text, "  average          {averaged}");
+    }
     if let Some(degrees) = found.degrees_of_freedom() {
         let k = coverage_factor(COVERAGE, degrees).map_err(unexpandable)?;
         let _ = writeln!(
@@ -74,15 +79,92 @@ pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
     }
     let _ = writeln!(
         text,
-        "  penalty's pull   up to {:.3} µm on S if the truth is the estimate, at most {:.3} µm",
+        "  penalty's pull   up to {:.3} µm on S if the truth is the estimate, at most {:.3} µm; in u as\n                   that of a surface that scatters by {:.3} µm",
         s.straightness.bias.amax(),
-        s.straightness.bias_bound.amax()
+        s.straightness.bias_bound.amax(),
+        s.scatter.held_back
     );
+    if let Some(warning) = uneven(found) {
+        let _ = writeln!(text, "  warning          {warning}");
+    }
     let _ = writeln!(text, "\nNot determined by these outputs:");
     for sentence in not_determined(found) {
         let _ = writeln!(text, "  - {sentence}");
     }
     Ok(text)
+}
+
+/// "40.3 µm (minimum zone), 95 % interval 39.7 to 40.9 µm, if the surface has no parabola".
+pub(super) fn straightness(found: &Found) -> Result<String, Message> {
+    let zone = &found.straightness_error;
+    let (low, high) = zone
+        .interval(COVERAGE, found.coverage_degrees())
+        .map_err(unexpandable)?;
+    // Two digits of the uncertainty.
+    let decimals = (1.0 - zone.std.log10().floor()).clamp(0.0, 6.0) as usize;
+    let shown = |value: f64| number::fixed(value, decimals);
+    let condition = if found.parabola_is_open() {
+        ", if the surface has no parabola, which these outputs cannot show"
+    } else {
+        ""
+    };
+    Ok(format!(
+        "{} µm (minimum zone), {} interval {} to {} µm{condition}",
+        shown(zone.value),
+        number::percent(COVERAGE),
+        shown(low),
+        shown(high)
+    ))
+}
+
+/// How repeats were brought together; nothing without repeats.
+pub(super) fn averaged(found: &Found) -> Option<String> {
+    let repeats = found.measured.repeats;
+    (repeats > 1).then(|| {
+        format!(
+            "the outputs of {repeats} repeats were averaged first and lambda chosen for the average"
+        )
+    })
+}
+
+/// A surface that the penalty does not fit.
+pub(super) fn uneven(found: &Found) -> Option<String> {
+    let scatter = &found.separation.scatter;
+    let penalised = found.setup.penalised;
+    let remedy = match penalised {
+        Penalised::Profile | Penalised::Slope => "choose penalty = \"curvature\"",
+        Penalised::Curvature => "space the sensors wider",
+    };
+    scatter.is_uneven().then(|| {
+        format!(
+            "the penalty on the {} holds back waves larger than the rest of the surface ({:.2} µm against \
+             {:.2} µm), and the uncertainties may be too small: {remedy}",
+            penalised.name(),
+            scatter.held_back,
+            scatter.even
+        )
+    })
+}
+
+/// What spacings with a common multiple do not show.
+fn invisible_waves(found: &Found) -> Option<String> {
+    /// So many are named one by one.
+    const NAMED: usize = 4;
+    let periods = found.measured.outputs.geometry().invisible_periods();
+    let longest = *periods.first()?;
+    let named: Vec<String> = periods
+        .iter()
+        .take(NAMED)
+        .map(|p| number::plain(*p, 4))
+        .collect();
+    let more = if periods.len() > NAMED { " …" } else { "" };
+    Some(format!(
+        "Waves of the surface that repeat every {} mm{more}: all spacings are multiples of {} mm, so all \
+         sensors see the same of them and S takes them up. The uncertainties take them to be as large as \
+         the waves that are seen. One spacing changed by a step would show them.",
+        named.join(", "),
+        number::plain(longest, 4)
+    ))
 }
 
 pub(super) fn not_determined(found: &Found) -> Vec<String> {
@@ -91,6 +173,7 @@ pub(super) fn not_determined(found: &Found) -> Vec<String> {
         "A straight line of surface and straightness: it fixes the axes, and was chosen by `line`."
             .to_owned(),
     ];
+    sentences.extend(invisible_waves(found));
     if !matches!(found.setup.settings.parabola, Parabola::ZeroAdjustment(_)) {
         sentences.push(
             "The level of the tilt: it goes with the zero-adjustment of sensor 4, taken as zero."
@@ -105,6 +188,8 @@ pub(super) fn noise_source(found: &Found) -> &'static str {
         "estimated from the residuals"
     } else if found.noise_from_repeats() {
         "from the scatter of the repeats"
+    } else if found.measured.repeats > 1 {
+        "stated, of the average of the repeats"
     } else {
         "stated"
     }

@@ -106,6 +106,16 @@ fn bad_points_are_refused() {
             "x,y\n0,0\n1,0\n0,1\n",
             "three points fit any circle",
         ),
+        (
+            "huge.csv",
+            "x,y\n1,0\n-1,0\n0,1e160\n0,-1\n",
+            "huge.csv:4:3: 1e160 mm is more than",
+        ),
+        (
+            "tiny.csv",
+            "x,y\n1e-160,0\n-1e-160,0\n0,1e-160\n0,-1e-160\n",
+            "mm of each other, less than",
+        ),
     ] {
         let folder = Folder::with(&[(name, content)]);
         bad_input(

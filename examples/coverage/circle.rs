@@ -20,7 +20,7 @@ struct Case {
     form: bool,
 }
 
-/// What one data set gives: centre x, centre y, radius, deviation, and whether the answer tells of form.
+/// What one data set gives: centre x, centre y, radius, deviation, and whether form is seen.
 type Counts = ([Tally; 4], bool);
 
 pub fn rows(seeds: u64) -> Vec<Row> {
@@ -63,7 +63,7 @@ fn rows_of(case: &Case, seeds: u64) -> Vec<Row> {
         .into_par_iter()
         .filter_map(|seed| count(&what, case.stated, seed))
         .collect();
-    let told = found.iter().filter(|f| f.1).count();
+    let seen = found.iter().filter(|f| f.1).count();
     let mut name = format!(
         "{} points over {}°, noise {}",
         case.points,
@@ -72,10 +72,10 @@ fn rows_of(case: &Case, seeds: u64) -> Vec<Row> {
     );
     if case.form {
         name += &format!(
-            ", {} lobes of {} µm (told in {:.1} %)",
+            ", {} lobes of {} µm (seen in {:.1} %)",
             FORM.0,
             FORM.1,
-            100.0 * told as f64 / found.len().max(1) as f64
+            100.0 * seen as f64 / found.len().max(1) as f64
         );
     }
     // A stated noise is no result, and with a form there is no true one.

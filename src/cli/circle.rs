@@ -56,6 +56,8 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let fit = orthogonal_fit(&points, args.noise).map_err(refused)?;
     let zones_found = circularity(&points, fit.circle).map_err(refused)?;
     let alike = fit.neighbours_alike(&points);
+    let arc = fit.covered_arc(&points);
+    let form = form_in_words(alike, arc, points.len());
     let mut others: Vec<(String, Circle)> = AlgebraicFit::ALL
         .into_iter()
         .filter_map(|kind| Some((kind.name().to_owned(), algebraic(&points, kind).ok()?)))
@@ -68,7 +70,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     } else {
         None
     };
-    let mut json = as_json(&points, &fit, alike, &zones_found, &others)?;
+    let mut json = as_json(&points, &fit, (alike, arc), &zones_found, &others)?;
     if let (Some(own), Value::Object(object)) = (nistir, &mut json) {
         object.insert(
             "nistir".to_owned(),
@@ -82,7 +84,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         );
     }
     Ok(Answer {
-        text: in_words(args, &points, &fit, alike, &zones_found, &others)?,
+        text: in_words(args, &points, &fit, form.as_deref(), &zones_found, &others)?,
         json,
         page: page(&CircleView {
             data: &args.points.display().to_string(),
@@ -91,7 +93,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             std: fit.standard_uncertainties(),
             residuals_um: &fit.residuals_um,
             noise: (fit.noise_um, fit.noise_given),
-            form: form_in_words(alike),
+            form: form.as_deref(),
             circularity: &zones_found,
             others: &others,
         }),
@@ -140,24 +142,44 @@ fn centroid_start(points: &[Point]) -> Circle {
 /// Below this probability of independent deviations the answer tells of form.
 const ALIKE: f64 = 0.01;
 
-fn form_in_words(alike: Option<f64>) -> Option<String> {
-    let p = alike.filter(|p| *p < ALIKE)?;
-    let chance = if p < 1e-4 {
-        "less than 0.0001".to_owned()
-    } else {
-        number::plain(p, 1)
-    };
-    Some(format!(
-        "Neighbouring deviations are alike (probability by chance {chance}): they hold form. The uncertainties take all \
-         deviations for independent noise; over part of a circle the form may shift centre and radius by more."
-    ))
+/// The gap in the points beyond which they count as part of a circle, rad, where even spacing would leave
+/// a gap clearly smaller.
+const GAP: f64 = std::f64::consts::FRAC_PI_3;
+
+/// What the answer says of form: that neighbours are alike, and that on part of a circle a form of few
+/// undulations passes for centre and radius.
+fn form_in_words(alike: Option<f64>, arc: f64, points: usize) -> Option<String> {
+    let seen = alike.filter(|p| *p < ALIKE).map(|p| {
+        let chance = if p < 1e-4 {
+            "less than 0.0001".to_owned()
+        } else {
+            number::plain(p, 1)
+        };
+        format!(
+            "Neighbouring deviations are alike (probability by chance {chance}): they hold form, which the \
+             uncertainties take for independent noise."
+        )
+    });
+    let even = std::f64::consts::TAU / points.max(1) as f64;
+    let gap = std::f64::consts::TAU - arc;
+    let part = (gap > GAP.max(1.5 * even)).then(|| {
+        format!(
+            "The points cover {:.0}°: a form that varies slowly along this arc passes for centre and radius, \
+             and no uncertainty here counts it.",
+            arc.to_degrees()
+        )
+    });
+    match (seen, part) {
+        (Some(seen), Some(part)) => Some(format!("{seen} {part}")),
+        (seen, part) => seen.or(part),
+    }
 }
 
 fn in_words(
     args: &Args,
     points: &[Point],
     fit: &CircleFit,
-    alike: Option<f64>,
+    form: Option<&str>,
     circularity: &Circularity,
     others: &[(String, Circle)],
 ) -> Result<String, Message> {
@@ -182,7 +204,7 @@ fn in_words(
         },
         fit.degrees_of_freedom
     );
-    if let Some(sentence) = form_in_words(alike) {
+    if let Some(sentence) = form {
         let _ = writeln!(text, "  {sentence}");
     }
     let _ = writeln!(text, "\nCircularity");
@@ -211,7 +233,7 @@ fn in_words(
 fn as_json(
     points: &[Point],
     fit: &CircleFit,
-    alike: Option<f64>,
+    (alike, arc): (Option<f64>, f64),
     circularity: &Circularity,
     others: &[(String, Circle)],
 ) -> Result<Value, Message> {
@@ -230,7 +252,8 @@ fn as_json(
             "covariance": {"order": ["centre_x", "centre_y", "radius"], "value": covariance, "unit": "mm2"},
             "noise": {"value": fit.noise_um, "unit": "um", "given": fit.noise_given},
             "degrees_of_freedom": fit.degrees_of_freedom,
-            "neighbours_alike": {"p_value": alike, "form": form_in_words(alike).is_some()},
+            "neighbours_alike": {"p_value": alike, "form": alike.is_some_and(|p| p < ALIKE)},
+            "arc": {"value": arc, "unit": "rad"},
         },
         "algebraic": others.iter().filter(|o| !o.0.starts_with("nistir")).map(|(name, o)| json!({
             "method": name,

@@ -6,7 +6,7 @@ use super::plot::{Axis, Chart, Mark, Polar, PolarTrace, Series};
 use super::{Cell, Figure, KeyFigure, Page, Section, Standing, Table, number};
 
 /// What the page shows of the fit.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub struct CircleView<'a> {
     /// Name of the data.
     pub data: &'a str,
@@ -20,8 +20,8 @@ pub struct CircleView<'a> {
     pub residuals_um: &'a [f64],
     /// Standard deviation of the radial deviations, µm, and whether it was given.
     pub noise: (f64, bool),
-    /// What the deviations show of form, where they do.
-    pub form: Option<String>,
+    /// What the answer says of form, where it does.
+    pub form: Option<&'a str>,
     /// The circularities.
     pub circularity: &'a Circularity,
     /// Other fits by name, mm.
@@ -77,8 +77,8 @@ fn fit_section(view: &CircleView) -> Section {
             "standard deviation of a point, from the residuals: form and noise together"
         }),
     ]);
-    let section = match &view.form {
-        Some(sentence) => section.note(sentence.as_str()),
+    let section = match view.form {
+        Some(sentence) => section.note(sentence),
         None => section,
     };
     section.figure(Figure::new(

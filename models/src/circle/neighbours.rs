@@ -1,4 +1,5 @@
-//! Whether neighbouring deviations are alike, as form is and noise is not.
+//! What part of a circle the points cover, and whether neighbouring deviations are alike, as form is and
+//! noise is not.
 
 use super::orthogonal::CircleFit;
 use super::points::Point;
@@ -6,6 +7,12 @@ use nalgebra::Matrix3;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 impl CircleFit {
+    /// The arc that the fitted `points` cover, rad: the circle less the widest gap between neighbours,
+    /// seen from the fitted centre. Evenly spaced points of a full circle lack one spacing.
+    pub fn covered_arc(&self, points: &[Point]) -> f64 {
+        std::f64::consts::TAU - around(points, self.circle.centre).1
+    }
+
     /// The probability that independent deviations of the fitted `points` would have neighbours as much
     /// alike as these: von Neumann's ratio of squared successive differences to squares, in the order of
     /// the angle from the widest gap on, against its mean and variance for the residuals of this fit
@@ -21,7 +28,7 @@ impl CircleFit {
         if n != self.residuals_um.len() || self.degrees_of_freedom < 4 || rounding {
             return None;
         }
-        let order = around(points, c.centre);
+        let (order, _) = around(points, c.centre);
         let d: Vec<f64> = order
             .iter()
             .map(|&i| self.residuals_um[i] / rms_um)
@@ -58,20 +65,23 @@ impl CircleFit {
     }
 }
 
-/// The places of the points by angle, beginning after the widest gap.
-fn around(points: &[Point], centre: Point) -> Vec<usize> {
+/// The places of the points by angle, beginning after the widest gap, and that gap, rad.
+fn around(points: &[Point], centre: Point) -> (Vec<usize>, f64) {
     let mut order: Vec<(f64, usize)> = points
         .iter()
         .enumerate()
         .map(|(i, p)| ((p.y - centre.y).atan2(p.x - centre.x), i))
         .collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let across = order[0].0 + std::f64::consts::TAU - order[order.len() - 1].0;
-    let widest = order
+    let across = match (order.first(), order.last()) {
+        (Some(first), Some(last)) => first.0 + std::f64::consts::TAU - last.0,
+        _ => std::f64::consts::TAU,
+    };
+    let (widest, start) = order
         .windows(2)
         .enumerate()
         .map(|(k, w)| (w[1].0 - w[0].0, k + 1))
         .fold((across, 0), |a, b| if b.0 > a.0 { b } else { a });
-    order.rotate_left(widest.1);
-    order.into_iter().map(|(_, i)| i).collect()
+    order.rotate_left(start);
+    (order.into_iter().map(|(_, i)| i).collect(), widest)
 }

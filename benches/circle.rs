@@ -7,7 +7,7 @@ use errsep_models::circle::{
     AlgebraicFit, CircleSimulation, Point, Reference, algebraic, circularity, orthogonal_fit,
     reference_zone, simulate,
 };
-use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem};
+use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem, SolveOutcome};
 use std::hint::black_box;
 
 fn fits(c: &mut Criterion) {
@@ -100,7 +100,10 @@ fn least_area(points: &[Point]) -> Option<f64> {
     for (sum, right) in sums.into_iter().zip([1.0, 1.0, 0.0, 0.0]) {
         program.add_constraint(sum, ComparisonOp::Eq, right);
     }
-    program.solve().ok().map(|solution| solution.objective())
+    match program.solve().ok()? {
+        SolveOutcome::Solution(solution) => Some(solution.objective()),
+        SolveOutcome::Interrupted(_) => None,
+    }
 }
 
 criterion_group!(benches, fits, reference_circles);

@@ -80,6 +80,39 @@ fn folder_holds_report_result_and_table() {
 }
 
 #[test]
+fn form_is_told_and_so_is_what_an_arc_cannot_show() {
+    let folder = Folder::with(&[]);
+    let told = |name: &str, extra: &[&str]| {
+        let made = run(
+            &folder,
+            &[&["simulate", "circle", "--points", "72"], extra].concat(),
+        );
+        assert_eq!(made.status, 0, "{}", made.stderr);
+        folder.write(name, &made.stdout);
+        let text = run(&folder, &["circle", name]).stdout;
+        (
+            text.contains("are alike"),
+            text.contains("passes for centre and radius"),
+        )
+    };
+    assert_eq!(told("noise.csv", &["--seed", "3"]), (false, false));
+    assert_eq!(told("lobes.csv", &["--lobe", "5:8"]), (true, false));
+    assert_eq!(
+        told("arc.csv", &["--arc", "90", "--seed", "3"]),
+        (false, true)
+    );
+    let answer = json(&folder, &["circle", "arc.csv", "--format", "json"]);
+    // Truncation: 1 µm of noise turns the ends by 2e-5 of 50 mm; the centre is known to some µm.
+    assert!((number(&answer, "/fit/arc/value") - std::f64::consts::FRAC_PI_2).abs() < 1e-3);
+    assert_eq!(answer["fit"]["neighbours_alike"]["form"], false);
+    // The circumscribed circle is refused where the inscribed one is, with the same reason.
+    for k in [2, 3] {
+        let reason = answer["circularity"][k]["reason"].as_str().unwrap();
+        assert!(reason.contains("too short an arc"), "{reason}");
+    }
+}
+
+#[test]
 fn every_key_is_documented() {
     let folder = Folder::with(&[("six.csv", SIX)]);
     let answer = json(
@@ -105,6 +138,16 @@ fn bad_points_are_refused() {
             "three.csv",
             "x,y\n0,0\n1,0\n0,1\n",
             "three points fit any circle",
+        ),
+        (
+            "huge.csv",
+            "x,y\n1,0\n-1,0\n0,1e160\n0,-1\n",
+            "huge.csv:4:3: 1e160 mm is more than",
+        ),
+        (
+            "tiny.csv",
+            "x,y\n1e-160,0\n-1e-160,0\n0,1e-160\n0,-1e-160\n",
+            "mm of each other, less than",
         ),
     ] {
         let folder = Folder::with(&[(name, content)]);

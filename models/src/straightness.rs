@@ -50,6 +50,9 @@ pub struct Straightness {
     pub highest: f64,
     /// Greatest deviation below the line, µm, not positive.
     pub lowest: f64,
+    frame: Frame,
+    /// Slope and height of the line in the frame.
+    line: (f64, f64),
 }
 
 impl Straightness {
@@ -60,12 +63,13 @@ impl Straightness {
 
     /// Deviation of a point from the line, µm.
     pub fn deviation(&self, x: f64, y: f64) -> f64 {
-        y - self.intercept - self.slope * x
+        let (u, v) = self.frame.local(x, y);
+        self.frame.height_unit * (v - self.line.1 - self.line.0 * u)
     }
 }
 
 /// Why there is no straightness.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum NoStraightness {
     /// Positions and deviations differ in number.
     #[error("{positions} positions, but {deviations} deviations")]
@@ -79,10 +83,20 @@ pub enum NoStraightness {
     #[error("a reference line needs two different positions")]
     OnePosition,
     /// Not a finite number.
-    #[error("point {index} is not finite")]
+    #[error("point {} is not finite", index + 1)]
     NotFinite {
         /// Which point, from 0.
         index: usize,
+    },
+    /// The straightness or the line is not a finite number.
+    #[error(
+        "the deviations, up to {deviation:e} µm over {length:e} mm, are too large to be calculated with"
+    )]
+    TooLarge {
+        /// Greatest deviation given, µm.
+        deviation: f64,
+        /// Distance of the first from the last position, mm.
+        length: f64,
     },
 }
 
@@ -93,7 +107,8 @@ pub enum NoStraightness {
 /// optimum. Cost n log n for the sort, then linear.
 ///
 /// # Errors
-/// Fewer than two different positions, different lengths, a value that is not finite.
+/// Fewer than two different positions, different lengths, a value that is not finite, a result too
+/// large to be a number.
 ///
 /// ```
 /// use errsep_models::straightness::{ReferenceLine, straightness};
@@ -106,7 +121,7 @@ pub fn straightness(
     y: &[f64],
     reference: ReferenceLine,
 ) -> Result<Straightness, NoStraightness> {
-    let points = sorted_points(x, y)?;
+    let (points, frame) = sorted_points(x, y)?;
     let slope = match reference {
         ReferenceLine::LeastSquares => least_squares_slope(&points),
         ReferenceLine::EndPoint => end_point_slope(&points),
@@ -117,7 +132,7 @@ pub fn straightness(
         (lo.min(r), hi.max(r))
     });
     let n = points.len() as f64;
-    let intercept = match reference {
+    let height = match reference {
         ReferenceLine::LeastSquares => rests().sum::<f64>() / n,
         ReferenceLine::EndPoint => {
             let (first, height) = mean_at_end(points.iter());
@@ -125,34 +140,94 @@ pub fn straightness(
         }
         ReferenceLine::MinimumZone => f64::midpoint(low, high),
     };
-    Ok(Straightness {
+    let world_slope = slope * frame.height_unit / frame.length_unit * frame.part;
+    let found = Straightness {
         reference,
-        slope,
-        intercept,
-        highest: high - intercept,
-        lowest: low - intercept,
-    })
+        slope: world_slope,
+        intercept: frame.height_unit * height - world_slope * frame.first,
+        highest: frame.height_unit * (high - height),
+        lowest: frame.height_unit * (low - height),
+        frame,
+        line: (slope, height),
+    };
+    let all = [
+        found.slope,
+        found.intercept,
+        found.highest,
+        found.lowest,
+        found.error(),
+    ];
+    if all.iter().all(|value| value.is_finite()) {
+        Ok(found)
+    } else {
+        Err(NoStraightness::TooLarge {
+            deviation: y.iter().fold(0.0, |m, v| m.max(v.abs())),
+            length: frame.length,
+        })
+    }
 }
 
 type Point = (f64, f64);
 
-fn sorted_points(x: &[f64], y: &[f64]) -> Result<Vec<Point>, NoStraightness> {
+/// Positions from the first one and deviations in powers of two near their greatest, so that no
+/// product overflows or vanishes and nothing is rounded but the difference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Frame {
+    first: f64,
+    /// Distance of the first from the last position; infinite where it overflows.
+    length: f64,
+    /// One, or a half where the length would overflow.
+    part: f64,
+    length_unit: f64,
+    height_unit: f64,
+}
+
+impl Frame {
+    fn local(&self, x: f64, y: f64) -> Point {
+        (
+            (self.part * x - self.part * self.first) / self.length_unit,
+            y / self.height_unit,
+        )
+    }
+}
+
+/// The power of two at or below a value, at least the least normal number.
+fn power_of_two(value: f64) -> f64 {
+    const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+    f64::from_bits(value.to_bits() & EXPONENT).max(f64::MIN_POSITIVE)
+}
+
+fn sorted_points(x: &[f64], y: &[f64]) -> Result<(Vec<Point>, Frame), NoStraightness> {
     if x.len() != y.len() {
         return Err(NoStraightness::Lengths {
             positions: x.len(),
             deviations: y.len(),
         });
     }
-    let mut points = x.iter().copied().zip(y.iter().copied()).collect::<Vec<_>>();
-    let finite = |p: &Point| p.0.is_finite() && p.1.is_finite();
-    if let Some(index) = points.iter().position(|p| !finite(p)) {
+    let given = || x.iter().copied().zip(y.iter().copied());
+    if let Some(index) = given().position(|p| !(p.0.is_finite() && p.1.is_finite())) {
         return Err(NoStraightness::NotFinite { index });
     }
-    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    match (points.first(), points.last()) {
-        (Some(first), Some(last)) if last.0 > first.0 => Ok(points),
-        _ => Err(NoStraightness::OnePosition),
+    let (first, last) = x
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| {
+            (l.min(v), h.max(v))
+        });
+    if !(last > first) {
+        return Err(NoStraightness::OnePosition);
     }
+    let length = last - first;
+    let part = if length.is_finite() { 1.0 } else { 0.5 };
+    let frame = Frame {
+        first,
+        length,
+        part,
+        length_unit: power_of_two(part * last - part * first),
+        height_unit: power_of_two(y.iter().fold(0.0, |m, v| m.max(v.abs()))),
+    };
+    let mut points: Vec<Point> = given().map(|(x, y)| frame.local(x, y)).collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    Ok((points, frame))
 }
 
 fn least_squares_slope(points: &[Point]) -> f64 {
@@ -309,6 +384,45 @@ mod tests {
                 assert!(found.error() <= straightness(&x, &y, other).unwrap().error() + 1e-12);
             }
         }
+    }
+
+    #[test]
+    fn units_of_any_size_give_the_same_straightness() {
+        let (x, y) = (grid(0.1), AXIS_1);
+        let of = |x: &[f64], y: &[f64], r| straightness(x, y, r).unwrap();
+        for reference in ReferenceLine::ALL {
+            let plain = of(&x, &y, reference);
+            for (of_x, of_y) in [
+                (1e200, 1.0),
+                (1e308, 1.0),
+                (1e-290, 1e-8),
+                (1.0, 1e-300),
+                (1.0, 1e307),
+            ] {
+                let (a, b) = (x.iter().map(|v| v * of_x), y.iter().map(|v| v * of_y));
+                let (a, b): (Vec<f64>, Vec<f64>) = (a.collect(), b.collect());
+                let s = of(&a, &b, reference);
+                // Epsilons: ten roundings of numbers of the size of the greatest deviation.
+                let near = |v: f64, w: f64| (v / of_y - w).abs() < 10.0 * f64::EPSILON * 7.2;
+                assert!(
+                    near(s.error(), plain.error()),
+                    "{reference:?} {of_x} {of_y} {s:?}"
+                );
+                for i in 0..x.len() {
+                    assert!(near(s.deviation(a[i], b[i]), plain.deviation(x[i], y[i])));
+                }
+            }
+        }
+        // From −1.7e308 to 1.7e308 mm: the length itself overflows.
+        let wide = [-1.7e308, 0.0, 1.7e308];
+        let s = of(&wide, &[0.0, 3.0, 0.0], ReferenceLine::MinimumZone);
+        assert_eq!(s.error(), 3.0);
+        let error = straightness(
+            &[0.0, 1.0, 2.0],
+            &[1.7e308, -1.7e308, 1.7e308],
+            ReferenceLine::EndPoint,
+        );
+        assert!(matches!(error, Err(NoStraightness::TooLarge { .. })));
     }
 
     #[test]

@@ -55,6 +55,9 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let refused = |e: CircleError| refused(&e, args);
     let fit = orthogonal_fit(&points, args.noise).map_err(refused)?;
     let zones_found = circularity(&points, fit.circle).map_err(refused)?;
+    let alike = fit.neighbours_alike(&points);
+    let arc = fit.covered_arc(&points);
+    let form = form_in_words(alike, arc, points.len());
     let mut others: Vec<(String, Circle)> = AlgebraicFit::ALL
         .into_iter()
         .filter_map(|kind| Some((kind.name().to_owned(), algebraic(&points, kind).ok()?)))
@@ -67,7 +70,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     } else {
         None
     };
-    let mut json = as_json(&points, &fit, &zones_found, &others)?;
+    let mut json = as_json(&points, &fit, (alike, arc), &zones_found, &others)?;
     if let (Some(own), Value::Object(object)) = (nistir, &mut json) {
         object.insert(
             "nistir".to_owned(),
@@ -81,7 +84,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         );
     }
     Ok(Answer {
-        text: in_words(args, &points, &fit, &zones_found, &others)?,
+        text: in_words(args, &points, &fit, form.as_deref(), &zones_found, &others)?,
         json,
         page: page(&CircleView {
             data: &args.points.display().to_string(),
@@ -90,6 +93,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             std: fit.standard_uncertainties(),
             residuals_um: &fit.residuals_um,
             noise: (fit.noise_um, fit.noise_given),
+            form: form.as_deref(),
             circularity: &zones_found,
             others: &others,
         }),
@@ -113,6 +117,9 @@ fn refused(error: &CircleError, args: &Args) -> Message {
         CircleError::NoRedundancy => {
             Message::bad_input(error.to_string()).remedy("add points, or give --noise")
         }
+        CircleError::TooLarge { .. } | CircleError::TooClose { .. } => {
+            Message::bad_input(error.to_string()).remedy("give the columns x and y in mm")
+        }
         _ => Message::bad_input(error.to_string())
             .remedy("give three or more different points that are not on one line"),
     };
@@ -132,10 +139,47 @@ fn centroid_start(points: &[Point]) -> Circle {
     }
 }
 
+/// Below this probability of independent deviations the answer tells of form.
+const ALIKE: f64 = 0.01;
+
+/// The gap in the points beyond which they count as part of a circle, rad, where even spacing would leave
+/// a gap clearly smaller.
+const GAP: f64 = std::f64::consts::FRAC_PI_3;
+
+/// What the answer says of form: that neighbours are alike, and that on part of a circle a form of few
+/// undulations passes for centre and radius.
+fn form_in_words(alike: Option<f64>, arc: f64, points: usize) -> Option<String> {
+    let seen = alike.filter(|p| *p < ALIKE).map(|p| {
+        let chance = if p < 1e-4 {
+            "less than 0.0001".to_owned()
+        } else {
+            number::plain(p, 1)
+        };
+        format!(
+            "Neighbouring deviations are alike (probability by chance {chance}): they hold form, which the \
+             uncertainties take for independent noise."
+        )
+    });
+    let even = std::f64::consts::TAU / points.max(1) as f64;
+    let gap = std::f64::consts::TAU - arc;
+    let part = (gap > GAP.max(1.5 * even)).then(|| {
+        format!(
+            "The points cover {:.0}°: a form that varies slowly along this arc passes for centre and radius, \
+             and no uncertainty here counts it.",
+            arc.to_degrees()
+        )
+    });
+    match (seen, part) {
+        (Some(seen), Some(part)) => Some(format!("{seen} {part}")),
+        (seen, part) => seen.or(part),
+    }
+}
+
 fn in_words(
     args: &Args,
     points: &[Point],
     fit: &CircleFit,
+    form: Option<&str>,
     circularity: &Circularity,
     others: &[(String, Circle)],
 ) -> Result<String, Message> {
@@ -160,6 +204,9 @@ fn in_words(
         },
         fit.degrees_of_freedom
     );
+    if let Some(sentence) = form {
+        let _ = writeln!(text, "  {sentence}");
+    }
     let _ = writeln!(text, "\nCircularity");
     for (reference, zone) in zones(circularity) {
         let _ = match zone {
@@ -186,6 +233,7 @@ fn in_words(
 fn as_json(
     points: &[Point],
     fit: &CircleFit,
+    (alike, arc): (Option<f64>, f64),
     circularity: &Circularity,
     others: &[(String, Circle)],
 ) -> Result<Value, Message> {
@@ -204,6 +252,8 @@ fn as_json(
             "covariance": {"order": ["centre_x", "centre_y", "radius"], "value": covariance, "unit": "mm2"},
             "noise": {"value": fit.noise_um, "unit": "um", "given": fit.noise_given},
             "degrees_of_freedom": fit.degrees_of_freedom,
+            "neighbours_alike": {"p_value": alike, "form": alike.is_some_and(|p| p < ALIKE)},
+            "arc": {"value": arc, "unit": "rad"},
         },
         "algebraic": others.iter().filter(|o| !o.0.starts_with("nistir")).map(|(name, o)| json!({
             "method": name,

@@ -2,21 +2,36 @@
 
 use std::path::Path;
 
-use errsep_models::circle::Point;
+use errsep_models::circle::{LARGEST, Point};
 
 use super::{Message, TableReader};
 
 /// Reads the columns `x` and `y`, mm.
 ///
 /// # Errors
-/// The table lacks a column, has an unknown one, holds something that is no number, or no row.
+/// The table lacks a column, has an unknown one, holds something that is no number, a number beyond
+/// [`LARGEST`], or no row.
 pub fn read_points(path: &Path) -> Result<Vec<Point>, Message> {
     let mut table = TableReader::open(path)?;
     table.only(&["x", "y"])?;
     let (x, y) = (table.column("x")?, table.column("y")?);
     let mut points = Vec::new();
     while let Some(row) = table.next_row()? {
-        points.push(Point::new(row.number(&x)?, row.number(&y)?));
+        let coordinate = |column| {
+            let value = row.number(column)?;
+            if value.abs() > LARGEST {
+                return Err(row
+                    .error(
+                        column,
+                        format!(
+                            "{value:e} mm is more than the {LARGEST:e} mm that can be calculated with"
+                        ),
+                    )
+                    .remedy("check the unit and the column"));
+            }
+            Ok(value)
+        };
+        points.push(Point::new(coordinate(&x)?, coordinate(&y)?));
     }
     if points.is_empty() {
         return Err(table.no_rows());

@@ -20,6 +20,8 @@ pub struct CircleView<'a> {
     pub residuals_um: &'a [f64],
     /// Standard deviation of the radial deviations, µm, and whether it was given.
     pub noise: (f64, bool),
+    /// What the answer says of form, where it does.
+    pub form: Option<&'a str>,
     /// The circularities.
     pub circularity: &'a Circularity,
     /// Other fits by name, mm.
@@ -60,29 +62,31 @@ fn fit_section(view: &CircleView) -> Section {
         KeyFigure::new(name, value, "mm").std(std).meaning(meaning)
     };
     let (noise, given) = view.noise;
-    Section::new("Orthogonal-distance fit")
-        .key_figures([
-            figure(
-                "Radius",
-                c.radius,
-                view.std[2],
-                "least squared radial deviations",
-            ),
-            figure("Centre x", c.centre.x, view.std[0], ""),
-            figure("Centre y", c.centre.y, view.std[1], ""),
-            KeyFigure::new("Deviation", noise, "µm").meaning(if given {
-                "standard deviation of a point, given"
-            } else {
-                "standard deviation of a point, from the residuals: form and noise together"
-            }),
-        ])
-        .figure(Figure::new(
-            "Radial deviations",
-            "Each point against its angle about the fitted centre, positive outside.",
-            Chart::new(Axis::new("angle", "°"), Axis::new("deviation", "µm")).series(
-                Series::points("points", degrees, view.residuals_um.to_vec()).mark(Mark::Dot),
-            ),
-        ))
+    let section = Section::new("Orthogonal-distance fit").key_figures([
+        figure(
+            "Radius",
+            c.radius,
+            view.std[2],
+            "least squared radial deviations",
+        ),
+        figure("Centre x", c.centre.x, view.std[0], ""),
+        figure("Centre y", c.centre.y, view.std[1], ""),
+        KeyFigure::new("Deviation", noise, "µm").meaning(if given {
+            "standard deviation of a point, given"
+        } else {
+            "standard deviation of a point, from the residuals: form and noise together"
+        }),
+    ]);
+    let section = match view.form {
+        Some(sentence) => section.note(sentence),
+        None => section,
+    };
+    section.figure(Figure::new(
+        "Radial deviations",
+        "Each point against its angle about the fitted centre, positive outside.",
+        Chart::new(Axis::new("angle", "°"), Axis::new("deviation", "µm"))
+            .series(Series::points("points", degrees, view.residuals_um.to_vec()).mark(Mark::Dot)),
+    ))
 }
 
 fn circularity_section(view: &CircleView) -> Section {

@@ -5,10 +5,14 @@
 //! Positions are in mm; form deviations are in µm and carry `_um` in their names.
 
 mod algebraic;
+mod bisector;
+mod circumscribed;
+mod contacts;
 mod diagnosable;
 mod effects;
-mod farthest;
 mod inscribed;
+mod minimum_zone;
+mod neighbours;
 mod nistir;
 mod orthogonal;
 mod points;
@@ -19,6 +23,6 @@ pub use algebraic::{AlgebraicFit, algebraic};
 pub use diagnosable::CirclePoints;
 pub use nistir::{NistirEnding, NistirFit, nistir_fit};
 pub use orthogonal::{CircleFit, OrthogonalCircle, orthogonal_fit};
-pub use points::{Circle, CircleError, Point, check_points};
+pub use points::{Circle, CircleError, LARGEST, Point, SMALLEST, check_points};
 pub use simulate::{CircleSimulation, Disturbance, simulate, simulate_disturbed};
 pub use zone::{Circularity, Reference, Zone, circularity, reference_zone};

@@ -1,7 +1,7 @@
 //! The circle of least squared orthogonal distances.
 
 use super::algebraic::{AlgebraicFit, algebraic};
-use super::points::{Circle, CircleError, Frame, Point, check_points};
+use super::points::{Circle, CircleError, FLAT, Frame, Point, check_points};
 use crate::uncertainty::{DegreesOfFreedom, Quantity, UncertaintyError};
 use errsep_solvers::{Fit, NoValue, Options, Problem};
 use nalgebra::{DMatrix, DVector, Matrix3};
@@ -147,10 +147,6 @@ pub fn orthogonal_fit(points: &[Point], noise_um: Option<f64>) -> Result<CircleF
     }
     Ok(assemble(&fit, frame, seed, noise_um, degrees_of_freedom))
 }
-
-/// Radius, in root-mean-square distances from the centroid, beyond which the arc is a line to rounding:
-/// its sagitta is then below 1e-8 of its length.
-const FLAT: f64 = 1e8;
 
 fn assemble(
     fit: &Fit,

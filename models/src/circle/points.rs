@@ -68,6 +68,25 @@ pub enum CircleError {
         /// Place in the list of points, from 0.
         index: usize,
     },
+    /// A coordinate so large that squares of lengths overflow.
+    #[error(
+        "point {} has the coordinate {value:e} mm, more than the {LARGEST:e} mm that can be calculated with",
+        index + 1
+    )]
+    TooLarge {
+        /// Place in the list of points, from 0.
+        index: usize,
+        /// The coordinate, mm.
+        value: f64,
+    },
+    /// Points so close together that squares of their distances vanish.
+    #[error(
+        "the points lie within {spread:e} mm of each other, less than the {SMALLEST:e} mm that can be calculated with"
+    )]
+    TooClose {
+        /// Greatest coordinate difference from the first point, mm.
+        spread: f64,
+    },
     /// Fewer than three points that differ.
     #[error(
         "a circle needs three different points, these are {distinct} different among {count}: measure more points"
@@ -100,9 +119,10 @@ pub enum CircleError {
         /// The radius given, mm.
         radius: f64,
     },
-    /// The points do not surround a centre, so that no inscribed circle is held by them.
+    /// The points do not surround a centre, so that they hold neither an inscribed nor a circumscribed
+    /// circle.
     #[error(
-        "the points cover too short an arc: no inscribed circle is held on all sides by three of them"
+        "the points cover too short an arc: they do not surround the centre, so that they hold no circle on all sides"
     )]
     NotSurrounded,
     /// Three points leave nothing to estimate the noise from.
@@ -124,11 +144,17 @@ pub enum CircleError {
     },
 }
 
+/// Greatest coordinate, mm, whose square, and the square of that in µm, stay far from overflow.
+pub const LARGEST: f64 = 1e100;
+
+/// Least extent of a set of points, mm, whose square stays far from underflow.
+pub const SMALLEST: f64 = 1e-100;
+
 /// Refuses points through which no circle can be laid.
 ///
 /// # Errors
-/// [`CircleError::NotFinite`], [`CircleError::TooFewPoints`], [`CircleError::AllEqual`],
-/// [`CircleError::Collinear`].
+/// [`CircleError::NotFinite`], [`CircleError::TooLarge`], [`CircleError::TooFewPoints`],
+/// [`CircleError::AllEqual`], [`CircleError::TooClose`], [`CircleError::Collinear`].
 pub fn check_points(points: &[Point]) -> Result<(), CircleError> {
     if let Some(index) = points
         .iter()
@@ -136,14 +162,25 @@ pub fn check_points(points: &[Point]) -> Result<(), CircleError> {
     {
         return Err(CircleError::NotFinite { index });
     }
-    let mut sorted: Vec<Point> = points.to_vec();
-    sorted.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    sorted.dedup();
-    let (count, distinct) = (points.len(), sorted.len());
-    match distinct {
+    for (index, p) in points.iter().enumerate() {
+        for value in [p.x, p.y] {
+            if value.abs() > LARGEST {
+                return Err(CircleError::TooLarge { index, value });
+            }
+        }
+    }
+    let count = points.len();
+    match distinct_up_to_three(points) {
         1 if count > 1 => return Err(CircleError::AllEqual { count }),
-        0..=2 => return Err(CircleError::TooFewPoints { count, distinct }),
+        distinct @ 0..=2 => return Err(CircleError::TooFewPoints { count, distinct }),
         _ => {}
+    }
+    let spread = points.iter().fold(0.0_f64, |widest, p| {
+        let q = p.minus(points[0]);
+        widest.max(q.x.abs()).max(q.y.abs())
+    });
+    if spread < SMALLEST {
+        return Err(CircleError::TooClose { spread });
     }
     // The spread across the best line is the smaller semi-axis of the scatter; it is rounding when
     // it is of the order of the coordinates' last digit.
@@ -169,6 +206,25 @@ pub fn check_points(points: &[Point]) -> Result<(), CircleError> {
     }
     Ok(())
 }
+
+/// How many of the points differ, three standing for more.
+fn distinct_up_to_three(points: &[Point]) -> usize {
+    let Some(&first) = points.first() else {
+        return 0;
+    };
+    let Some(&second) = points.iter().find(|&&p| p != first) else {
+        return 1;
+    };
+    if points.iter().any(|&p| p != first && p != second) {
+        3
+    } else {
+        2
+    }
+}
+
+/// Radius, in root-mean-square distances from the centroid, beyond which the arc is a line to rounding:
+/// its sagitta is then below 1e-8 of its length.
+pub(super) const FLAT: f64 = 1e8;
 
 /// Centroid and root-mean-square distance: coordinates in which the fits are well scaled.
 #[derive(Debug, Clone, Copy)]

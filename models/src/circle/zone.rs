@@ -1,7 +1,9 @@
 //! Circularity: the radial separation of the points about a reference circle.
 
-use super::farthest::farthest_edges;
+use super::circumscribed::smallest_circumscribed;
+use super::contacts::all_on_one_side;
 use super::inscribed::largest_inscribed;
+use super::minimum_zone::minimum_zone_centre;
 use super::points::{Circle, CircleError, Frame, Point, check_points};
 use serde::{Deserialize, Serialize};
 
@@ -93,6 +95,8 @@ impl Circularity {
 /// Those of [`check_points`].
 pub fn circularity(points: &[Point], least_squares: Circle) -> Result<Circularity, CircleError> {
     check_points(points)?;
+    let search = Search::new(points, least_squares.centre);
+    let maximum_inscribed = search.maximum_inscribed();
     Ok(Circularity {
         least_squares: zone_about(
             points,
@@ -100,90 +104,107 @@ pub fn circularity(points: &[Point], least_squares: Circle) -> Result<Circularit
             least_squares.centre,
             Some(least_squares.radius),
         ),
-        minimum_zone: reference_zone(points, Reference::MinimumZone),
-        maximum_inscribed: reference_zone(points, Reference::MaximumInscribed),
-        minimum_circumscribed: reference_zone(points, Reference::MinimumCircumscribed),
+        minimum_zone: search.minimum_zone(),
+        minimum_circumscribed: match &maximum_inscribed {
+            Ok(_) => search.minimum_circumscribed(),
+            Err(reason) => Err(reason.clone()),
+        },
+        maximum_inscribed,
     })
 }
 
-/// The zone of one reference circle, found exactly: each optimum is a corner of a finite set, which
-/// is searched whole. For the least-squares reference give the fitted circle to [`circularity`];
-/// here it stands for the Taubin fit.
+/// The zone of one reference circle, exact to the rounding of the coordinates. For the least-squares
+/// reference give the fitted circle to [`circularity`]; here it stands for the Taubin fit.
 ///
 /// # Errors
 /// Those of [`check_points`]; [`CircleError::StraighterThanAnyCircle`] where the minimum zone is a
-/// straight strip, [`CircleError::NotSurrounded`] where no inscribed circle is held.
+/// straight strip; for the inscribed and the circumscribed circle [`CircleError::NotSurrounded`] where
+/// the points do not surround the least-squares centre or hold no inscribed circle.
 pub fn reference_zone(points: &[Point], reference: Reference) -> Result<Zone, CircleError> {
     check_points(points)?;
-    let frame = Frame::of(points);
-    let local: Vec<Point> = points.iter().map(|&p| frame.to_local(p)).collect();
-    let (centre, radius) = match reference {
-        Reference::LeastSquares => {
-            let circle = super::algebraic(points, super::AlgebraicFit::Taubin)?;
-            return Ok(zone_about(
-                points,
-                reference,
-                circle.centre,
-                Some(circle.radius),
-            ));
-        }
-        Reference::MinimumZone => (minimum_zone_centre(&local)?, None),
-        Reference::MaximumInscribed => {
-            let (c, r) = largest_inscribed(&local).ok_or(CircleError::NotSurrounded)?;
-            (c, Some(r))
-        }
-        Reference::MinimumCircumscribed => farthest_edges(&local)
-            .iter()
-            .map(|edge| edge.smallest())
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(c, r)| (c, Some(r)))
-            .ok_or(CircleError::Collinear)?,
-    };
-    let world = frame.to_world(Circle {
-        centre,
-        radius: radius.unwrap_or(1.0),
-    });
-    Ok(zone_about(
-        points,
-        reference,
-        world.centre,
-        radius.map(|_| world.radius),
-    ))
+    let taubin = super::algebraic(points, super::AlgebraicFit::Taubin);
+    if reference == Reference::LeastSquares {
+        let circle = taubin?;
+        return Ok(zone_about(
+            points,
+            reference,
+            circle.centre,
+            Some(circle.radius),
+        ));
+    }
+    // Without a circle the centre counts as far away, where no points surround it.
+    let centre = taubin.map_or(Point::new(f64::INFINITY, 0.0), |c| c.centre);
+    let search = Search::new(points, centre);
+    match reference {
+        Reference::MinimumZone => search.minimum_zone(),
+        Reference::MaximumInscribed => search.maximum_inscribed(),
+        _ => search
+            .maximum_inscribed()
+            .and_then(|_| search.minimum_circumscribed()),
+    }
 }
 
-/// The minimum of (farthest − nearest distance) over all centres.
-///
-/// At a minimum two outer and two inner contacts alternate: the gradient of an outer distance is a
-/// unit vector, and the hulls of the outer and of the inner unit vectors must meet, which on a circle
-/// needs two chords that cross. Such a centre lies where an edge of the farthest-point Voronoi diagram
-/// crosses one of the nearest-point diagram, so that walking all edges of the first finds it.
-fn minimum_zone_centre(points: &[Point]) -> Result<Point, CircleError> {
-    let mut best: Option<(Point, f64)> = None;
-    let mut strip = f64::INFINITY;
-    for edge in farthest_edges(points) {
-        let narrowest = edge.zone_candidates(points, |centre| {
-            let (inner, outer) = extremes(points, centre);
-            let width = outer - inner;
-            if best.is_none_or(|(_, w)| width < w) {
-                best = Some((centre, width));
-            }
+/// The points in coordinates of magnitude one and where to begin.
+struct Search<'a> {
+    points: &'a [Point],
+    frame: Frame,
+    local: Vec<Point>,
+    start: Point,
+    surrounded: bool,
+}
+
+impl<'a> Search<'a> {
+    fn new(points: &'a [Point], centre: Point) -> Self {
+        let frame = Frame::of(points);
+        let local: Vec<Point> = points.iter().map(|&p| frame.to_local(p)).collect();
+        let centre = frame.to_local(centre);
+        let near = centre.x.abs().max(centre.y.abs()) < FAR;
+        Self {
+            points,
+            frame,
+            surrounded: near && all_on_one_side(&local, centre).is_none(),
+            start: if near { centre } else { Point::default() },
+            local,
+        }
+    }
+
+    fn zone(&self, reference: Reference, centre: Point, radius: Option<f64>) -> Zone {
+        let world = self.frame.to_world(Circle {
+            centre,
+            radius: radius.unwrap_or(1.0),
         });
-        strip = strip.min(narrowest);
+        zone_about(
+            self.points,
+            reference,
+            world.centre,
+            radius.map(|_| world.radius),
+        )
     }
-    match best {
-        Some((centre, width)) if width < strip => Ok(centre),
-        _ => Err(CircleError::StraighterThanAnyCircle),
+
+    fn minimum_zone(&self) -> Result<Zone, CircleError> {
+        let centre = minimum_zone_centre(&self.local, self.start)?;
+        Ok(self.zone(Reference::MinimumZone, centre, None))
+    }
+
+    fn maximum_inscribed(&self) -> Result<Zone, CircleError> {
+        if !self.surrounded {
+            return Err(CircleError::NotSurrounded);
+        }
+        let (centre, radius) =
+            largest_inscribed(&self.local, self.start).ok_or(CircleError::NotSurrounded)?;
+        Ok(self.zone(Reference::MaximumInscribed, centre, Some(radius)))
+    }
+
+    fn minimum_circumscribed(&self) -> Result<Zone, CircleError> {
+        let (centre, radius) =
+            smallest_circumscribed(&self.local, self.start).ok_or(CircleError::Collinear)?;
+        Ok(self.zone(Reference::MinimumCircumscribed, centre, Some(radius)))
     }
 }
 
-fn extremes(points: &[Point], centre: Point) -> (f64, f64) {
-    let (low, high) = points.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), p| {
-        let q = p.minus(centre);
-        let square = q.dot(q);
-        (l.min(square), h.max(square))
-    });
-    (low.sqrt(), high.sqrt())
-}
+/// Distance of a centre, in root-mean-square distances from the centroid, beyond which a search does
+/// not begin there.
+const FAR: f64 = 1e6;
 
 fn zone_about(points: &[Point], reference: Reference, centre: Point, radius: Option<f64>) -> Zone {
     let distances: Vec<f64> = points.iter().map(|p| p.distance(centre)).collect();

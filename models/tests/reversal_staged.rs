@@ -355,12 +355,12 @@ fn traces_of_different_grids_meet_on_the_coarser() {
     let straight: Vec<f64> = (s.x.iter())
         .map(|x| slide(*x) - height - turn / spread * (x - center))
         .collect();
-    // Truncation: where the coarse trace is read between its positions the cubic's error is
-    // g³ t(1−t)(1−2t)/6 ≤ 0.016 times the third derivative of S_A, 3.1³ · 0.016 · 8e-5 µm/mm³ =
-    // 4e-5 µm at 199 mm only, none elsewhere; following the tangent from 199 to 200 mm leaves
-    // sin″/2 = 2.1e-4 µm in one of 200 cells, 1e-6 µm in the height and 3e-6 at the ends by the slope.
+    // Truncation: on its own positions the form is exact but for the line, and there the ends count,
+    // where the tangent of the last three grid points is followed over 1 mm. By hand that leaves 2.9e-4
+    // µm at 200 mm and −1.1e-4 at 0, cells of 1 mm each: 1.4e-6 and 0.5e-6 µm in the height, 4.3e-6
+    // and 1.6e-6 at the ends by the slope, less than 7e-6 in all.
     let error = worst(&s.form(0).unwrap().values, &straight);
-    assert!(error < 5e-6, "{error}");
+    assert!(error < 7e-6, "{error}");
 }
 
 #[test]

@@ -212,6 +212,38 @@ fn two_channels_say_what_they_determine() {
 }
 
 #[test]
+fn missing_readings_are_no_taper_and_lost_positions_are_told() {
+    let folder = TempDir::new().unwrap();
+    // The wiggle of the readings is noise of 0.04 µm; the slopes close here.
+    let write = |name: &str, is_read: &dyn Fn(f64, &str) -> bool| {
+        let mut text = String::from("channel,x,reading\n");
+        for (x, values) in readings() {
+            for (channel, value) in ["1A", "1B", "2A", "2B"].iter().zip(values) {
+                if is_read(x, channel) {
+                    text += &format!("{channel},{x},{}\n", value - 0.005 * x);
+                }
+            }
+        }
+        fs::write(folder.path().join(name), text).unwrap();
+        json(folder.path(), &["reversal", name])
+    };
+    let warnings = |answer: &Value| answer["warnings"].to_string();
+    let third = write("third.csv", &|x, channel| channel != "2A" || x > 33.0);
+    assert_eq!(warnings(&third), "[]");
+    assert_eq!(third["forms"]["x"].as_array().unwrap().len(), 41);
+    assert_eq!(third["closure"]["x"].as_array().unwrap().len(), 27);
+    let ends = write("ends.csv", &|x, channel| {
+        x > 0.0 || channel == "1B" || channel == "2B"
+    });
+    assert!(
+        warnings(&ends).contains("at 1 of the measured positions too few channels"),
+        "{}",
+        warnings(&ends)
+    );
+    assert_eq!(ends["forms"]["x"][0], 2.5);
+}
+
+#[test]
 fn the_folder_holds_report_result_and_tables() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("data.csv"), wide(",", "\n", ".", "")).unwrap();

@@ -13,6 +13,7 @@ mod circle;
 mod diagnosis;
 mod four_sensor;
 mod machine;
+mod staged;
 mod step_diagonal;
 mod tally;
 
@@ -25,6 +26,7 @@ type Room = (&'static str, u64, fn(u64) -> Vec<Row>);
 
 /// One line a model.
 const ROOMS: &[Room] = &[
+    ("staged", 2000, staged::rows),
     ("circle", 2000, circle::rows),
     ("four-sensor", 400, four_sensor::rows),
     ("step-diagonal", 2000, step_diagonal::rows),

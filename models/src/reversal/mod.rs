@@ -1,6 +1,7 @@
 //! The four-channel reversal: the parallelism of spindle and slide, the form of the slide and the
 //! form of both sides of the artefact, from traces at two spindle positions.
 
+mod cells;
 mod combinations;
 mod convention;
 pub mod diagnosable;

@@ -100,7 +100,8 @@ impl TrueForm {
     }
 }
 
-/// A form less its least-squares line over the measured positions.
+/// A form less its least-squares line over the measured positions, each weighted by the width of its
+/// cell.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct GaugedForm {
     form: TrueForm,
@@ -109,14 +110,27 @@ pub struct GaugedForm {
 }
 
 impl GaugedForm {
-    /// Takes the least-squares line over positions out of a form.
+    /// Takes the line over the different ones of these positions out of a form: the line of the
+    /// trapezoidal rule, with half an interval more at either end.
     pub fn over(form: TrueForm, positions: &[f64]) -> Self {
-        let n = positions.len().max(1) as f64;
-        let center = positions.iter().sum::<f64>() / n;
-        let mean = positions.iter().map(|x| form.at(*x)).sum::<f64>() / n;
-        let (product, spread) = positions.iter().fold((0.0, 0.0), |(p, s), x| {
+        let mut places = positions.to_vec();
+        places.sort_by(f64::total_cmp);
+        let range = places.last().unwrap_or(&0.0) - places.first().unwrap_or(&0.0);
+        places.dedup_by(|b, a| *b - *a <= 1e-9 * range);
+        let mut points: Vec<(f64, f64)> = Vec::with_capacity(4 * places.len());
+        for pair in places.windows(2) {
+            let half = (pair[1] - pair[0]) / 2.0;
+            points.extend([(pair[0], half), (pair[1], half)]);
+        }
+        // The outer halves of the end cells; a single position has weight all the same.
+        let alone = (places.first().copied().unwrap_or(0.0), 1.0);
+        points.extend([points.first(), points.last()].map(|p| *p.unwrap_or(&alone)));
+        let total = points.iter().map(|(_, w)| w).sum::<f64>();
+        let center = points.iter().map(|(x, w)| w * x).sum::<f64>() / total;
+        let mean = points.iter().map(|(x, w)| w * form.at(*x)).sum::<f64>() / total;
+        let (product, spread) = points.iter().fold((0.0, 0.0), |(p, s), (x, w)| {
             let d = x - center;
-            (p + d * (form.at(*x) - mean), s + d * d)
+            (p + w * d * (form.at(*x) - mean), s + w * d * d)
         });
         let slope = if spread > 0.0 { product / spread } else { 0.0 };
         Self {

@@ -46,7 +46,8 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         .residuals()
         .into_iter()
         .flat_map(|(channel, values)| {
-            s.x.iter().zip(values).map(move |(&x, residual)| Residual {
+            let x = s.closure.iter().flat_map(|c| &c.x);
+            x.zip(values).map(move |(&x, residual)| Residual {
                 channel,
                 repeat: 1,
                 backward: false,
@@ -62,7 +63,7 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         contrasts: s.contrasts,
         closure: s.closure.as_ref().map(|c| Closure {
             slope: c.slope,
-            x: s.x.clone(),
+            x: c.x.clone(),
             profile: c.profile.clone(),
             rms: c.rms,
             expected_rms: c.expected_rms,
@@ -183,6 +184,18 @@ fn warnings(s: &Staged, setup: &ReversalSetup) -> Vec<String> {
              --simultaneous uses them as they are"
                 .to_owned(),
         );
+    }
+    if s.left_out > 0
+        && let (Some(first), Some(last)) = (s.x.first(), s.x.last())
+    {
+        warnings.push(format!(
+            "at {} of the measured positions too few channels were read to tell the forms apart: tilts \
+             and forms are those of the other positions, x = {} to {} mm; --simultaneous uses all \
+             readings",
+            s.left_out,
+            number::plain(*first, 6),
+            number::plain(*last, 6)
+        ));
     }
     match &s.closure {
         Some(closure) => {

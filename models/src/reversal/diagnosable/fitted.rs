@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{FirstOrder, forms};
+use super::{FirstOrder, Gauge, forms};
 use crate::model::{Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record};
 use crate::reversal::smooth_profile::SmoothProfile;
 use crate::reversal::{Channel, effects};
@@ -38,7 +38,6 @@ impl FittedModel for FirstOrder {
             patterns[(t, 1)] = channel.side_sign();
             patterns[(t, 2)] = 1.0;
         }
-        let line = DVector::from_iterator(n, self.positions.iter().map(|x| x - mean_x));
         let offsets = self.present.len();
         let mut columns = DMatrix::zeros(
             self.record.places.len(),
@@ -55,7 +54,7 @@ impl FittedModel for FirstOrder {
         let withheld = if self.rigid() {
             Vec::new()
         } else {
-            vec![(2, line)]
+            vec![(2, Gauge::of(&self.positions).slope)]
         };
         Freedom {
             columns,
@@ -105,7 +104,12 @@ impl FittedModel for FirstOrder {
         let n = self.positions.len();
         let mean_x = self.positions.iter().sum::<f64>() / n as f64;
         let sxx: f64 = self.positions.iter().map(|x| (x - mean_x).powi(2)).sum();
-        let contrast = |name: &str, sign: fn(Channel) -> f64| Quantity {
+        // The closure holds no form: its line is that of least squares.
+        let closing: Vec<f64> = (self.positions.iter())
+            .map(|x| (x - mean_x) / sxx)
+            .collect();
+        let gauge = Gauge::of(&self.positions);
+        let of_slope = |name: &str, sign: fn(Channel) -> f64, slope: &[f64]| Quantity {
             name: name.to_owned(),
             unit: "rad",
             weights: DVector::from_iterator(
@@ -118,10 +122,12 @@ impl FittedModel for FirstOrder {
                         .filter(|c| **c == channel)
                         .count() as f64;
                     // µm per mm is 10⁻³ rad.
-                    1e-3 * sign(channel) * (place.x - mean_x) / (4.0 * sxx * traces)
+                    1e-3 * sign(channel) * slope[self.at(place)] / (4.0 * traces)
                 }),
             ),
         };
+        let contrast =
+            |name: &str, sign: fn(Channel) -> f64| of_slope(name, sign, gauge.slope.as_slice());
         if self.rigid() {
             vec![
                 contrast("alpha", Channel::indicator_sign),
@@ -131,7 +137,7 @@ impl FittedModel for FirstOrder {
         } else {
             vec![
                 contrast("alpha", Channel::indicator_sign),
-                contrast("beta", Channel::spindle_sign),
+                of_slope("beta", Channel::spindle_sign, &closing),
                 contrast("gamma", Channel::side_sign),
             ]
         }

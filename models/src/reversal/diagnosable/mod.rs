@@ -14,6 +14,7 @@ use std::collections::BTreeSet;
 use nalgebra::DVector;
 use thiserror::Error;
 
+use super::cells::cell_width;
 use super::smooth_profile::{SmoothProfile, Smoother};
 use super::{Channel, Convention, Observations};
 use crate::model::{Column, FittedModel, Place, Record};
@@ -177,20 +178,13 @@ impl FirstOrder {
     fn fit(&mut self, anew: bool) {
         let means = self.channel_means(&self.record.observed, None);
         let n = self.positions.len();
-        let mean_x = self.positions.iter().sum::<f64>() / n as f64;
-        let sxx: f64 = self.positions.iter().map(|x| (x - mean_x).powi(2)).sum();
+        let gauge = Gauge::of(&self.positions);
         let mut residual: [Option<DVector<f64>>; 4] = [const { None }; 4];
         for channel in &self.present {
             let k = channel.index();
             let Some(mean) = &means[k] else { continue };
-            let level = mean.mean();
-            let slope = mean
-                .iter()
-                .zip(&self.positions)
-                .map(|(y, x)| y * (x - mean_x))
-                .sum::<f64>()
-                / sxx;
-            let offset = level - slope * mean_x;
+            let slope = gauge.slope.dot(mean);
+            let offset = gauge.height.dot(mean) - slope * gauge.center;
             self.lines[k] = ChannelLine { slope, offset };
             residual[k] = Some(DVector::from_iterator(
                 n,
@@ -439,6 +433,33 @@ impl FirstOrder {
     /// The smooth reading of a place's channel at mid travel, µm.
     pub fn mid_reading(&self, place: &Place) -> f64 {
         self.mid_readings[self.channel(place).index()]
+    }
+}
+
+/// The straight line of a profile, each position weighted by the width of its cell, as the fits have it.
+struct Gauge {
+    /// Where the height is taken, mm.
+    center: f64,
+    /// Weights of the height.
+    height: DVector<f64>,
+    /// Weights of the slope, 1/mm.
+    slope: DVector<f64>,
+}
+
+impl Gauge {
+    fn of(positions: &[f64]) -> Self {
+        let x = DVector::from_column_slice(positions);
+        let widths = (0..x.len()).map(|k| cell_width(positions, k));
+        let widths = DVector::from_iterator(x.len(), widths);
+        let height = &widths / widths.sum();
+        let center = height.dot(&x);
+        let turn = height.component_mul(&x.add_scalar(-center));
+        let spread = turn.dot(&x.add_scalar(-center));
+        Self {
+            center,
+            slope: turn / spread,
+            height,
+        }
     }
 }
 

@@ -1,16 +1,20 @@
 //! The gauge: the least-squares line of every form over the measured positions is zero.
 //!
 //! A form is its spline less a straight line z₁ + z₂ξ, ξ = (x − centre)/scale. The least-squares
-//! line of the spline over all readings' positions is z = G⁻¹Xᵀ B c, with X = (1, ξ), G = XᵀX and B
-//! the basis at the positions: the linear constraint that ties z to the coefficients.
+//! line of the spline over the positions of all channels, each weighted by the width of its
+//! [cell](crate::reversal::cells), is z = G⁻¹XᵀW B c, with X = (1, ξ), W the widths, G = XᵀW X and
+//! B the basis at the positions: the linear constraint that ties z to the coefficients. Readings do
+//! not count in it, so that a tilt means the same with and without one of them.
 
 use errsep_solvers::linear::bordered::Constraints;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 
 use super::readings::ChannelReadings;
+use super::starts::starts;
 use super::unknowns::Unknowns;
 use crate::basis::bspline::CubicBSpline;
+use crate::reversal::cells::{Union, cell_width};
 
 /// Centre and half width of the positions, mm: ξ = (x − centre)/scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,13 +60,14 @@ pub fn constraints(
     axis: Axis,
 ) -> Constraints {
     let forms = unknowns.forms.len();
+    let places: Vec<f64> = Union::of(channels.iter().map(|c| &c.x[..])).collect();
     let mut band = Vec::with_capacity(2 * forms);
     let mut border = DMatrix::zeros(2 * forms, unknowns.border_count());
     let mut last: Option<(usize, [Vec<f64>; 2])> = None;
     for (form, basis) in bases.iter().enumerate() {
         let rows = match last.take() {
             Some((of, rows)) if bases[of] == *basis => rows,
-            _ => line_of_spline(basis, channels, axis),
+            _ => line_of_spline(basis, &places, axis),
         };
         for (l, row) in rows.iter().enumerate() {
             let mut column = vec![0.0; unknowns.band_count()];
@@ -83,59 +88,43 @@ pub fn constraints(
     }
 }
 
-/// The two rows of G⁻¹XᵀB.
-fn line_of_spline(basis: &CubicBSpline, channels: &[ChannelReadings], axis: Axis) -> [Vec<f64>; 2] {
-    let cells = basis.cell_count();
-    // Moments Σ tᵖ, Σ ξ tᵖ and Σ ξ² of the positions of each cell.
-    let per_channel: Vec<Vec<[f64; 9]>> = channels
-        .par_iter()
-        .map(|channel| {
-            let mut moments = vec![[0.0; 9]; cells];
-            let mut from = 0;
-            for (k, moment) in moments.iter_mut().enumerate() {
-                let end = if k + 1 == cells {
-                    channel.len()
-                } else {
-                    let right = basis.breaks()[k + 1];
-                    from + channel.x[from..].partition_point(|x| *x < right)
-                };
-                let (left, width) = basis.cell(k);
-                for x in &channel.x[from..end] {
-                    let (t, xi) = ((x - left) / width, axis.xi(*x));
-                    let powers = [1.0, t, t * t, t * t * t];
-                    for (p, power) in powers.into_iter().enumerate() {
-                        moment[p] += power;
-                        moment[4 + p] += xi * power;
-                    }
-                    moment[8] += xi * xi;
+/// The two rows of G⁻¹XᵀW B for growing positions.
+fn line_of_spline(basis: &CubicBSpline, places: &[f64], axis: Axis) -> [Vec<f64>; 2] {
+    let starts = starts(places, basis.breaks());
+    // Moments Σ w tᵖ, Σ w ξ tᵖ and Σ w ξ² of the positions of each cell of the spline.
+    let moments: Vec<[f64; 9]> = (0..basis.cell_count())
+        .into_par_iter()
+        .map(|k| {
+            let mut moment = [0.0; 9];
+            let (left, width) = basis.cell(k);
+            for i in starts[k]..starts[k + 1] {
+                let (w, x) = (cell_width(places, i), places[i]);
+                let (t, xi) = ((x - left) / width, axis.xi(x));
+                let powers = [1.0, t, t * t, t * t * t];
+                for (p, power) in powers.into_iter().enumerate() {
+                    moment[p] += w * power;
+                    moment[4 + p] += w * xi * power;
                 }
-                from = end;
+                moment[8] += w * xi * xi;
             }
-            moments
+            moment
         })
         .collect();
-    let mut products = [
+    let mut rows = [
         vec![0.0; basis.coefficient_count()],
         vec![0.0; basis.coefficient_count()],
     ];
-    for moments in &per_channel {
-        for (k, moment) in moments.iter().enumerate() {
-            for (l, polynomial) in basis.polynomials(k).iter().enumerate() {
-                for p in 0..4 {
-                    products[0][k + l] += polynomial[p] * moment[p];
-                    products[1][k + l] += polynomial[p] * moment[4 + p];
-                }
+    for (k, moment) in moments.iter().enumerate() {
+        for (l, polynomial) in basis.polynomials(k).iter().enumerate() {
+            for p in 0..4 {
+                rows[0][k + l] += polynomial[p] * moment[p];
+                rows[1][k + l] += polynomial[p] * moment[4 + p];
             }
         }
     }
-    // Σ ξ is zero by the choice of the centre up to rounding; the exact sums are kept all the same.
-    let [n, s1, s2] = [0, 4, 8].map(|p| -> f64 {
-        let moments = per_channel.iter().flatten();
-        moments.map(|moment| moment[p]).sum()
-    });
+    let [n, s1, s2] = [0, 4, 8].map(|p| moments.iter().map(|moment| moment[p]).sum::<f64>());
     let determinant = n * s2 - s1 * s1;
     let inverse = Matrix2::new(s2, -s1, -s1, n) / determinant;
-    let mut rows = products;
     for k in 0..basis.coefficient_count() {
         let z = inverse * Vector2::new(rows[0][k], rows[1][k]);
         (rows[0][k], rows[1][k]) = (z.x, z.y);

@@ -20,18 +20,19 @@ impl Staged {
         Some(tilt.angle)
     }
 
-    /// Mean reading less model on the common grid, µm, a row a channel: ± the closure profile and the
-    /// slope that the convention says is zero. Fewer than four channels leave nothing.
+    /// Mean reading less model, µm, a row a channel, at the positions of the [closure](Staged::closure):
+    /// ± its profile and the slope that the convention says is zero. Fewer than four channels leave
+    /// nothing.
     pub fn residuals(&self) -> Vec<(Channel, Vec<f64>)> {
         let Some(closure) = &self.closure else {
             return Vec::new();
         };
-        let center = self.x.iter().sum::<f64>() / self.x.len() as f64;
+        let center = closure.x.iter().sum::<f64>() / closure.x.len() as f64;
         let slope = um_from_mm(closure.slope.value.tan());
         let closing = self.convention.closure();
         let rest = |channel: Channel| {
             let (form, tilt) = (channel.spindle_sign(), closing.sign(channel) * slope);
-            let points = self.x.iter().zip(&closure.profile);
+            let points = closure.x.iter().zip(&closure.profile);
             points
                 .map(|(x, c)| form * c + tilt * (x - center))
                 .collect()

@@ -1,14 +1,14 @@
 //! The forms: tilt out of every trace, all on one grid, combined.
 
-use nalgebra::DMatrix;
-
-use super::grid::{common_grid, counts_near};
-use super::line::{Line, remove_line, variances_without_line};
+use super::designs::Designs;
+use super::gauge::LinePart;
+use super::grid::Grid;
+use super::joint::Joint;
+use super::line::Line;
 use super::resample::{Interpolation, resample};
 use super::rotation::{Removal, rotated, sheared};
 use super::trace::Trace;
 use super::{FORMS, Form, NoSolution};
-use crate::reversal::combinations::determined;
 
 pub(super) type Profile = (Vec<f64>, Vec<f64>);
 
@@ -37,114 +37,127 @@ pub(super) fn take_tilt_out(
         .collect()
 }
 
-/// The rest of every channel on one grid.
+/// What every channel leaves at the positions where that tells the forms apart.
 pub(super) struct Together {
     pub(super) x: Vec<f64>,
-    pub(super) rests: Vec<Vec<f64>>,
-    pub(super) one_grid: bool,
+    /// Place of each position in the grid.
+    kept: Vec<usize>,
+    /// By trace and position.
+    rests: Vec<Vec<f64>>,
+    /// Which traces have a value, by position.
+    subsets: Vec<usize>,
+    gauge: LinePart,
 }
 
-/// All profiles on one grid: the positions that every one of them reaches.
-pub(super) fn bring_together(
-    traces: &[Trace],
+/// What the sheared traces leave on the grid.
+pub(super) fn sheared_together(grid: &Grid, joint: &Joint, gauge: LinePart) -> Together {
+    Together {
+        x: grid.x.clone(),
+        kept: (0..grid.x.len()).collect(),
+        rests: joint.rests.clone(),
+        subsets: grid.subsets.clone(),
+        gauge,
+    }
+}
+
+/// What the rotated traces leave: their points lie beside the grid and are interpolated back.
+pub(super) fn rotated_together(
+    grid: &Grid,
+    designs: &Designs,
     profiles: &[Profile],
-    removal: Removal,
+    gauge: LinePart,
     how: Interpolation,
 ) -> Result<Together, NoSolution> {
-    let (grid, one_grid) = common_grid(traces);
-    if one_grid && removal == Removal::Shear {
-        let rests = profiles.iter().map(|(_, y)| y.clone()).collect();
-        return Ok(Together {
-            x: grid,
-            rests,
-            one_grid,
-        });
-    }
-    let values = profiles
+    let values: Vec<Vec<Option<f64>>> = profiles
         .iter()
-        .map(|(x, y)| resample(x, y, &grid, how))
-        .collect::<Vec<_>>();
-    let reached = |k: &usize| values.iter().all(|v| v[*k].is_some());
-    let kept = (0..grid.len()).filter(reached).collect::<Vec<_>>();
-    if kept.len() < 3 {
-        return Err(NoSolution::NoOverlap {
-            positions: kept.len(),
-        });
-    }
-    let rests = values
-        .iter()
-        .map(|v| kept.iter().filter_map(|&k| v[k]).collect())
+        .zip(&grid.sights)
+        .map(|((x, y), sights)| {
+            let rotated = resample(x, y, &grid.x, how).into_iter();
+            rotated
+                .zip(sights)
+                .map(|(v, s)| v.filter(|_| s.is_some()))
+                .collect()
+        })
         .collect();
-    Ok(Together {
-        x: kept.iter().map(|&k| grid[k]).collect(),
-        rests,
-        one_grid,
-    })
+    let mut together = Together {
+        x: Vec::new(),
+        kept: Vec::new(),
+        rests: vec![Vec::new(); profiles.len()],
+        subsets: Vec::new(),
+        gauge,
+    };
+    for (k, x) in grid.x.iter().enumerate() {
+        let has = |c: usize| values[c][k].is_some();
+        let subset = (0..profiles.len())
+            .filter(|c| has(*c))
+            .fold(0, |s, c| s | (1 << c));
+        if designs.weights(subset).is_none() {
+            continue;
+        }
+        together.x.push(*x);
+        together.kept.push(k);
+        together.subsets.push(subset);
+        for (rest, own) in together.rests.iter_mut().zip(&values) {
+            rest.push(own[k].unwrap_or(0.0));
+        }
+    }
+    let positions = designs.fewest(&together.subsets);
+    if positions < 3 {
+        return Err(NoSolution::NoOverlap { positions });
+    }
+    if together.x.len() < grid.x.len() {
+        together.gauge = LinePart::over(&together.x);
+    }
+    Ok(together)
 }
 
-/// The variance of each channel's mean at each position for noise 1. What interpolation averages is
-/// not credited, so that the uncertainty of interpolated traces is a little too large.
-pub(super) struct UnitVariances(Vec<Vec<f64>>);
-
-impl UnitVariances {
-    pub(super) fn of(traces: &[Trace], x: &[f64]) -> Self {
-        Self(
-            traces
-                .iter()
-                .map(|t| counts_near(t, x).iter().map(|n| 1.0 / n).collect())
-                .collect(),
-        )
+impl Together {
+    /// Σ weight·rest over the channels at a position, and its variance for noise 1.
+    fn at(&self, k: usize, weights: &[f64], joint: &Joint) -> (f64, f64) {
+        let terms = self.rests.iter().zip(weights);
+        let value = terms.map(|(rest, w)| w * rest[k]).sum();
+        (value, joint.variance(self.kept[k], weights))
     }
 
-    pub(super) fn of_profile(&self, x: &[f64], weights: &[f64]) -> Vec<f64> {
-        let mut sum = vec![0.0; x.len()];
-        for (variances, w) in self.0.iter().zip(weights) {
-            for (s, v) in sum.iter_mut().zip(variances) {
-                *s += w * w * v;
+    /// The forms, in the gauge.
+    pub(super) fn forms(&self, designs: &Designs, joint: &Joint, sigma: f64) -> Vec<Form> {
+        let combinations = designs.combinations().iter().enumerate();
+        combinations
+            .map(|(j, combination)| {
+                let (mut values, variances): (Vec<f64>, Vec<f64>) = (0..self.x.len())
+                    .filter_map(|k| {
+                        let weights = designs.weights(self.subsets[k])?.get(j)?;
+                        Some(self.at(k, weights, joint))
+                    })
+                    .unzip();
+                self.gauge.remove(&self.x, &mut values);
+                Form {
+                    name: combination.name(&FORMS),
+                    values,
+                    std: variances.iter().map(|v| sigma * v.sqrt()).collect(),
+                    combination: combination.clone(),
+                }
+            })
+            .collect()
+    }
+
+    /// The closure profile without its line, at the positions that all four channels have: positions,
+    /// values, variances for noise 1.
+    pub(super) fn closure(
+        &self,
+        designs: &Designs,
+        joint: &Joint,
+    ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let (mut x, mut values, mut variances) = (Vec::new(), Vec::new(), Vec::new());
+        for k in 0..self.x.len() {
+            if let Some(weights) = designs.closing(self.subsets[k]) {
+                let (value, variance) = self.at(k, weights, joint);
+                x.push(self.x[k]);
+                values.push(value);
+                variances.push(variance);
             }
         }
-        variances_without_line(x, &sum)
+        LinePart::alike(&x, |_| true).remove(&x, &mut values);
+        (x, values, variances)
     }
-}
-
-/// Σ weight·profile over the channels, in the gauge: without its least-squares line.
-pub(super) fn combine(x: &[f64], rests: &[Vec<f64>], weights: &[f64]) -> Vec<f64> {
-    let mut sum = vec![0.0; x.len()];
-    for (rest, w) in rests.iter().zip(weights) {
-        for (s, r) in sum.iter_mut().zip(rest) {
-            *s += w * r;
-        }
-    }
-    remove_line(x, &mut sum);
-    sum
-}
-
-pub(super) fn solve_forms(
-    x: &[f64],
-    rests: &[Vec<f64>],
-    traces: &[Trace],
-    unit: &UnitVariances,
-    sigma: f64,
-) -> Vec<Form> {
-    let design = DMatrix::from_fn(traces.len(), 3, |r, c| {
-        let channel = traces[r].channel;
-        match c {
-            0 => channel.indicator_sign(),
-            1 => f64::from(u8::from(channel.is_side_a())),
-            _ => f64::from(u8::from(!channel.is_side_a())),
-        }
-    });
-    determined(&design, &[1, 2])
-        .into_iter()
-        .map(|combination| Form {
-            name: combination.name(&FORMS),
-            values: combine(x, rests, &combination.weights),
-            std: unit
-                .of_profile(x, &combination.weights)
-                .iter()
-                .map(|v| sigma * v.sqrt())
-                .collect(),
-            combination,
-        })
-        .collect()
 }

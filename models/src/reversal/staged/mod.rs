@@ -1,13 +1,17 @@
 //! The staged solution: lines, contrasts, forms from what the lines leave.
 //!
-//! Each channel's least-squares line gives its tilt; the contrasts of the tilts give α, β, γ; the
-//! rest of each channel, freed of its tilt by shear or rotation, gives the forms. See
+//! The line of each channel gives its tilt; the contrasts of the tilts give α, β, γ; the rest of each
+//! channel, freed of its tilt by shear or rotation, gives the forms. The lines are solved together with
+//! free forms, so that a channel that lacks readings takes no form for slope. See
 //! `docs/theory/reversal-staged.md`.
 
 mod answers;
+mod designs;
 mod estimates;
 mod forms;
+mod gauge;
 mod grid;
+mod joint;
 mod line;
 mod no_solution;
 mod noise;
@@ -24,13 +28,18 @@ pub use resample::Interpolation;
 pub use rotation::Removal;
 pub use trace::Trace;
 
+use super::cells::Union;
 use super::convention::{Contrast, Convention};
 use super::{Channel, Observations};
+use designs::Designs;
 use estimates::rms;
-use forms::{Together, UnitVariances, bring_together, combine, solve_forms, take_tilt_out};
+use forms::{rotated_together, sheared_together, take_tilt_out};
+use gauge::LinePart;
+use grid::Grid;
+use joint::Joint;
 use line::Line;
 use rotation::{angle_of_slope, sheared};
-use tilts::{channel_lines, contrasts, solve_tilts};
+use tilts::{Tilts, channel_lines, contrasts, solve_tilts};
 
 /// How to solve.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -57,7 +66,7 @@ pub struct Value {
     pub std: f64,
 }
 
-/// The least-squares line of one channel.
+/// The line of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelLine {
     /// Which channel.
@@ -96,7 +105,8 @@ pub struct Form {
     pub name: String,
     /// Its coefficients on M, S_A, S_B and its weights on the channels.
     pub combination: Combination,
-    /// Values, µm, without straight-line part.
+    /// Values, µm, without straight-line part: their least-squares line over the measured positions,
+    /// each weighted by the width of its cell, is zero.
     pub values: Vec<f64>,
     /// Standard uncertainties, µm.
     pub std: Vec<f64>,
@@ -107,7 +117,9 @@ pub struct Form {
 pub struct Closure {
     /// The contrast that the convention says is zero, rad.
     pub slope: Value,
-    /// (R1A + R1B − R2A − R2B)/4 on the common grid, µm, without straight-line part.
+    /// Positions of the common grid that all four channels have, mm.
+    pub x: Vec<f64>,
+    /// (R1A + R1B − R2A − R2B)/4 there, µm, without straight-line part.
     pub profile: Vec<f64>,
     /// Its root mean square, µm.
     pub rms: f64,
@@ -130,7 +142,7 @@ pub struct ErrorRms {
     pub thickness: Option<f64>,
 }
 
-/// What the model leaves of the readings on the common grid.
+/// What the model leaves of the readings where all four channels were read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residual {
     /// Root mean square, µm.
@@ -154,8 +166,11 @@ pub struct Staged {
     pub contrasts: Option<[(Contrast, Value); 4]>,
     /// Positions of the forms, mm.
     pub x: Vec<f64>,
-    /// Whether the traces share that grid, or were interpolated onto it.
+    /// Whether that grid is the traces' own, or they were interpolated onto it.
     pub one_grid: bool,
+    /// Measured positions at which too few channels were read to tell the forms apart: the forms' lines
+    /// are zero over the others, and the tilts count from those lines.
+    pub left_out: usize,
     /// The forms or their combinations.
     pub forms: Vec<Form>,
     /// The closure; only four channels have one.
@@ -176,8 +191,8 @@ const MOST: f64 = std::f64::consts::FRAC_PI_4;
 /// Solves in stages.
 ///
 /// Repeats and directions are averaged at each position; traces of different grids are interpolated
-/// onto a common one. Any subset of channels is taken: the answer holds the combinations that it
-/// determines.
+/// onto a common one, and a channel that was not read somewhere has no value there. Any subset of
+/// channels is taken: the answer holds the combinations that it determines.
 ///
 /// # Errors
 /// [`NoSolution`] says what is missing.
@@ -187,35 +202,43 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
         .into_iter()
         .filter_map(|c| Trace::of(observations, c))
         .collect::<Vec<_>>();
-    let fits = fit_lines(&traces)?;
-    let estimates = estimate_errors(&traces, &fits, options);
+    let channels: Vec<Channel> = traces.iter().map(|t| t.channel).collect();
+    let designs = Designs::of(&channels);
+    let first = fit_lines(&traces)?;
+    let grid = Grid::of(&traces, &designs, options.interpolation)?;
+    let measured = Union::of(traces.iter().map(|t| &t.x[..]));
+    let (gauge, left_out) = LinePart::gauge(&grid, measured, options.interpolation);
+    let joint = Joint::solve(&traces, &first, &grid, &designs, &gauge)?;
+    let fits = &joint.lines;
+    let estimates = estimate_errors(&traces, fits, options);
     let early_noise = noise_figures(options, &traces, None);
     let removal = options
         .removal
         .unwrap_or_else(|| choose(&estimates, early_noise.first()));
     let half = options.thickness.unwrap_or(0.0) / 2.0;
-    let (removal, profiles) = match take_tilt_out(&traces, &fits, removal, half) {
+    let (removal, profiles) = match take_tilt_out(&traces, fits, removal, half) {
         Err(NoSolution::Folded { .. }) if options.removal.is_none() => (
             Removal::Shear,
-            take_tilt_out(&traces, &fits, Removal::Shear, half)?,
+            take_tilt_out(&traces, fits, Removal::Shear, half)?,
         ),
         profiles => (removal, profiles?),
     };
-    let Together { x, rests, one_grid } =
-        bring_together(&traces, &profiles, removal, options.interpolation)?;
-    let unit = UnitVariances::of(&traces, &x);
-    let closure_profile = (traces.len() == 4).then(|| {
-        let weights = Channel::ALL.map(|c| c.spindle_sign() / 4.0);
-        (combine(&x, &rests, &weights), unit.of_profile(&x, &weights))
-    });
-    let noise_figures = noise_figures(options, &traces, closure_profile.as_ref());
+    let together = match removal {
+        Removal::Shear => sheared_together(&grid, &joint, gauge),
+        Removal::Rotation => {
+            rotated_together(&grid, &designs, &profiles, gauge, options.interpolation)?
+        }
+    };
+    let closing = (traces.len() == 4).then(|| together.closure(&designs, &joint));
+    let noise_figures = noise_figures(options, &traces, closing.as_ref());
     let noise = *noise_figures.first().ok_or(NoSolution::NoReadings)?;
-    let lines = channel_lines(&traces, &fits, estimates, noise.sigma);
-    let forms = solve_forms(&x, &rests, &traces, &unit, noise.sigma);
-    let contrasts = (traces.len() == 4).then(|| contrasts(&lines));
-    let closure = closure_profile
+    let tilts = Tilts::of(&joint, noise.sigma);
+    let lines = channel_lines(&traces, fits, estimates, &tilts);
+    let forms = together.forms(&designs, &joint, noise.sigma);
+    let contrasts = (traces.len() == 4).then(|| contrasts(&tilts));
+    let closure = closing
         .zip(contrasts)
-        .map(|((profile, unit), contrasts)| {
+        .map(|((x, profile, unit), contrasts)| {
             let closing = options.convention.closure();
             let slope = contrasts.iter().find(|(c, _)| *c == closing);
             let expected = unit.iter().sum::<f64>() / unit.len() as f64;
@@ -229,19 +252,20 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
                 ),
                 rms: rms(&profile),
                 expected_rms: noise.sigma * expected.sqrt(),
+                x,
                 profile,
             }
         });
-    let freedom = residual_freedom(&x, &lines);
     let mut staged = Staged {
         convention: options.convention,
         removal,
-        tilts: solve_tilts(&lines, options.convention),
+        tilts: solve_tilts(&tilts, &channels, options.convention),
         contrasts,
-        residual: freedom,
+        residual: residual_freedom(closure.as_ref()),
         lines,
-        x,
-        one_grid,
+        one_grid: grid.one_grid,
+        left_out,
+        x: together.x,
         forms,
         closure,
         noise,
@@ -329,7 +353,7 @@ fn choose(estimates: &[ErrorEstimates], noise: Option<&Noise>) -> Removal {
 fn noise_figures(
     options: &Options,
     traces: &[Trace],
-    closure: Option<&(Vec<f64>, Vec<f64>)>,
+    closure: Option<&(Vec<f64>, Vec<f64>, Vec<f64>)>,
 ) -> Vec<Noise> {
     let declared = options.noise.map(|sigma| Noise {
         sigma,
@@ -339,7 +363,7 @@ fn noise_figures(
     [
         declared,
         noise::from_repeats(traces),
-        closure.and_then(|(profile, unit)| noise::from_closure(profile, unit)),
+        closure.and_then(|(_, profile, unit)| noise::from_closure(profile, unit)),
         noise::from_neighbours(traces),
     ]
     .into_iter()
@@ -347,11 +371,12 @@ fn noise_figures(
     .collect()
 }
 
-/// Four channels of n positions: 4 n mean readings; 4 offsets, 3 tilts and 3 forms of n values less
-/// line each. Fewer channels leave nothing.
-fn residual_freedom(x: &[f64], lines: &[ChannelLine]) -> Residual {
+/// Four channels at the n positions that all of them have: 4 n mean readings; 4 offsets, 3 tilts and 3
+/// forms of n values less line each. A position that one of them lacks, and fewer channels, leave
+/// nothing.
+fn residual_freedom(closure: Option<&Closure>) -> Residual {
     Residual {
         rms: 0.0,
-        degrees_of_freedom: if lines.len() == 4 { x.len() - 1 } else { 0 },
+        degrees_of_freedom: closure.map_or(0, |c| c.x.len().saturating_sub(1)),
     }
 }

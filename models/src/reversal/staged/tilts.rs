@@ -1,74 +1,98 @@
 //! The tilts: the line of each channel and the contrasts of the slopes.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::estimates::{ErrorEstimates, rms};
+use super::joint::Joint;
 use super::line::Line;
 use super::rotation::{angle_of_slope, sheared};
 use super::trace::Trace;
 use super::{ChannelLine, Tilt, Value};
+use crate::reversal::Channel;
 use crate::reversal::combinations::determined;
 use crate::reversal::convention::{Contrast, Convention};
 use crate::units::mm_from_um;
+
+/// The channels' tilts, and their covariance for noise σ, rad².
+pub(super) struct Tilts {
+    pub(super) values: Vec<f64>,
+    covariance: DMatrix<f64>,
+}
+
+impl Tilts {
+    pub(super) fn of(joint: &Joint, sigma: f64) -> Self {
+        let values: Vec<f64> = joint
+            .lines
+            .iter()
+            .map(|l| angle_of_slope(l.slope))
+            .collect();
+        // d(arctan s) = ds cos².
+        let gain: Vec<f64> = (values.iter())
+            .map(|tilt| mm_from_um(sigma) * tilt.cos().powi(2))
+            .collect();
+        let slopes = joint.slopes();
+        let covariance = slopes.map_with_location(|r, c, v| v * gain[r] * gain[c]);
+        Self { values, covariance }
+    }
+
+    /// Σ weight·tilt.
+    pub(super) fn weighted(&self, weights: &[f64]) -> Value {
+        let weights = DVector::from_column_slice(weights);
+        Value {
+            value: weights.iter().zip(&self.values).map(|(w, t)| w * t).sum(),
+            std: weights.dot(&(&self.covariance * &weights)).max(0.0).sqrt(),
+        }
+    }
+
+    fn one(&self, channel: usize) -> Value {
+        Value {
+            value: self.values[channel],
+            std: self.covariance[(channel, channel)].max(0.0).sqrt(),
+        }
+    }
+}
 
 pub(super) fn channel_lines(
     traces: &[Trace],
     fits: &[Line],
     estimates: Vec<ErrorEstimates>,
-    sigma: f64,
+    tilts: &Tilts,
 ) -> Vec<ChannelLine> {
     traces
         .iter()
         .zip(fits)
         .zip(estimates)
-        .map(|((t, line), estimates)| {
-            let tilt = angle_of_slope(line.slope);
-            // d(arctan s) = ds cos².
-            let std = mm_from_um(sigma / line.spread.sqrt()) * tilt.cos().powi(2);
-            ChannelLine {
-                channel: t.channel,
-                readings: t.count.iter().sum::<f64>() as usize,
-                positions: t.x.len(),
-                tilt: Value { value: tilt, std },
-                offset: line.at(0.0),
-                rest_rms: rms(&sheared(t, line).1),
-                direction_difference: t.direction_difference,
-                estimates,
-            }
+        .enumerate()
+        .map(|(c, ((t, line), estimates))| ChannelLine {
+            channel: t.channel,
+            readings: t.count.iter().sum::<f64>() as usize,
+            positions: t.x.len(),
+            tilt: tilts.one(c),
+            offset: line.at(0.0),
+            rest_rms: rms(&sheared(t, line).1),
+            direction_difference: t.direction_difference,
+            estimates,
         })
         .collect()
 }
 
-pub(super) fn weighted(lines: &[ChannelLine], weights: &[f64]) -> Value {
-    let terms = || lines.iter().zip(weights);
-    Value {
-        value: terms().map(|(l, w)| w * l.tilt.value).sum(),
-        std: terms()
-            .map(|(l, w)| (w * l.tilt.std).powi(2))
-            .sum::<f64>()
-            .sqrt(),
-    }
+pub(super) fn contrasts(tilts: &Tilts) -> [(Contrast, Value); 4] {
+    Contrast::ALL.map(|c| (c, tilts.weighted(&Channel::ALL.map(|k| c.sign(k) / 4.0))))
 }
 
-pub(super) fn contrasts(lines: &[ChannelLine]) -> [(Contrast, Value); 4] {
-    Contrast::ALL.map(|c| {
-        let weights = lines
-            .iter()
-            .map(|l| c.sign(l.channel) / 4.0)
-            .collect::<Vec<_>>();
-        (c, weighted(lines, &weights))
-    })
-}
-
-pub(super) fn solve_tilts(lines: &[ChannelLine], convention: Convention) -> Vec<Tilt> {
+pub(super) fn solve_tilts(
+    tilts: &Tilts,
+    channels: &[Channel],
+    convention: Convention,
+) -> Vec<Tilt> {
     let unknowns = convention.tilts();
-    let design = DMatrix::from_fn(lines.len(), 3, |r, c| unknowns[c].sign(lines[r].channel));
+    let design = DMatrix::from_fn(channels.len(), 3, |r, c| unknowns[c].sign(channels[r]));
     let names = unknowns.map(|c| c.name(convention));
     determined(&design, &[])
         .into_iter()
         .map(|combination| Tilt {
             name: combination.name(&names),
-            angle: weighted(lines, &combination.weights),
+            angle: tilts.weighted(&combination.weights),
             combination,
         })
         .collect()

@@ -25,7 +25,7 @@ pub fn solve(file: &Path, data: &ReversalData, setup: &ReversalSetup) -> Result<
             Some(d) if setup.fit_thickness => Thickness::Fitted(d),
             Some(d) => Thickness::Known(d),
         },
-        noise: setup.noise.map_or(Noise::PerChannel, Noise::Declared),
+        noise: setup.noise.map_or(Noise::Estimated, Noise::Declared),
         knots: setup.knots.map_or(Knots::Chosen, Knots::Cells),
         ..Options::default()
     };

@@ -151,7 +151,12 @@ mod tests {
     #[test]
     fn draws_have_the_variance_of_the_law() {
         use rand::SeedableRng;
-        let law = Law { white: 1.0, correlated: 2.0, length: 3.0, shift: 0.5 };
+        let law = Law {
+            white: 1.0,
+            correlated: 2.0,
+            length: 3.0,
+            shift: 0.5,
+        };
         let x = [0.0, 1.0, 1.5, 4.0];
         let w = [1.0, -2.0, 0.5, 0.7];
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
@@ -160,7 +165,12 @@ mod tests {
         for _ in 0..count {
             let mut noise = [0.0; 4];
             law.draw(&x, &mut random, &mut noise);
-            sum += noise.iter().zip(&w).map(|(n, w)| n * w).sum::<f64>().powi(2);
+            sum += noise
+                .iter()
+                .zip(&w)
+                .map(|(n, w)| n * w)
+                .sum::<f64>()
+                .powi(2);
         }
         let expected = law.form(&decays(&x, law.length), &w, &w);
         // k·u: the mean of 40 000 squares is known to √(2/40 000); four of them.

@@ -64,7 +64,13 @@ impl Posterior {
         for shift in [false, true] {
             explore(contrasts, None, shift, plain.minus_log, &mut possible);
             if let Some(lengths) = lengths {
-                explore(contrasts, Some(lengths), shift, plain.minus_log, &mut possible);
+                explore(
+                    contrasts,
+                    Some(lengths),
+                    shift,
+                    plain.minus_log,
+                    &mut possible,
+                );
             }
         }
         let top = possible
@@ -93,9 +99,10 @@ impl Posterior {
     /// The mean of the laws.
     pub fn mean(&self) -> Law {
         let mean = |of: fn(&Law) -> f64| {
-            let terms = self.possible.iter().map(|p| {
-                p.probability * p.quadratic / (self.count - 2.0) * of(&p.law)
-            });
+            let terms = self
+                .possible
+                .iter()
+                .map(|p| p.probability * p.quadratic / (self.count - 2.0) * of(&p.law));
             terms.sum::<f64>()
         };
         let correlated = mean(|l| l.correlated);
@@ -160,7 +167,13 @@ fn explore(
             let share: f64 = sides
                 .iter()
                 .zip(&limits)
-                .map(|(s, l)| if l.1 > l.0 { (s.1 - s.0) / (l.1 - l.0) } else { 1.0 })
+                .map(|(s, l)| {
+                    if l.1 > l.0 {
+                        (s.1 - s.0) / (l.1 - l.0)
+                    } else {
+                        1.0
+                    }
+                })
                 .product();
             let log_cell = (share / points.len() as f64).ln();
             possible.extend(points.into_iter().map(|(_, mut p)| {
@@ -177,7 +190,9 @@ fn explore(
 fn middles(side: Side, count: usize) -> Vec<f64> {
     if side.1 > side.0 {
         let width = (side.1 - side.0) / count as f64;
-        (0..count).map(|k| side.0 + (k as f64 + 0.5) * width).collect()
+        (0..count)
+            .map(|k| side.0 + (k as f64 + 0.5) * width)
+            .collect()
     } else {
         vec![side.0]
     }
@@ -273,15 +288,29 @@ mod tests {
     fn intervals_of_a_further_trace_hold() {
         for law in [
             Law::of_white(1.0),
-            Law { white: 1.0, correlated: 1.0, length: 15.0, shift: 0.0 },
-            Law { white: 1.0, correlated: 0.0, length: 1.0, shift: 0.3 },
+            Law {
+                white: 1.0,
+                correlated: 1.0,
+                length: 15.0,
+                shift: 0.0,
+            },
+            Law {
+                white: 1.0,
+                correlated: 0.0,
+                length: 1.0,
+                shift: 0.3,
+            },
         ] {
             let (mut inside, seeds) = ([0; 2], 150);
             for seed in 0..seeds {
                 let (x, contrasts) = contrasts(&law, 60, seed);
                 let posterior = Posterior::of(&contrasts).unwrap();
                 let mut noise = vec![0.0; x.len()];
-                law.draw(&x, &mut ChaCha8Rng::seed_from_u64(10_000 + seed), &mut noise);
+                law.draw(
+                    &x,
+                    &mut ChaCha8Rng::seed_from_u64(10_000 + seed),
+                    &mut noise,
+                );
                 let n = x.len() as f64;
                 let middle = x.iter().sum::<f64>() / n;
                 let spread: f64 = x.iter().map(|x| (x - middle).powi(2)).sum();
@@ -297,7 +326,9 @@ mod tests {
                         .collect();
                     let (variance, freedom) = posterior.variance(&of);
                     let error: f64 = noise.iter().zip(w).map(|(e, w)| e * w).sum();
-                    let t = StudentsT::new(0.0, 1.0, freedom).unwrap().inverse_cdf(0.975);
+                    let t = StudentsT::new(0.0, 1.0, freedom)
+                        .unwrap()
+                        .inverse_cdf(0.975);
                     *inside += u32::from(error.abs() < t * variance.sqrt());
                 }
             }
@@ -311,7 +342,12 @@ mod tests {
 
     #[test]
     fn many_repeats_give_the_law() {
-        let law = Law { white: 1.0, correlated: 0.6, length: 10.0, shift: 0.2 };
+        let law = Law {
+            white: 1.0,
+            correlated: 0.6,
+            length: 10.0,
+            shift: 0.2,
+        };
         let (_, contrasts) = contrasts(&law, 400, 5);
         let mean = Posterior::of(&contrasts).unwrap().mean();
         // k·u: 24 contrasts of 400 values know the white part to 3 %, the correlated one to some 10 %

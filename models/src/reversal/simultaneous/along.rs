@@ -82,7 +82,8 @@ impl Gathered {
                         let at = range.start + (2 * k + 1) * range.len() / (2 * taken);
                         let x = channel.x[rows_of.row(at)];
                         let own = solution.predict(channel.channel, x)?;
-                        row.band.extend(own.band.iter().map(|(j, v)| (*j, factor * v)));
+                        row.band
+                            .extend(own.band.iter().map(|(j, v)| (*j, factor * v)));
                         row.border.resize(own.border.len(), 0.0);
                         for (sum, v) in row.border.iter_mut().zip(&own.border) {
                             *sum += factor * v;
@@ -104,7 +105,12 @@ impl Gathered {
     fn counting(&self, (band, border): &(Vec<f64>, Vec<f64>)) -> Vec<Vec<f64>> {
         let of = |row: &Row| {
             let near: f64 = row.band.iter().map(|(j, v)| v * band[*j]).sum();
-            near + row.border.iter().zip(border).map(|(v, z)| v * z).sum::<f64>()
+            near + row
+                .border
+                .iter()
+                .zip(border)
+                .map(|(v, z)| v * z)
+                .sum::<f64>()
         };
         self.traces
             .iter()
@@ -196,11 +202,14 @@ impl AlongTraces {
             .iter()
             .map(|p| {
                 let length = p.law.length;
-                lengths.iter().position(|l| l.0 == length).unwrap_or_else(|| {
-                    let of = |t: &Cells| decays(&t.positions, length);
-                    lengths.push((length, gathered.traces.iter().map(of).collect()));
-                    lengths.len() - 1
-                })
+                lengths
+                    .iter()
+                    .position(|l| l.0 == length)
+                    .unwrap_or_else(|| {
+                        let of = |t: &Cells| decays(&t.positions, length);
+                        lengths.push((length, gathered.traces.iter().map(of).collect()));
+                        lengths.len() - 1
+                    })
             })
             .collect();
         let (cells, readings) = gathered
@@ -342,7 +351,10 @@ impl AlongTraces {
         if squares - expected <= CLEAR * doubt {
             return (0.0, 1.0);
         }
-        ((squares - expected) / (readings * (freedom / cells)), freedom)
+        (
+            (squares - expected) / (readings * (freedom / cells)),
+            freedom,
+        )
     }
 
     /// tr HV: the part of the noise's variance that the fit takes up.
@@ -377,7 +389,9 @@ impl AlongTraces {
                 }
                 let band: Vec<(usize, f64)> = band.into_iter().enumerate().collect();
                 let border: Vec<(usize, f64)> = border.into_iter().enumerate().collect();
-                let taken = self.gathered.counting(&solution.covariance.times(&band, &border));
+                let taken = self
+                    .gathered
+                    .counting(&solution.covariance.times(&band, &border));
                 let traces = taken.iter().zip(signs).zip(&along);
                 traces
                     .map(|((taken, signs), d)| law.form(d, taken, signs))

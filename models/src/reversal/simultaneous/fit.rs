@@ -183,13 +183,7 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
             solution.scatter = Scatter::Along(Arc::new(along));
         }
     }
-    solution.closure = closure::of(
-        &problem,
-        &result,
-        &channels,
-        &by_channel,
-        &solution.scatter,
-    );
+    solution.closure = closure::of(&problem, &result, &channels, &by_channel, &solution.scatter);
     solution.convergence.seconds = began.elapsed().as_secs_f64();
     Ok(solution)
 }

@@ -254,7 +254,10 @@ mod tests {
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
         // k·u: the variance of 600 values is known to 6 %; the share of information is one figure for
         // all cuts.
-        assert!((variance * freedom / 2.0 - 1.0).abs() < 0.25, "{variance} {freedom}");
+        assert!(
+            (variance * freedom / 2.0 - 1.0).abs() < 0.25,
+            "{variance} {freedom}"
+        );
     }
 
     #[test]
@@ -262,7 +265,10 @@ mod tests {
         let noisy = levels(60, [0.05, 0.5, 0.05, 0.05], |_| 0.0, 1).sigmas(&[1.0; 4]);
         assert!(noisy[1] / noisy[0] > 6.0, "{noisy:?}");
         let jump = levels(60, [0.05; 4], |x| f64::from(u8::from(x > 50.0)), 2).sigmas(&[1.0; 4]);
-        assert!(jump.iter().all(|s| (s / 0.05 - 1.0).abs() < 0.3), "{jump:?}");
+        assert!(
+            jump.iter().all(|s| (s / 0.05 - 1.0).abs() < 0.3),
+            "{jump:?}"
+        );
         // Too little is known of each.
         let few = levels(12, [0.05, 0.5, 0.05, 0.05], |_| 0.0, 1).sigmas(&[1.0; 4]);
         assert!(few.windows(2).all(|p| p[0] == p[1]), "{few:?}");

@@ -91,8 +91,7 @@ impl<'a> Survey<'a> {
             Noise::Declared(sigma) => vec![sigma; self.channels.len()],
             Noise::Equal => vec![1.0; self.channels.len()],
             Noise::Estimated => {
-                let values: Vec<Vec<f64>> =
-                    self.channels.iter().map(|c| c.value.clone()).collect();
+                let values: Vec<Vec<f64>> = self.channels.iter().map(|c| c.value.clone()).collect();
                 let levels = Levels::along(self.channels, &self.traces, &values);
                 levels.sigmas(&vec![1.0; self.channels.len()])
             }
@@ -280,11 +279,7 @@ pub struct Left {
 
 impl Left {
     /// From the residuals of single traces against what is known of the noise.
-    pub fn of_residuals(
-        problem: &Reversal,
-        residuals: &[Vec<f64>],
-        known: Option<Level>,
-    ) -> Self {
+    pub fn of_residuals(problem: &Reversal, residuals: &[Vec<f64>], known: Option<Level>) -> Self {
         let freedom = freedom_left(problem);
         let squares: f64 = residuals
             .iter()

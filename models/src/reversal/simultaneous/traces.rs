@@ -124,7 +124,12 @@ fn group(c: usize, channel: &ChannelReadings, traces: &[Trace], own: Vec<usize>)
     let edges = shared_positions(longest, own.iter().flat_map(|t| x_of(*t)))
         .unwrap_or_else(|| even_edges(channel, longest));
     let last = edges.len().saturating_sub(1);
-    let cell_of = |x: f64| edges.partition_point(|e| *e <= x).saturating_sub(1).min(last);
+    let cell_of = |x: f64| {
+        edges
+            .partition_point(|e| *e <= x)
+            .saturating_sub(1)
+            .min(last)
+    };
     let mut sums = vec![(0.0, 0.0); edges.len()];
     let on_cells: Vec<CellTrace> = own
         .iter()
@@ -201,7 +206,10 @@ mod tests {
         let data = observations(|_, k| 2.0 * k as f64, 3, 10);
         let channels = ChannelReadings::sort(&data);
         let traces = of(&channels, &data);
-        assert_eq!(traces[0].iter().map(Trace::len).collect::<Vec<_>>(), [10; 3]);
+        assert_eq!(
+            traces[0].iter().map(Trace::len).collect::<Vec<_>>(),
+            [10; 3]
+        );
         let groups = grouped(&channels, &traces);
         assert_eq!(groups.len(), 1);
         assert_eq!(groups[0].positions.len(), 10);

@@ -158,8 +158,16 @@ impl BorderedCovariance {
             self.triangle.solve(&mut own);
         }
         for (i, value) in own.iter_mut().enumerate() {
-            *value -= lost.iter().zip(self.p.row(i).iter()).map(|(l, p)| l * p).sum::<f64>();
-            *value += through.iter().zip(self.u.row(i).iter()).map(|(t, u)| t * u).sum::<f64>();
+            *value -= lost
+                .iter()
+                .zip(self.p.row(i).iter())
+                .map(|(l, p)| l * p)
+                .sum::<f64>();
+            *value += through
+                .iter()
+                .zip(self.u.row(i).iter())
+                .map(|(t, u)| t * u)
+                .sum::<f64>();
         }
         (own, through)
     }

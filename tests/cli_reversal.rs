@@ -384,3 +384,119 @@ fn a_million_rows() {
         ("2B", 249.999, f64::from((rows - 1) % 7))
     );
 }
+
+/// Readings made by the program itself: 61 positions, noise 0.05 µm.
+fn simulated(folder: &Path, options: &[&str]) {
+    let base = [
+        "simulate",
+        "reversal",
+        "--positions",
+        "61",
+        "--noise",
+        "0.05",
+    ];
+    let (code, text, err) = run(folder, &[&base, options].concat());
+    assert_eq!(code, Some(0), "{err}");
+    fs::write(folder.join("data.csv"), text).unwrap();
+}
+
+#[test]
+fn a_misfit_is_told_and_the_diagnosis_named() {
+    let folder = TempDir::new().unwrap();
+    for (seed, repeats) in [("1", "1"), ("2", "1"), ("3", "3")] {
+        simulated(
+            folder.path(),
+            &[
+                "--effect",
+                "taper=5e-6",
+                "--seed",
+                seed,
+                "--repeats",
+                repeats,
+            ],
+        );
+        let args = ["reversal", "data.csv", "--simultaneous"];
+        let answer = json(folder.path(), &args);
+        let alpha = &answer["tilts"]["alpha"];
+        let (value, std) = (
+            alpha["value"].as_f64().unwrap(),
+            alpha["std"].as_f64().unwrap(),
+        );
+        // k·u: α is 40 µrad, and the misfit leaves it alone.
+        assert!((value - 40e-6).abs() < 2.0 * std && std < 1e-6, "{alpha}");
+        assert_eq!(answer["agreement"]["disagree"], true);
+        // 5 µrad over 300 mm: 1.5 µm/√12.
+        let missed = answer["agreement"]["missed"]["value"].as_f64().unwrap();
+        assert!((0.3..0.6).contains(&missed), "{missed}");
+        let (_, text, _) = run(folder.path(), &args);
+        for said in ["model and readings disagree", "errsep diagnose data.csv"] {
+            assert!(text.contains(said), "{said:?} is not in:\n{text}");
+        }
+        let (_, text, _) = run(folder.path(), &["reversal", "data.csv"]);
+        assert!(text.contains("errsep diagnose data.csv"), "{text}");
+    }
+    simulated(folder.path(), &["--seed", "5"]);
+    let (_, text, _) = run(folder.path(), &["reversal", "data.csv", "--simultaneous"]);
+    assert!(!text.contains("diagnose"), "{text}");
+    // With one repeat it is said what is assumed, and what it would be otherwise.
+    assert!(text.contains("only repeats would"), "{text}");
+}
+
+/// The angle stands with its value in seconds of arc, the expanded uncertainty by itself.
+#[test]
+fn seconds_of_arc_belong_to_the_value() {
+    let folder = TempDir::new().unwrap();
+    simulated(folder.path(), &["--seed", "5"]);
+    for method in [&[][..], &["--simultaneous"]] {
+        let (_, text, _) = run(folder.path(), &[&["reversal", "data.csv"], method].concat());
+        let line = text.lines().find(|l| l.starts_with("  alpha")).unwrap();
+        let (value, expanded) = line.split_once(", U = ").unwrap();
+        // 40 µrad are 8.25″.
+        assert!(value.ends_with("″)") && value.contains("(8."), "{line}");
+        assert!(!expanded.contains('″'), "{line}");
+    }
+}
+
+#[test]
+fn more_knots_than_readings_carry_are_refused_at_once() {
+    let folder = TempDir::new().unwrap();
+    simulated(folder.path(), &["--seed", "3"]);
+    for knots in ["59", "86", "20000", "100000000", "4294967295"] {
+        let setup = format!("[model]\nknots = {knots}\n");
+        fs::write(folder.path().join("k.toml"), setup).unwrap();
+        let args = [
+            "reversal",
+            "data.csv",
+            "--setup",
+            "k.toml",
+            "--simultaneous",
+        ];
+        let (code, out, err) = run(folder.path(), &args);
+        assert_eq!(code, Some(1), "{err}");
+        assert!(out.is_empty());
+        assert!(
+            err.contains("at most 58") && err.contains("leave them out"),
+            "{err}"
+        );
+    }
+}
+
+#[test]
+fn an_indicator_that_stands_still_is_told() {
+    let folder = TempDir::new().unwrap();
+    let mut still = "x,1A,1B,2A,2B\n".to_owned();
+    for k in 0..20 {
+        still += &format!("{},1.5,1.5,1.5,1.5\n", 5 * k);
+    }
+    fs::write(folder.path().join("still.csv"), still).unwrap();
+    for method in [&[][..], &["--simultaneous"]] {
+        let args = [&["reversal", "still.csv"], method].concat();
+        let (code, text, err) = run(folder.path(), &args);
+        assert_eq!(code, Some(0), "{err}");
+        assert!(
+            text.contains("all readings of 1A, 1B, 2A, 2B are equal"),
+            "{text}"
+        );
+        assert!(!text.contains("Noise of one reading: 1"), "{text}");
+    }
+}

@@ -13,6 +13,7 @@ mod circle;
 mod diagnosis;
 mod four_sensor;
 mod machine;
+mod reversal;
 mod staged;
 mod step_diagonal;
 mod tally;
@@ -26,6 +27,7 @@ type Room = (&'static str, u64, fn(u64) -> Vec<Row>);
 
 /// One line a model.
 const ROOMS: &[Room] = &[
+    ("reversal", 2000, reversal::rows),
     ("staged", 2000, staged::rows),
     ("circle", 2000, circle::rows),
     ("four-sensor", 400, four_sensor::rows),

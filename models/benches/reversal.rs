@@ -66,7 +66,7 @@ fn by_readings(criterion: &mut Criterion) {
         group.sample_size(if n > 20_000 { 10 } else { 20 });
         for (name, noise) in [
             ("equal noise", Noise::Equal),
-            ("noise per channel", Noise::PerChannel),
+            ("noise per channel", Noise::Estimated),
         ] {
             let options = options(&basis, noise);
             group.bench_with_input(BenchmarkId::new(name, n), &n, |bencher, _| {

@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "splines" => splines(times)?,
         "pass" => passes(times, n)?,
         "fit" => fits(times, n, Noise::Equal)?,
-        "fit-by-channel" => fits(times, n, Noise::PerChannel)?,
+        "fit-by-channel" => fits(times, n, Noise::Estimated)?,
         _ => return Err(usage.into()),
     }
     Ok(())

@@ -46,7 +46,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         write(&observations, n, cells, &file)?;
     }
 
-    for (name, noise) in [("equal", Noise::Equal), ("by-channel", Noise::PerChannel)] {
+    for (name, noise) in [("equal", Noise::Equal), ("by-channel", Noise::Estimated)] {
         let options = Options {
             thickness: Thickness::Known(THICKNESS),
             noise,

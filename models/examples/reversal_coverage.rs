@@ -69,7 +69,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut tallies = vec![Tally::default(); 6];
     for seed in 0..seeds {
         plan.seed = 10_000 + seed;
-        let solution = fit(&simulate(&plan, &[])?.0, &options(Noise::PerChannel))?;
+        let solution = fit(&simulate(&plan, &[])?.0, &options(Noise::Estimated))?;
         for (j, tilt) in solution.tilts().iter().enumerate() {
             let error = tilt.angle.value - true_tilts[j];
             tallies[j].add(error, bound_tilts[j].angle.std, tilt.angle.std);

@@ -9,6 +9,7 @@ pub mod four_sensor;
 pub mod fourier;
 pub mod machine;
 pub mod model;
+pub mod noise;
 pub mod reversal;
 pub mod straightness;
 pub mod uncertainty;

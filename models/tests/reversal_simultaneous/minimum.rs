@@ -226,7 +226,7 @@ fn from_a_head_start_the_minimum_is_that_over_all_readings() {
     let lines = simultaneous::lines(&channels).unwrap();
     let seed = simultaneous::tilts(&unknowns, &lines);
     let start = simultaneous::start(&unknowns, &seed, &lines, 42.0);
-    for noise in [Noise::Equal, Noise::PerChannel] {
+    for noise in [Noise::Equal, Noise::Estimated] {
         let solution = fit(&observations, &options(&basis, 42.0, noise)).unwrap();
         let weights: Vec<f64> = match noise {
             Noise::Equal => vec![1.0; 4],
@@ -259,7 +259,7 @@ fn from_a_head_start_the_minimum_is_that_over_all_readings() {
             // Truncation: 1e-12 of a cost of 1800 lets a tilt move by 6e-5 of its uncertainty.
             assert!(error.abs() < 1e-4 * t.angle.std, "{}: {error:e}", t.name);
         }
-        if noise == Noise::PerChannel {
+        if noise == Noise::Estimated {
             // The fixed point: under these weights the noise comes out as one in every channel.
             for n in &solution.noise {
                 let left = n.readings as f64 * n.residual_rms.powi(2);
@@ -275,7 +275,7 @@ fn from_a_head_start_the_minimum_is_that_over_all_readings() {
 fn a_prediction_is_the_reading_less_its_residual() {
     let (plan, basis) = spline_plan(9, 61, 0.05, 5);
     let (observations, _) = simulate(&plan, &[]).unwrap();
-    let solution = fit(&observations, &options(&basis, 42.0, Noise::PerChannel)).unwrap();
+    let solution = fit(&observations, &options(&basis, 42.0, Noise::Estimated)).unwrap();
     for record in solution.records(&observations) {
         let predicted = solution
             .predict(record.reading.channel, record.reading.x)

@@ -25,7 +25,7 @@ fn uneven_traces_gaps_repeats_and_unequal_noise_stay_within_the_stated_uncertain
         }
     }
     let (observations, truth) = simulate(&plan, &[]).unwrap();
-    let solution = fit(&observations, &options(&basis, 42.0, Noise::PerChannel)).unwrap();
+    let solution = fit(&observations, &options(&basis, 42.0, Noise::Estimated)).unwrap();
     for (name, value) in truths(&truth) {
         let found = tilt(&solution, name);
         // k·u: four standard uncertainties of a fixed seed.
@@ -64,7 +64,7 @@ fn the_thickness_is_found_where_tilt_and_form_are_large() {
     let (mut plan, basis) = spline_plan(20, 200, 0.01, 8);
     plan.gamma_rad = 30e-3;
     let (observations, _) = simulate(&plan, &[]).unwrap();
-    let mut options = options(&basis, 0.0, Noise::PerChannel);
+    let mut options = options(&basis, 0.0, Noise::Estimated);
     options.thickness = Thickness::Fitted(20.0);
     let found = fit(&observations, &options).unwrap().thickness();
     // k·u.
@@ -79,7 +79,7 @@ fn outliers_do_not_count_under_a_robust_loss() {
     plan.outlier_size = 50.0;
     let (observations, truth) = simulate(&plan, &[]).unwrap();
     assert!(!truth.outliers.is_empty());
-    let mut options = options(&basis, 42.0, Noise::PerChannel);
+    let mut options = options(&basis, 42.0, Noise::Estimated);
     let plain = fit(&observations, &options).unwrap();
     options.loss = Loss::Huber { scale: 1.345 };
     let robust = fit(&observations, &options).unwrap();
@@ -108,7 +108,7 @@ fn outliers_do_not_count_under_a_robust_loss() {
 fn trials_give_the_uncertainty_of_the_covariance() {
     let (plan, basis) = spline_plan(8, 60, 0.05, 11);
     let (observations, _) = simulate(&plan, &[]).unwrap();
-    let solution = fit(&observations, &options(&basis, 42.0, Noise::PerChannel)).unwrap();
+    let solution = fit(&observations, &options(&basis, 42.0, Noise::Estimated)).unwrap();
     let x = [0.0, 77.0, 150.0, 300.0];
     let trials = 400;
     let spread = monte_carlo(&solution, &observations, &x, trials, 5).unwrap();
@@ -137,7 +137,7 @@ fn over_many_seeds_errors_are_as_large_as_stated() {
     for seed in 0..seeds {
         let (plan, basis) = spline_plan(6, 50, 0.05, 1000 + seed);
         let (observations, truth) = simulate(&plan, &[]).unwrap();
-        let solution = fit(&observations, &options(&basis, 42.0, Noise::PerChannel)).unwrap();
+        let solution = fit(&observations, &options(&basis, 42.0, Noise::Estimated)).unwrap();
         for (name, value) in truths(&truth) {
             let found = tilt(&solution, name);
             let z = (found.value - value) / found.std;

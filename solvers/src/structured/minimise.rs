@@ -69,12 +69,23 @@ impl Fit {
     }
 
     /// The value that held border unknowns would take if they were released too, to first order,
-    /// with its covariance for unit noise: is the model's fixed value right?
+    /// with the variance of that for unit noise: is the model's fixed value right?
     pub fn if_released<P: StructuredProblem>(
         &self,
         problem: &P,
         release: usize,
     ) -> Option<(f64, f64)> {
+        let (value, covariance) = self.released(problem, release)?;
+        Some((value, covariance.border()[(release, release)]))
+    }
+
+    /// The value that a held border unknown would take if it were released too, to first order, and
+    /// the covariance of all unknowns for unit noise then.
+    pub fn released<P: StructuredProblem>(
+        &self,
+        problem: &P,
+        release: usize,
+    ) -> Option<(f64, BorderedCovariance)> {
         let mut held = problem.held().to_vec();
         *held.get_mut(release)? = false;
         let missing = problem
@@ -88,11 +99,9 @@ impl Fit {
         if !solved.undetermined.is_empty() {
             return None;
         }
-        let variance =
-            BorderedCovariance::new(&self.evaluation.system, &solved).border()[(release, release)];
         Some((
             self.parameters.border[release] + solved.border[release],
-            variance,
+            BorderedCovariance::new(&self.evaluation.system, &solved),
         ))
     }
 }

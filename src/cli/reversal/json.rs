@@ -40,8 +40,18 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
             "rms": o.residual_rms,
             "noise": o.noise,
             "noise_source": o.noise_words,
+            "noise_law": o.noise_law.map(|law| json!({
+                "white": law.white.sqrt(),
+                "correlated": law.correlated.sqrt(),
+                "length": law.length,
+                "shift": law.shift.sqrt(),
+            })),
             "degrees_of_freedom": o.degrees_of_freedom,
             "channels": o.channel_noise.iter().map(|(c, s)| (c.name().to_owned(), json!(s))).collect::<Map<_, _>>(),
+        },
+        "agreement": {
+            "disagree": o.disagree,
+            "missed": {"value": o.missed, "unit": "um"},
         },
         "convergence": {
             "converged": true,

@@ -13,6 +13,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::ValueEnum;
+use errsep_models::reversal::Channel;
 use errsep_models::reversal::staged::Removal;
 use serde_json::Value;
 
@@ -80,7 +81,9 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let progress = super::progress("reading", None);
     let data = read(&args.data, &setup.columns)?;
     progress.set_message("solving");
-    let outcome = solve(args, &data, &setup)?;
+    let mut outcome = solve(args, &data, &setup)?;
+    outcome.warnings.extend(still(&data));
+    outcome.warnings.extend(pointer(args, &outcome));
     progress.finish_and_clear();
     let mut inputs = vec![args.data.clone()];
     inputs.extend(args.setup.clone());
@@ -107,6 +110,48 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         seed: None,
         status: Status::Done,
     })
+}
+
+/// Channels whose readings are all equal.
+fn still(data: &ReversalData) -> Option<String> {
+    let stands = |channel: &Channel| {
+        let mut readings = data.observations.of(*channel).map(|r| r.value);
+        let first = readings.next();
+        readings.all(|r| Some(r) == first)
+    };
+    let channels = data.observations.channels();
+    let names: Vec<&str> = channels
+        .iter()
+        .filter(|c| stands(c))
+        .map(|c| c.name())
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "all readings of {} are equal: an indicator that does not move, or whose resolution hides \
+             everything, tells nothing of the noise, and uncertainties are too small; check it, or \
+             state the noise in the set-up ([indicator] noise)",
+            names.join(", ")
+        )
+    })
+}
+
+/// Where to go from an answer whose model and readings disagree.
+fn pointer(args: &Args, o: &Outcome) -> Option<String> {
+    let closes = o
+        .closure
+        .as_ref()
+        .is_none_or(|c| !staged::does_not_close(c.slope));
+    if o.disagree != Some(true) && closes {
+        return None;
+    }
+    let mut command = format!("errsep diagnose {}", args.data.display());
+    if let Some(setup) = &args.setup {
+        command += &format!(" --setup {}", setup.display());
+    }
+    if args.columns.is_some() {
+        command += ", with the same --columns";
+    }
+    Some(format!("to see where they disagree and why: {command}"))
 }
 
 fn solve(args: &Args, data: &ReversalData, setup: &ReversalSetup) -> Result<Outcome, Message> {

@@ -1,5 +1,6 @@
 //! The answer of either solution, in one form for terminal, JSON, tables and report.
 
+use errsep_models::noise::Law;
 use errsep_models::reversal::staged::Value;
 use errsep_models::reversal::{Channel, Contrast, Convention};
 use errsep_models::straightness::{ReferenceLine, straightness};
@@ -70,9 +71,17 @@ pub struct Outcome {
     pub noise_words: String,
     pub channel_noise: Vec<(Channel, f64)>,
     pub degrees_of_freedom: f64,
-    /// How well the noise is known that every standard uncertainty is made of: infinite where it was
+    /// Variances of the parts of the noise of one reading, µm², where repeats tell them.
+    pub noise_law: Option<Law>,
+    /// How well the standard uncertainties of the angles are known: infinite where the noise was
     /// declared.
     pub noise_freedom: DegreesOfFreedom,
+    /// The same of the forms.
+    pub form_freedom: DegreesOfFreedom,
+    /// Whether model and readings disagree beyond the noise; absent where nothing tells.
+    pub disagree: Option<bool>,
+    /// What the model misses where they do, µm root mean square.
+    pub missed: f64,
     /// Name, root mean square in µm, where it comes from.
     pub method_errors: Vec<(String, f64, String)>,
     pub convergence: Convergence,

@@ -79,7 +79,7 @@ pub fn page(file: &Path, data: &ReversalData, setup: &ReversalSetup, o: &Outcome
                 residual: r.residual,
             })
             .collect(),
-        coverage_factor: coverage_factor(COVERAGE, o.noise_freedom).unwrap_or_default(),
+        coverage_factor: coverage_factor(COVERAGE, o.form_freedom).unwrap_or_default(),
         noise_um: Some(o.noise),
         noise_source: o.noise_words.clone(),
         channel_noise: o

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use errsep_models::reversal::simultaneous::{
-    self, ChannelNoise, KnotVerdict, Knots, Noise, Options, ReversalError, Simultaneous, Thickness,
+    self, ChannelNoise, KnotVerdict, Knots, Noise, NoiseOrigin, Options, ReversalError,
+    Simultaneous, Thickness,
 };
 use errsep_models::reversal::{Channel, Contrast, Observations};
 use errsep_models::uncertainty::DegreesOfFreedom;
@@ -25,7 +26,7 @@ pub fn solve(file: &Path, data: &ReversalData, setup: &ReversalSetup) -> Result<
             Some(d) if setup.fit_thickness => Thickness::Fitted(d),
             Some(d) => Thickness::Known(d),
         },
-        noise: setup.noise.map_or(Noise::PerChannel, Noise::Declared),
+        noise: setup.noise.map_or(Noise::Estimated, Noise::Declared),
         knots: setup.knots.map_or(Knots::Chosen, Knots::Cells),
         ..Options::default()
     };
@@ -49,9 +50,21 @@ fn refusal(why: &ReversalError, file: &Path, data: &ReversalData) -> Message {
             "read every channel at three or more different positions x",
         ),
         ReversalError::TooSteep { .. } => (Message::bad_input(why.to_string()), OTHER_UNITS),
-        ReversalError::TooFewReadings { .. } => (
+        ReversalError::TooFewReadings { .. } | ReversalError::TooFewPositions { .. } => (
             Message::bad_input(why.to_string()),
             "take more readings, or give fewer [model] knots in the set-up",
+        ),
+        ReversalError::TooFewToTellNoise { .. } => (
+            Message::not_solved(why.to_string()),
+            "give fewer [model] knots, state [indicator] noise in the set-up, or take more readings",
+        ),
+        ReversalError::TooManyKnots { .. } => (
+            Message::not_solved(why.to_string()),
+            "give no more [model] knots than that, or leave them out: they are chosen from the data",
+        ),
+        ReversalError::NotDetermined { .. } => (
+            Message::not_solved(why.to_string()),
+            "give fewer [model] knots, or leave them out: they are chosen from the data",
         ),
         _ => (
             Message::bad_input(why.to_string()),
@@ -106,14 +119,14 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         })
         .collect::<Vec<_>>();
     let x = positions(data);
-    let forms = fit
-        .forms(&x)
-        .into_iter()
+    let profiles = fit.forms(&x);
+    let forms = profiles
+        .iter()
         .map(|f| Form {
             is_single: errsep_models::reversal::staged::FORMS.contains(&f.name.as_str()),
-            name: f.name,
-            values: f.values,
-            std: f.std,
+            name: f.name.clone(),
+            values: f.values.clone(),
+            std: f.std.clone(),
         })
         .collect();
     let residuals = fit
@@ -158,19 +171,25 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         residual_rms: (squares / residuals.len().max(1) as f64).sqrt(),
         residuals,
         noise: (variance / readings).sqrt(),
-        noise_words: match setup.noise {
-            Some(_) => "declared in the set-up".to_owned(),
-            None => format!(
-                "estimated for each channel, {:.0} degrees of freedom together",
-                fit.degrees_of_freedom
-            ),
-        },
+        noise_words: noise_words(fit, data),
         channel_noise: fit.noise.iter().map(|n| (n.channel, n.sigma)).collect(),
         degrees_of_freedom: fit.degrees_of_freedom,
-        noise_freedom: match setup.noise {
-            Some(_) => DegreesOfFreedom::Infinite,
-            None => DegreesOfFreedom::Finite(fit.degrees_of_freedom.max(1.0)),
+        noise_law: match fit.noise_origin {
+            NoiseOrigin::Repeats(law) => Some(law),
+            _ => None,
         },
+        noise_freedom: freedom(
+            fit.tilts()
+                .iter()
+                .map(|t| t.degrees_of_freedom)
+                .chain(fit.closure.iter().map(|c| c.degrees_of_freedom)),
+        ),
+        form_freedom: freedom(profiles.iter().map(|f| f.degrees_of_freedom)),
+        disagree: match fit.knots.verdict {
+            KnotVerdict::TooFew => Some(true),
+            _ => fit.agreement.disagree,
+        },
+        missed: fit.agreement.missed,
         method_errors: Vec::new(),
         convergence: Convergence {
             reason: fit.convergence.ending.to_string(),
@@ -182,6 +201,60 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         warnings: warnings(fit, closure.as_ref(), setup),
         closure,
         tilts,
+    }
+}
+
+/// The least of some degrees of freedom.
+fn freedom(all: impl Iterator<Item = f64>) -> DegreesOfFreedom {
+    let least = all.fold(f64::INFINITY, f64::min);
+    if least.is_finite() {
+        DegreesOfFreedom::Finite(least.max(1.0))
+    } else {
+        DegreesOfFreedom::Infinite
+    }
+}
+
+/// Share of the noise that might be correlated, and over which part of the range, where nothing tells.
+const SUPPOSED: (f64, f64) = (0.5, 0.05);
+
+/// Where the noise comes from, and what is assumed of it.
+fn noise_words(fit: &Simultaneous, data: &Observations) -> String {
+    let alike = fit.noise.windows(2).all(|n| n[0].sigma == n[1].sigma);
+    let of = if alike {
+        "the same in all channels"
+    } else {
+        "the channels differ"
+    };
+    let source = match fit.noise_origin {
+        NoiseOrigin::Repeats(law) => {
+            let part = |variance: f64| number::plain(variance.sqrt(), 2);
+            return format!(
+                "from the repeats, {of}: white {} µm, correlated along a trace {} µm over {} mm,                  shift of a trace {} µm",
+                part(law.white),
+                part(law.correlated),
+                number::plain(law.length, 2),
+                part(law.shift)
+            );
+        }
+        NoiseOrigin::Declared => "declared in the set-up".to_owned(),
+        NoiseOrigin::Residuals => format!(
+            "from the residuals, {of}, {:.0} degrees of freedom",
+            fit.degrees_of_freedom
+        ),
+    };
+    let x = positions(data);
+    let (share, part) = SUPPOSED;
+    let length = part * (x.last().unwrap_or(&0.0) - x.first().unwrap_or(&0.0));
+    match fit.if_correlated(data, share, length) {
+        Ok(factors) if !factors.is_empty() => format!(
+            "{source}; taken as independent from reading to reading, which only repeats would \
+             show: were half of its variance correlated over {} mm along a trace, u of {} would be \
+             {} times as large",
+            number::plain(length, 2),
+            fit.tilts().first().map_or("", |t| t.name.as_str()),
+            number::plain(factors[0], 2)
+        ),
+        _ => source,
     }
 }
 
@@ -215,6 +288,13 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
 
 fn warnings(fit: &Simultaneous, closure: Option<&Closure>, setup: &ReversalSetup) -> Vec<String> {
     let mut warnings = Vec::new();
+    if fit.agreement.disagree == Some(true) && fit.agreement.missed > 0.0 {
+        warnings.push(format!(
+            "model and readings disagree: beside the noise the model misses {} µm (root mean square); \
+             the uncertainties count it as if it were noise, which is no substitute for finding it",
+            number::plain(fit.agreement.missed, 2)
+        ));
+    }
     if fit.knots.verdict == KnotVerdict::TooFew {
         warnings.push(format!(
             "residuals of neighbouring readings go together (correlation {}, {} standard deviations): \

@@ -74,7 +74,11 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         noise_words: noise_words(&s),
         channel_noise: Vec::new(),
         degrees_of_freedom: s.residual.degrees_of_freedom as f64,
+        noise_law: None,
         noise_freedom: freedom(s.noise.degrees_of_freedom),
+        form_freedom: freedom(s.noise.degrees_of_freedom),
+        disagree: profile_exceeds_noise(&s),
+        missed: 0.0,
         method_errors: method_errors(&s),
         convergence: Convergence {
             reason: "solved in stages, without iteration".to_owned(),
@@ -163,10 +167,15 @@ const SIGNIFICANT: f64 = 4.0;
 pub const NOTHING_CLOSES: &str = "with fewer than four channels nothing closes: drift, a poor reversal \
      and other errors of the method go unnoticed";
 
+/// Whether the slopes do not close within their uncertainty.
+pub fn does_not_close(slope: Value) -> bool {
+    slope.value.abs() > SIGNIFICANT * slope.std
+}
+
 /// Slopes that do not close.
 pub fn slope_warning(slope: Value, convention: Convention) -> Option<String> {
     let contrast = convention.closure();
-    (slope.value.abs() > SIGNIFICANT * slope.std).then(|| {
+    does_not_close(slope).then(|| {
         format!(
             "the slopes do not close: {} µrad in the contrast {} ({})",
             number::measured(urad_from_rad(slope.value), Some(urad_from_rad(slope.std))),
@@ -174,6 +183,14 @@ pub fn slope_warning(slope: Value, convention: Convention) -> Option<String> {
             contrast.meaning(convention)
         )
     })
+}
+
+/// Whether the closure profile is larger than the noise explains; absent where the noise is not known
+/// apart from the model.
+fn profile_exceeds_noise(s: &Staged) -> Option<bool> {
+    let known = s.noise.source == NoiseSource::Declared || s.noise.source == NoiseSource::Repeats;
+    let closure = s.closure.as_ref().filter(|_| known)?;
+    Some(closure.rms > 1.5 * closure.expected_rms)
 }
 
 fn warnings(s: &Staged, setup: &ReversalSetup) -> Vec<String> {
@@ -200,9 +217,7 @@ fn warnings(s: &Staged, setup: &ReversalSetup) -> Vec<String> {
     match &s.closure {
         Some(closure) => {
             warnings.extend(slope_warning(closure.slope, s.convention));
-            let known =
-                s.noise.source == NoiseSource::Declared || s.noise.source == NoiseSource::Repeats;
-            if known && closure.rms > 1.5 * closure.expected_rms {
+            if profile_exceeds_noise(s) == Some(true) {
                 warnings.push(format!(
                     "the closure profile, {} µm, is larger than the noise explains, {} µm: the model lacks something",
                     number::plain(closure.rms, 2),

@@ -96,11 +96,11 @@ fn write_all(t: &mut String, file: &Path, data: &ReversalData, o: &Outcome) -> s
     for tilt in &o.tilts {
         writeln!(
             t,
-            "  {:13} {} µrad, U = {} µrad ({}″)  {}",
+            "  {:13} {} µrad ({}″), U = {} µrad  {}",
             tilt.name,
             measured_urad(tilt.angle),
-            number::plain(urad_from_rad(k * tilt.angle.std), 2),
             number::plain(arcsec_from_rad(tilt.angle.value), 4),
+            number::plain(urad_from_rad(k * tilt.angle.std), 2),
             o.meaning(tilt)
         )?;
     }

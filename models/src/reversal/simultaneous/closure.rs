@@ -4,7 +4,7 @@ use errsep_solvers::structured::Fit;
 
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
-use super::solution::Closure;
+use super::solution::{Closure, Scatter};
 use crate::reversal::staged::Value;
 
 /// The closure: the contrast the convention holds at zero, if it were released; and the closure
@@ -14,17 +14,16 @@ pub fn of(
     result: &Fit,
     channels: &[ChannelReadings],
     residuals: &[Vec<f64>],
-    unit: f64,
+    scatter: &Scatter,
 ) -> Option<Closure> {
     let index = problem.unknowns.closure_index()?;
-    let (value, variance) = result.if_released(problem, index)?;
+    let (value, covariance) = result.released(problem, index)?;
+    let (std, degrees_of_freedom) = scatter.spread(&covariance, &[], &[(index, 1.0)]);
     let (x, profile) = profile(problem, channels, residuals);
     let rms = (profile.iter().map(|c| c * c).sum::<f64>() / profile.len().max(1) as f64).sqrt();
     Some(Closure {
-        slope: Value {
-            value,
-            std: unit * variance.sqrt(),
-        },
+        slope: Value { value, std },
+        degrees_of_freedom,
         x,
         profile,
         rms,

@@ -3,7 +3,11 @@
 use errsep_solvers::problem::NoValue;
 use thiserror::Error;
 
+use super::knots::FEWEST_POSITIONS;
 use crate::basis::bspline::BreakError;
+
+/// Fewest readings beyond the unknowns from which the noise is told.
+pub const FEWEST_FREE: usize = 3;
 
 /// Why there is no simultaneous solution.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -54,6 +58,46 @@ pub enum ReversalError {
         readings: usize,
         /// Number of unknowns.
         unknowns: usize,
+    },
+    /// Too few readings beside the unknowns to tell the noise.
+    #[error(
+        "{readings} readings beside {unknowns} unknowns leave {freedom} degrees of freedom: without a stated noise at least {FEWEST_FREE} are needed to tell the noise and with it the uncertainty"
+    )]
+    TooFewToTellNoise {
+        /// Number of readings.
+        readings: usize,
+        /// Number of unknowns.
+        unknowns: usize,
+        /// Their difference.
+        freedom: usize,
+    },
+    /// Too few positions for the forms of the shortest spline.
+    #[error(
+        "the readings of no channel have more than {positions} different positions; {FEWEST_POSITIONS} are needed"
+    )]
+    TooFewPositions {
+        /// Most different positions of any channel.
+        positions: usize,
+    },
+    /// More cells than the readings carry.
+    #[error("knots = {asked} are more than these readings carry: at most {most}")]
+    TooManyKnots {
+        /// How many are asked for.
+        asked: usize,
+        /// How many these readings carry.
+        most: usize,
+    },
+    /// A tilt that these readings leave open.
+    #[error(
+        "these readings do not determine {name} with {cells} knots: its standard uncertainty would be {times:.0} times that of a line through the readings"
+    )]
+    NotDetermined {
+        /// Its name.
+        name: String,
+        /// Number of cells.
+        cells: usize,
+        /// How many times.
+        times: f64,
     },
     /// Break points that carry no spline.
     #[error("knots: {0}")]

@@ -1,23 +1,28 @@
 //! The fit: seed, knots, minimisation, noise of the channels.
 
+use std::sync::Arc;
 use std::time::Instant;
 
+use errsep_solvers::linear::bordered::BorderedCovariance;
+use errsep_solvers::loss::Loss;
 use errsep_solvers::structured::{Options as Minimisation, Parameters, minimise};
 
-use rayon::prelude::*;
-
+use super::along::AlongTraces;
 use super::closure;
-use super::error::ReversalError;
+use super::error::{FEWEST_FREE, ReversalError};
 use super::gauge::Axis;
-use super::knots::{Choice, KnotTrial};
-use super::noise::{self, Settled, first_noise, weights_of};
+use super::knots::{self, Choice, FEWEST_POSITIONS, KnotTrial};
+use super::noise::{self, Left, Settled, Survey, freedom_left, sum_of_squares, weights_of};
 use super::options::{Knots, Noise, Options, Thickness};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
 use super::seed;
-use super::solution::{ChannelNoise, Convergence, FittedKnots, Simultaneous};
+use super::solution::{
+    Agreement, ChannelNoise, Convergence, FittedKnots, NoiseOrigin, Scatter, Simultaneous,
+};
 use super::unknowns::Unknowns;
 use crate::reversal::Observations;
+use crate::units::mm_from_um;
 
 /// Fits tilts, offsets and forms to all readings at once.
 ///
@@ -37,7 +42,8 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         Thickness::Known(mm) => (mm, false),
         Thickness::Fitted(mm) => (mm, true),
     };
-    let mut sigmas = first_noise(&channels, options.noise);
+    let survey = Survey::new(&channels, observations);
+    let mut sigmas = survey.first_noise(options.noise);
     let unknowns_of = |coefficients: usize| {
         Unknowns::new(
             channels.iter().map(|c| c.channel).collect(),
@@ -53,15 +59,13 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         thickness_mm,
         weights: &weights_of(&sigmas),
     };
-    let (breaks, table) = choose_breaks(&choice, &options.knots, unknowns_of)?;
+    let declared = matches!(options.noise, Noise::Declared(_));
+    let free = if declared { 0 } else { FEWEST_FREE };
+    let most = knots::most_cells(&channels, &unknowns_of(FEWEST_POSITIONS), free);
+    let (breaks, table) = choose_breaks(&choice, &options.knots, most, unknowns_of)?;
     let unknowns = unknowns_of(breaks.len() + 2);
     let readings = observations.readings.len();
-    if readings < unknowns.free_count() + 1 {
-        return Err(ReversalError::TooFewReadings {
-            readings,
-            unknowns: unknowns.free_count(),
-        });
-    }
+    enough(&channels, readings, unknowns.free_count(), free)?;
     let bases = match &options.knots {
         Knots::At(_) => {
             let basis = crate::basis::bspline::CubicBSpline::new(breaks.clone())?;
@@ -94,46 +98,43 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
     };
     let Settled {
         fit: result,
-        freedom,
+        residuals: by_channel,
+        known,
         history,
         first_run,
-    } = noise::settle(&mut problem, start, options, &mut sigmas)?;
+    } = noise::settle(&mut problem, start, options, &survey, &mut sigmas)?;
     let Some(covariance) = result.covariance() else {
         return Err(ReversalError::NotConverged {
             ending: result.ending.to_string(),
         });
     };
 
-    let by_channel = problem.residuals(&result.parameters)?;
-    let total: f64 = freedom.iter().sum();
-    // With equal noise rows are in units of one: their own scatter gives the unit.
-    let sigma_unit = match options.noise {
-        Noise::Equal if total > 0.0 => (2.0 * result.cost / total).sqrt(),
-        _ => 1.0,
+    let freedom = freedom_left(&problem);
+    let left = Left::of_residuals(&problem, &by_channel, known);
+    let robust = options.loss != Loss::Quadratic;
+    // Rows in units of the declared noise have a variance of one, and what the model misses; otherwise
+    // their own scatter tells it, with what the model misses in it.
+    let variance = match (declared, robust) {
+        (_, true) => noise::robust_unit(&problem, &by_channel).powi(2),
+        (true, _) => 1.0 + left.variance,
+        _ => weighted_squares(&by_channel, &problem.weights) / freedom,
     };
-    let unit = sigma_unit * noise::robust_unit(&problem, &by_channel);
-    let noise = channels
-        .par_iter()
-        .zip(&sigmas)
-        .zip(&freedom)
-        .zip(&by_channel)
-        .map(|(((c, sigma), freedom), residuals)| ChannelNoise {
-            channel: c.channel,
-            readings: c.len(),
-            residual_rms: rms(residuals),
-            sigma: sigma * sigma_unit,
-            degrees_of_freedom: *freedom,
-        })
-        .collect();
-    let closure = closure::of(&problem, &result, &channels, &by_channel, unit);
-    let knots = FittedKnots::new(breaks, table, &by_channel);
+    let scatter = Scatter::White {
+        variance,
+        freedom: if declared && left.variance <= 0.0 {
+            f64::INFINITY
+        } else {
+            freedom
+        },
+    };
+    let unit = if robust { 1.0 } else { variance.sqrt() };
     let mut residuals = vec![0.0; readings];
     for (channel, own) in channels.iter().zip(&by_channel) {
         for (i, r) in channel.source.iter().zip(own) {
             residuals[*i as usize] = *r;
         }
     }
-    Ok(Simultaneous {
+    let mut solution = Simultaneous {
         convention: options.convention,
         unknowns: problem.unknowns.clone(),
         bases: problem.bases.clone(),
@@ -141,21 +142,136 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         thickness_mm: problem.thickness(&result.parameters),
         cubics: problem.cubics(&result.parameters),
         gauge: problem.gauge().clone(),
-        parameters: result.parameters,
+        parameters: result.parameters.clone(),
         covariance,
-        unit_variance: unit * unit,
-        noise,
+        scatter,
+        weights: problem.weights.clone(),
+        noise: channel_noise(&channels, &sigmas, &by_channel, unit, freedom),
+        noise_origin: if declared {
+            NoiseOrigin::Declared
+        } else {
+            NoiseOrigin::Residuals
+        },
+        agreement: Agreement {
+            disagree: left.clear,
+            missed: left.variance.sqrt() * rms(&sigmas),
+        },
         residuals,
-        degrees_of_freedom: total,
-        closure,
-        knots,
+        degrees_of_freedom: freedom,
+        closure: None,
+        knots: FittedKnots::new(breaks, table, &by_channel),
         convergence: Convergence {
-            ending: result.ending,
+            ending: result.ending.clone(),
             history,
             first_run,
-            seconds: began.elapsed().as_secs_f64(),
+            seconds: 0.0,
         },
-    })
+    };
+    is_determined(&solution, &solution.covariance, &channels, &problem.weights)?;
+    if !declared && !robust && !survey.repeats.is_empty() {
+        let along = AlongTraces::new(&solution, &problem, &survey, &by_channel)?;
+        if let Some(along) = along {
+            let (law, missed) = (along.law(), along.missed_variance());
+            let unit = (law.variance() + missed).sqrt();
+            solution.noise = channel_noise(&channels, &sigmas, &by_channel, unit, freedom);
+            let mean_square = rms(&sigmas).powi(2);
+            solution.noise_origin = NoiseOrigin::Repeats(law.times(mean_square));
+            solution.agreement = Agreement {
+                disagree: Some(missed > 0.0),
+                missed: (missed * mean_square).sqrt(),
+            };
+            solution.scatter = Scatter::Along(Arc::new(along));
+        }
+    }
+    solution.closure = closure::of(&problem, &result, &channels, &by_channel, &solution.scatter);
+    solution.convergence.seconds = began.elapsed().as_secs_f64();
+    Ok(solution)
+}
+
+/// Whether there are as many readings and positions as the unknowns need.
+fn enough(
+    channels: &[ChannelReadings],
+    readings: usize,
+    unknowns: usize,
+    free: usize,
+) -> Result<(), ReversalError> {
+    if readings < unknowns {
+        return Err(ReversalError::TooFewReadings { readings, unknowns });
+    }
+    if readings < unknowns + free {
+        return Err(ReversalError::TooFewToTellNoise {
+            readings,
+            unknowns,
+            freedom: readings - unknowns,
+        });
+    }
+    let positions = knots::positions(channels);
+    if positions < FEWEST_POSITIONS {
+        return Err(ReversalError::TooFewPositions { positions });
+    }
+    Ok(())
+}
+
+/// A tilt's standard uncertainty is not determined beyond so many times that of a channel's line.
+const MOST_TIMES: f64 = 1e3;
+
+/// Whether the readings determine the tilts: each against the slope of the worst channel's line.
+fn is_determined(
+    solution: &Simultaneous,
+    covariance: &BorderedCovariance,
+    channels: &[ChannelReadings],
+    weights: &[f64],
+) -> Result<(), ReversalError> {
+    let line = channels
+        .iter()
+        .zip(weights)
+        .map(|(c, weight)| {
+            let mean = c.x.iter().sum::<f64>() / c.len() as f64;
+            let spread: f64 = c.x.iter().map(|x| (x - mean).powi(2)).sum();
+            mm_from_um(1.0) / (weight * spread.sqrt())
+        })
+        .fold(0.0, f64::max);
+    for (name, terms) in solution.tilt_terms() {
+        let times = covariance.variance(&[], &terms).sqrt() / line;
+        if !(times <= MOST_TIMES) {
+            return Err(ReversalError::NotDetermined {
+                name,
+                cells: solution.knots.cells(),
+                times,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn weighted_squares(residuals: &[Vec<f64>], weights: &[f64]) -> f64 {
+    let channels = residuals.iter().zip(weights);
+    channels
+        .map(|(own, weight)| weight * weight * sum_of_squares(own))
+        .sum()
+}
+
+/// The noise of the channels: the weights' standard deviations times the unit in which they are.
+fn channel_noise(
+    channels: &[ChannelReadings],
+    sigmas: &[f64],
+    residuals: &[Vec<f64>],
+    unit: f64,
+    freedom: f64,
+) -> Vec<ChannelNoise> {
+    let readings: usize = channels.iter().map(ChannelReadings::len).sum();
+    channels
+        .iter()
+        .zip(sigmas)
+        .zip(residuals)
+        .map(|((c, sigma), residuals)| ChannelNoise {
+            channel: c.channel,
+            readings: c.len(),
+            residual_rms: rms(residuals),
+            sigma: sigma * unit,
+            degrees_of_freedom: freedom * c.len() as f64 / readings as f64,
+        })
+        .collect()
 }
 
 fn check(observations: &Observations, options: &Options) -> Result<(), ReversalError> {
@@ -211,8 +327,7 @@ fn start_of_thickness(
     let held = minimise(problem, start, options)?;
     let released = held.if_released(problem, index);
     problem.hold(index, false);
-    let freedom: f64 = noise::shared_freedom(problem).iter().sum();
-    let unit = (2.0 * held.cost / freedom.max(1.0)).sqrt();
+    let unit = (2.0 * held.cost / freedom_left(problem).max(1.0)).sqrt();
     let std_mm = released.map_or(f64::INFINITY, |(_, variance)| unit * variance.sqrt());
     if std_mm > problem.thickness_mm {
         return Err(ReversalError::ThicknessNotDetermined { std_mm });
@@ -223,10 +338,17 @@ fn start_of_thickness(
 fn choose_breaks(
     choice: &Choice,
     knots: &Knots,
+    most: usize,
     unknowns_of: impl Fn(usize) -> Unknowns,
 ) -> Result<(Vec<f64>, Vec<KnotTrial>), ReversalError> {
     match knots {
         Knots::At(breaks) => Ok((breaks.clone(), Vec::new())),
+        Knots::Cells(asked) if *asked > most && most > 0 => Err(ReversalError::TooManyKnots {
+            asked: *asked,
+            most,
+        }),
+        // Not even one cell is carried: what is missing is told when the unknowns are counted.
+        Knots::Cells(_) if most == 0 => Ok((choice.breaks(&unknowns_of(4), 1)?, Vec::new())),
         Knots::Cells(cells) => Ok((choice.breaks(&unknowns_of(cells + 3), *cells)?, Vec::new())),
         Knots::Chosen => {
             let (cells, table) = choice.choose(&unknowns_of)?;
@@ -255,8 +377,5 @@ fn head_start(problem: &Reversal, start: &Parameters, options: Minimisation) -> 
 }
 
 fn rms(values: &[f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+    (sum_of_squares(values) / values.len().max(1) as f64).sqrt()
 }

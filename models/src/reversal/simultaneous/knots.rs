@@ -8,6 +8,7 @@
 use errsep_solvers::linear::bordered::Bordered;
 use errsep_solvers::structured::{StructuredProblem, evaluate};
 
+use super::error::FEWEST_FREE;
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
 use super::seed;
@@ -53,6 +54,26 @@ fn ladder(most: usize) -> impl Iterator<Item = usize> {
         })
         .take_while(move |cells| *cells <= most)
 }
+
+/// Number of different positions of the channel that has most.
+pub fn positions(channels: &[ChannelReadings]) -> usize {
+    let of = |c: &ChannelReadings| c.x.chunk_by(|a, b| a == b).count();
+    channels.iter().map(of).max().unwrap_or(0)
+}
+
+/// Most cells that readings carry: a spline of K cells with its slope and offset has K + 3 unknowns and
+/// needs as many positions (Schoenberg and Whitney 1953), and `free` readings more than all unknowns
+/// tell the noise. `unknowns` are those of any number of cells.
+pub fn most_cells(channels: &[ChannelReadings], unknowns: &Unknowns, free: usize) -> usize {
+    let readings: usize = channels.iter().map(ChannelReadings::len).sum();
+    let others = unknowns.free_count() - unknowns.band_count();
+    let by_readings = readings.saturating_sub(others + free) / unknowns.forms.len().max(1);
+    let by_positions = positions(channels).saturating_sub(FEWEST_POSITIONS - 1);
+    by_readings.saturating_sub(1).min(by_positions)
+}
+
+/// Positions that the spline of a single cell needs with its slope and offset.
+pub const FEWEST_POSITIONS: usize = 4;
 
 /// What the fits of the ladder share.
 pub struct Choice<'a> {
@@ -139,13 +160,7 @@ impl Choice<'_> {
         unknowns_of: impl Fn(usize) -> Unknowns,
     ) -> Result<(usize, Vec<KnotTrial>), ReversalError> {
         let readings: usize = self.channels.iter().map(ChannelReadings::len).sum();
-        let most = self
-            .channels
-            .iter()
-            .map(|c| c.x.chunk_by(|a, b| a == b).count())
-            .max()
-            .unwrap_or(0)
-            / POSITIONS_A_CELL;
+        let most = positions(self.channels) / POSITIONS_A_CELL;
         let mut table: Vec<KnotTrial> = Vec::new();
         let mut best = 0;
         for cells in std::iter::once(1).chain(ladder(most)) {
@@ -155,7 +170,7 @@ impl Choice<'_> {
             if table.last().is_some_and(|t| t.cells == breaks.len() - 1) {
                 continue;
             }
-            if readings < count + 2 {
+            if readings < count + FEWEST_FREE {
                 break;
             }
             let bases = self.bases(&unknowns, &breaks)?;

@@ -4,12 +4,14 @@
 //! [`Simultaneous`]: tilts with uncertainty, forms as functions with bands, the noise of every
 //! channel, residuals, knots and convergence. See `docs/theory/reversal-simultaneous.md`.
 
+mod along;
 mod closure;
 mod dense;
 mod error;
 mod fit;
 mod gauge;
 mod knots;
+mod levels;
 mod monte_carlo;
 mod noise;
 mod options;
@@ -20,6 +22,7 @@ mod rows;
 mod seed;
 mod solution;
 mod starts;
+mod traces;
 mod unknowns;
 
 pub use dense::DenseReversal;
@@ -33,8 +36,8 @@ pub use problem::Reversal;
 pub use readings::ChannelReadings;
 pub use seed::{lines, start, tilts};
 pub use solution::{
-    ChannelNoise, Closure, Convergence, FittedKnots, KnotVerdict, MOST_DENSE_READINGS, Prediction,
-    Profile, ResidualRecord, Simultaneous, Tilt,
+    Agreement, ChannelNoise, Closure, Convergence, FittedKnots, KnotVerdict, MOST_DENSE_READINGS,
+    NoiseOrigin, Prediction, Profile, ResidualRecord, Simultaneous, Tilt,
 };
 pub use unknowns::{Form, Unknowns};
 

@@ -4,12 +4,13 @@
 use errsep_solvers::structured::{Options as Minimisation, minimise};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 use super::error::ReversalError;
+use super::noise::Survey;
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
-use super::solution::Simultaneous;
+use super::solution::{NoiseOrigin, Simultaneous};
+use crate::noise::Law;
 use crate::reversal::Observations;
 
 /// What the trials say of one quantity.
@@ -66,14 +67,22 @@ pub fn monte_carlo(
         })
         .collect();
     let sigmas: Vec<f64> = solution.noise.iter().map(|n| n.sigma).collect();
+    let laws = laws(solution);
+    let sorted = channels.clone();
+    let survey = Survey::new(&sorted, observations);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut tilts: Vec<Vec<f64>> = Vec::new();
     let mut forms: Vec<Vec<f64>> = Vec::new();
     for _ in 0..trials {
-        for ((channel, model), sigma) in channels.iter_mut().zip(&models).zip(&sigmas) {
-            for (value, model) in channel.value.iter_mut().zip(model) {
-                let z: f64 = StandardNormal.sample(&mut rng);
-                *value = model + sigma * z;
+        for (c, (channel, model)) in channels.iter_mut().zip(&models).enumerate() {
+            for trace in &survey.traces[c] {
+                let rows: Vec<usize> = (0..trace.len()).map(|k| trace.row(k)).collect();
+                let x: Vec<f64> = rows.iter().map(|row| channel.x[*row]).collect();
+                let mut noise = vec![0.0; rows.len()];
+                laws[c].draw(&x, &mut rng, &mut noise);
+                for (row, noise) in rows.into_iter().zip(noise) {
+                    channel.value[row] = model[row] + noise;
+                }
             }
         }
         let problem = Reversal::new(
@@ -132,6 +141,15 @@ pub fn monte_carlo(
             })
             .collect(),
     })
+}
+
+/// The law of each channel's readings.
+fn laws(solution: &Simultaneous) -> Vec<Law> {
+    let variances = || solution.noise.iter().map(|n| n.sigma * n.sigma);
+    match solution.noise_origin {
+        NoiseOrigin::Repeats(law) => variances().map(|v| law.times(v / law.variance())).collect(),
+        NoiseOrigin::Declared | NoiseOrigin::Residuals => variances().map(Law::of_white).collect(),
+    }
 }
 
 fn spread(name: String, mut values: Vec<f64>) -> Spread {

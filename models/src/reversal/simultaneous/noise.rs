@@ -1,46 +1,120 @@
-//! The noise of the channels: a first guess, then estimated together with the fit.
+//! The noise of the channels beside the fit.
+//!
+//! All channels have one standard deviation, unless their own are told apart by neighbouring readings
+//! ([`Levels`]), never by what the model leaves of them: where a model misses anything, one channel could
+//! take it all and the others would be trusted. What the model misses is shared by all channels alike.
 
 use errsep_solvers::loss::Loss;
 use errsep_solvers::structured::{
-    Fit, Iteration, Minimiser, Options as Minimisation, Parameters, Progress, hat_traces, minimise,
+    Fit, Iteration, Options as Minimisation, Parameters, hat_traces, minimise,
 };
 
 use super::error::ReversalError;
+use super::levels::{Level, Levels};
 use super::options::{Noise, Options};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
+use super::traces::{self, Group, Trace};
+use crate::reversal::Observations;
 
 /// Rounds in which the channels' noise is estimated anew.
-const MOST_NOISE_ROUNDS: usize = 10;
+const MOST_ROUNDS: usize = 10;
 
-/// The noise has settled when no channel's changes by more than this share.
-const NOISE_SETTLED: f64 = 1e-4;
+/// The noise has settled when the weights change by no more than this share.
+const SETTLED: f64 = 1e-2;
+
+/// Under a robust loss the scale decides what counts as an outlier.
+const ROBUST_SETTLED: f64 = 1e-4;
 
 /// A robust fit is near its end, where curvature helps, when a step without it promises to lower
 /// the cost by less than this share.
 const NEAR: f64 = 0.1;
 
-/// A channel's noise is never taken below this share of the noisiest: a channel without any noise
-/// would otherwise be the only one to count.
-const LEAST_NOISE: f64 = 1e-6;
+/// Model and readings disagree where the variance left over exceeds the noise by so many standard
+/// deviations of the logarithm of their ratio.
+const CLEAR: f64 = 3.5;
 
-/// While a step promises to lower the cost by more than this share of it, residuals tell of the
-/// start, not of the noise.
-const FAR_FROM_MINIMUM: f64 = 0.5;
+/// The readings by trace, and the repeats.
+pub struct Survey<'a> {
+    pub channels: &'a [ChannelReadings],
+    pub traces: Vec<Vec<Trace>>,
+    /// The repeats of each channel and direction; empty where nothing was repeated.
+    pub repeats: Vec<Group>,
+}
+
+impl<'a> Survey<'a> {
+    /// Looks through the readings.
+    pub fn new(channels: &'a [ChannelReadings], observations: &Observations) -> Self {
+        let traces = traces::of(channels, observations);
+        let repeated = traces.iter().any(|t| t.len() > 1);
+        let mut repeats = if repeated {
+            traces::grouped(channels, &traces)
+        } else {
+            Vec::new()
+        };
+        if repeats.iter().all(|g| g.traces.len() < 2) {
+            repeats.clear();
+        }
+        Self {
+            channels,
+            traces,
+            repeats,
+        }
+    }
+
+    /// The mean of a channel's values in each cell of a trace of a group; NaN in empty cells.
+    pub fn cell_means(&self, group: &Group, trace: usize, values: &[Vec<f64>]) -> Vec<f64> {
+        let rows = &self.traces[group.channel][group.traces[trace]];
+        let own = &values[group.channel];
+        let mut means = vec![f64::NAN; group.positions.len()];
+        for (cell, range) in &group.on_cells[trace].cells {
+            let sum: f64 = range.clone().map(|k| own[rows.row(k)]).sum();
+            means[*cell] = sum / range.len() as f64;
+        }
+        means
+    }
+
+    /// The repeats of a group on the cells in which all have readings.
+    pub fn complete_means(&self, group: &Group, values: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let complete = group.complete();
+        (0..group.traces.len())
+            .map(|t| {
+                let means = self.cell_means(group, t, values);
+                complete.iter().map(|cell| means[*cell]).collect()
+            })
+            .collect()
+    }
+
+    /// First guess of each channel's noise, µm, from the readings themselves.
+    pub fn first_noise(&self, noise: Noise) -> Vec<f64> {
+        match noise {
+            Noise::Declared(sigma) => vec![sigma; self.channels.len()],
+            Noise::Equal => vec![1.0; self.channels.len()],
+            Noise::Estimated => {
+                let values: Vec<Vec<f64>> = self.channels.iter().map(|c| c.value.clone()).collect();
+                let levels = Levels::along(self.channels, &self.traces, &values);
+                levels.sigmas(&vec![1.0; self.channels.len()])
+            }
+        }
+    }
+}
 
 /// A fit with settled noise.
 pub struct Settled {
     /// The fit under the last weights.
     pub fit: Fit,
-    /// Degrees of freedom of each channel.
-    pub freedom: Vec<f64>,
+    /// Reading less model, µm, by channel in the order of its sorted readings.
+    pub residuals: Vec<Vec<f64>>,
+    /// What the noise is known to be apart from the model, in weighted units; `None` where nothing
+    /// tells.
+    pub known: Option<Level>,
     /// One record a pass over all readings.
     pub history: Vec<Iteration>,
     /// How many of them until the first minimum.
     pub first_run: usize,
 }
 
-/// Minimises, and estimates the noise of each channel if that is asked for.
+/// Minimises, and finds the weights of the channels if they are asked for.
 ///
 /// # Errors
 /// [`ReversalError`] where the model is not defined.
@@ -48,120 +122,216 @@ pub fn settle(
     problem: &mut Reversal,
     start: Parameters,
     options: &Options,
+    survey: &Survey,
     sigmas: &mut Vec<f64>,
 ) -> Result<Settled, ReversalError> {
-    let estimated = options.noise == Noise::PerChannel;
-    if options.loss == Loss::Quadratic && estimated {
-        return settle_on_the_way(problem, start, options, sigmas);
-    }
-    let near = Minimisation {
-        cost_tolerance: NEAR,
-        ..options.minimisation
-    };
     let robust = options.loss != Loss::Quadratic;
-    let first = if robust { near } else { options.minimisation };
-    let mut fit = minimise(problem, start, first)?;
-    let mut history = fit.iterations.clone();
-    if robust {
-        // From the least-squares solution on, outliers are those of the readings, not of the start.
-        problem.loss = options.loss;
-        for (far, stop) in [(true, near), (false, options.minimisation)] {
-            if !fit.converged() {
-                break;
-            }
-            problem.far = far;
-            fit = minimise(problem, fit.parameters, stop)?;
-            history.extend(&fit.iterations);
-        }
-    }
+    let (mut fit, mut history) = first_fit(problem, start, options)?;
     let first_run = history.len();
-    let mut freedom = shared_freedom(problem);
-    for _ in 0..MOST_NOISE_ROUNDS {
-        let Some(covariance) = fit.covariance().filter(|_| estimated) else {
+    let mut residuals = problem.residuals(&fit.parameters)?;
+    let mut known = match options.noise {
+        Noise::Declared(_) => Some(Level {
+            variance: 1.0,
+            freedom: f64::INFINITY,
+        }),
+        _ => None,
+    };
+    // Variance that every channel has got for what the model misses.
+    let mut missed = 0.0;
+    for round in 0..MOST_ROUNDS {
+        if matches!(options.noise, Noise::Declared(_)) || !fit.converged() {
             break;
-        };
-        let traces = hat_traces(problem, &fit.parameters, &covariance)?;
-        freedom = freedom_left(problem, &traces);
-        let residuals = problem.residuals(&fit.parameters)?;
-        let next = floored(robust_sigmas(&residuals, &freedom));
-        let change = largest_change(&next, sigmas);
+        }
+        let levels = levels(survey, &residuals);
+        let mut next = told_apart(problem, &fit, &levels, options, survey)?;
+        known = known_level(problem, &levels, sigmas);
+        if robust {
+            let scale = robust_scale(&residuals, &next, freedom_left(problem));
+            next.iter_mut().for_each(|s| *s *= scale);
+        } else if !all_equal(&next) && (round > 0 || !all_equal(sigmas)) {
+            // Weights by the noise alone would hand what the model misses to the noisiest channel.
+            missed = shared_misfit(&residuals, &next, &levels, freedom_left(problem), missed);
+            next.iter_mut().for_each(|s| *s = s.hypot(missed.sqrt()));
+        }
+        if change(&next, sigmas, robust) <= if robust { ROBUST_SETTLED } else { SETTLED } {
+            break;
+        }
         *sigmas = next;
         problem.weights = weights_of(sigmas);
-        if change <= NOISE_SETTLED {
-            break;
-        }
         fit = minimise(problem, fit.parameters, options.minimisation)?;
         history.extend(&fit.iterations);
+        residuals = problem.residuals(&fit.parameters)?;
     }
     Ok(Settled {
         fit,
-        freedom,
+        residuals,
+        known,
         history,
         first_run,
     })
 }
 
-/// Least squares: at every point the noise is brought to its fixed point on the linear prediction,
-/// whose rows are at hand in compressed form; no pass over the readings is spent on it.
-///
-/// σ_c² = RSS_c/(n_c − tr H_c), the iterated estimate of variance components that is unbiased at
-/// its fixed point (Förstner 1979).
-fn settle_on_the_way(
+/// The fit under the first weights; under a robust loss least squares first, so that outliers are
+/// those of the readings, not of the start.
+fn first_fit(
     problem: &mut Reversal,
     start: Parameters,
     options: &Options,
-    sigmas: &mut Vec<f64>,
-) -> Result<Settled, ReversalError> {
-    let mut freedom = shared_freedom(problem);
-    let mut minimiser = Minimiser::gathering(problem, start, options.minimisation)?;
-    let ending = loop {
-        for _ in 0..MOST_NOISE_ROUNDS {
-            let Some(parts) = minimiser.parts(problem) else {
-                break;
-            };
-            let far = !(parts.predicted <= FAR_FROM_MINIMUM * minimiser.cost());
-            if far && !parts.last {
-                break;
-            }
-            freedom = freedom_left(problem, &parts.traces);
-            let next = floored(
-                sigmas
-                    .iter()
-                    .zip(&parts.squares)
-                    .zip(&freedom)
-                    .map(|((sigma, squares), freedom)| sigma * (squares / freedom).sqrt())
-                    .collect(),
-            );
-            let change = largest_change(&next, sigmas);
-            if change <= NOISE_SETTLED {
-                break;
-            }
-            let factors: Vec<f64> = sigmas
-                .iter()
-                .zip(&next)
-                .map(|(old, new)| old / new)
-                .collect();
-            minimiser.reweigh(&factors);
-            *sigmas = next;
-            problem.weights = weights_of(sigmas);
-            // The next change is smaller by the share of the readings that unknowns use up.
-            let readings = problem.channels.iter().map(|c| c.len() as f64);
-            let used = parts.traces.iter().zip(readings).map(|(t, n)| t / n);
-            if change * used.fold(0.0, f64::max) <= NOISE_SETTLED {
-                break;
-            }
-        }
-        if let Progress::Done(ending) = minimiser.advance(problem) {
-            break ending;
-        }
+) -> Result<(Fit, Vec<Iteration>), ReversalError> {
+    if options.loss == Loss::Quadratic {
+        let fit = minimise(problem, start, options.minimisation)?;
+        let history = fit.iterations.clone();
+        return Ok((fit, history));
+    }
+    let near = Minimisation {
+        cost_tolerance: NEAR,
+        ..options.minimisation
     };
-    let fit = minimiser.finish(ending);
-    Ok(Settled {
-        freedom,
-        history: fit.iterations.clone(),
-        first_run: fit.iterations.len(),
-        fit,
-    })
+    let mut fit = minimise(problem, start, near)?;
+    let mut history = fit.iterations.clone();
+    problem.loss = options.loss;
+    for (far, stop) in [(true, near), (false, options.minimisation)] {
+        if !fit.converged() {
+            break;
+        }
+        problem.far = far;
+        fit = minimise(problem, fit.parameters, stop)?;
+        history.extend(&fit.iterations);
+    }
+    Ok((fit, history))
+}
+
+/// What neighbours tell of each channel's noise: in contrasts of the repeats of every channel, else in
+/// the residuals.
+fn levels(survey: &Survey, residuals: &[Vec<f64>]) -> Levels {
+    let repeated = Levels::of_repeats(survey.channels.len(), &survey.repeats, |group| {
+        survey.complete_means(group, residuals)
+    });
+    if repeated.0.iter().all(|l| l.freedom > 0.0) {
+        repeated
+    } else {
+        Levels::along(survey.channels, &survey.traces, residuals)
+    }
+}
+
+/// The share of its readings with which a channel tells of its own noise. H the hat matrix, the
+/// information on the variances of channels a and b in the residuals is ½‖(I − H)_ab‖², and with
+/// Σ_b ‖H_ab‖² = tr H_aa its least eigenvalue is at least ½ min (n_a − 3 tr H_aa).
+fn share_left(readings: usize, used: f64) -> f64 {
+    1.0 - 3.0 * used / readings as f64
+}
+
+/// The channels' standard deviations as far as they are told apart.
+fn told_apart(
+    problem: &Reversal,
+    fit: &Fit,
+    levels: &Levels,
+    options: &Options,
+    survey: &Survey,
+) -> Result<Vec<f64>, ReversalError> {
+    let channels = problem.channels.len();
+    if options.noise == Noise::Equal || !levels.differ() {
+        return Ok(levels.sigmas(&vec![0.0; channels]));
+    }
+    let kept = match fit.covariance() {
+        // Repeats tell of their noise whatever the fit does.
+        _ if !survey.repeats.is_empty() => vec![1.0; channels],
+        None => vec![0.0; channels],
+        Some(covariance) => hat_traces(problem, &fit.parameters, &covariance)?
+            .into_iter()
+            .zip(problem.channels)
+            .map(|(used, c)| share_left(c.len(), used))
+            .collect(),
+    };
+    Ok(levels.sigmas(&kept))
+}
+
+/// What is known of the noise apart from the model, in units of the weights; `None` where the model
+/// has so many unknowns that neighbours are part of it.
+fn known_level(problem: &Reversal, levels: &Levels, sigmas: &[f64]) -> Option<Level> {
+    let readings: usize = problem.channels.iter().map(ChannelReadings::len).sum();
+    if share_left(readings, problem.unknowns.free_count() as f64) <= 0.0 {
+        return None;
+    }
+    let weighted = levels.0.iter().zip(sigmas).map(|(l, s)| Level {
+        variance: l.variance / (s * s),
+        ..*l
+    });
+    let pooled = Levels(weighted.collect()).pooled();
+    (pooled.freedom > 0.0).then_some(pooled)
+}
+
+/// Whether the variance left by a fit exceeds the noise clearly.
+fn exceeds(left: f64, freedom: f64, known: Level) -> bool {
+    let doubt = (2.0 / known.freedom + 2.0 / freedom).sqrt();
+    left > known.variance * (CLEAR * doubt).exp()
+}
+
+/// What is left of the readings beside the noise: whether the model clearly misses something, and how
+/// much, in weighted units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Left {
+    /// Whether it does, where anything tells.
+    pub clear: Option<bool>,
+    /// Variance of what it misses; zero where that is not clear.
+    pub variance: f64,
+}
+
+impl Left {
+    /// From the residuals of single traces against what is known of the noise.
+    pub fn of_residuals(problem: &Reversal, residuals: &[Vec<f64>], known: Option<Level>) -> Self {
+        let freedom = freedom_left(problem);
+        let squares: f64 = residuals
+            .iter()
+            .zip(&problem.weights)
+            .map(|(own, weight)| weight * weight * sum_of_squares(own))
+            .sum();
+        let left = squares / freedom;
+        let clear = known
+            .filter(|_| freedom > 0.0)
+            .map(|known| exceeds(left, freedom, known));
+        Self {
+            clear,
+            variance: match (clear, known) {
+                (Some(true), Some(known)) => (left - known.variance).max(0.0),
+                _ => 0.0,
+            },
+        }
+    }
+}
+
+/// The variance, the same in every channel, that beside the noise accounts for the residuals:
+/// Σ RSS_c/(σ_c² + s) = ν (after Mandel and Paule 1970); zero where the noise alone does.
+fn shared_misfit(
+    residuals: &[Vec<f64>],
+    sigmas: &[f64],
+    levels: &Levels,
+    freedom: f64,
+    before: f64,
+) -> f64 {
+    let squares: Vec<f64> = residuals.iter().map(|r| sum_of_squares(r)).collect();
+    let left = |s: f64| -> f64 {
+        let shares = squares.iter().zip(sigmas);
+        shares.map(|(rss, sigma)| rss / (sigma * sigma + s)).sum()
+    };
+    let known = Level {
+        variance: 1.0,
+        freedom: levels.pooled().freedom,
+    };
+    if before <= 0.0 && !exceeds(left(0.0) / freedom, freedom, known) {
+        return 0.0;
+    }
+    let (mut low, mut high) = (0.0, squares.iter().sum::<f64>() / freedom);
+    // Halving to rounding.
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if left(middle) > freedom {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
 }
 
 /// 1/σ by channel.
@@ -169,65 +339,46 @@ pub fn weights_of(sigmas: &[f64]) -> Vec<f64> {
     sigmas.iter().map(|s| 1.0 / s).collect()
 }
 
-fn largest_change(next: &[f64], sigmas: &[f64]) -> f64 {
-    let shares = next.iter().zip(sigmas).map(|(a, b)| (a / b - 1.0).abs());
-    shares.fold(0.0, f64::max)
+fn all_equal(sigmas: &[f64]) -> bool {
+    sigmas.windows(2).all(|pair| pair[0] == pair[1])
 }
 
-/// Degrees of freedom of each channel if unknowns are shared out by readings.
-pub fn shared_freedom(problem: &Reversal) -> Vec<f64> {
-    let used = problem.unknowns.free_count() as f64;
+/// The largest change, relative: of the standard deviations, or of their ratios where nothing hangs on
+/// the scale.
+fn change(next: &[f64], sigmas: &[f64], scale_counts: bool) -> f64 {
+    let ratios: Vec<f64> = next.iter().zip(sigmas).map(|(a, b)| a / b).collect();
+    let unit = match ratios.first() {
+        Some(first) if !scale_counts => *first,
+        _ => 1.0,
+    };
+    let changes = ratios.iter().map(|r| (r / unit - 1.0).abs());
+    changes.fold(0.0, f64::max)
+}
+
+/// Readings less unknowns.
+pub fn freedom_left(problem: &Reversal) -> f64 {
     let readings: usize = problem.channels.iter().map(ChannelReadings::len).sum();
-    problem
-        .channels
-        .iter()
-        .map(|c| c.len() as f64 * (1.0 - used / readings as f64))
-        .collect()
+    readings as f64 - problem.unknowns.free_count() as f64
 }
 
-/// Degrees of freedom of each channel: readings less the trace of its part of the hat matrix.
-fn freedom_left(problem: &Reversal, traces: &[f64]) -> Vec<f64> {
-    problem
-        .channels
-        .iter()
-        .zip(traces)
-        .map(|(c, trace)| (c.len() as f64 - trace).max(1.0))
-        .collect()
-}
-
-/// Under a robust loss the median of the residuals takes the place of their squares.
-fn robust_sigmas(residuals: &[Vec<f64>], freedom: &[f64]) -> Vec<f64> {
-    residuals
-        .iter()
-        .zip(freedom)
-        .map(|(own, freedom)| {
-            let mut sizes: Vec<f64> = own.iter().map(|r| r.abs()).collect();
-            let middle = sizes.len() / 2;
-            let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-            // The median of |z| of a normal z is 0.6745 σ.
-            *median / 0.6745 * (own.len() as f64 / freedom).sqrt()
-        })
-        .collect()
-}
-
-fn floored(sigmas: Vec<f64>) -> Vec<f64> {
-    let largest = sigmas.iter().fold(0.0_f64, |m, s| m.max(*s));
-    if !(largest > 0.0) {
-        return vec![1.0; sigmas.len()];
-    }
-    sigmas
-        .into_iter()
-        .map(|s| s.max(LEAST_NOISE * largest))
-        .collect()
+/// Under a robust loss the median of all residuals takes the place of their squares; in units of the
+/// channels' standard deviations.
+fn robust_scale(residuals: &[Vec<f64>], sigmas: &[f64], freedom: f64) -> f64 {
+    let scaled = residuals.iter().zip(sigmas);
+    let mut sizes: Vec<f64> = scaled
+        .flat_map(|(own, sigma)| own.iter().map(move |r| (r / sigma).abs()))
+        .collect();
+    let count = sizes.len();
+    let (_, median, _) = sizes.select_nth_unstable_by(count / 2, f64::total_cmp);
+    // The median of |z| of a normal z is 0.6745 σ.
+    let scale = *median / 0.6745 * (count as f64 / freedom).sqrt();
+    if scale > 0.0 { scale } else { 1.0 }
 }
 
 /// By how much a robust loss stretches the standard uncertainty: the rows, each times its factor w,
 /// have given (Σ w² J Jᵀ)⁻¹; the covariance is E[ψ²]/E[ψ′]² (JᵀJ)⁻¹ (Huber 1981, section 7.6),
 /// ψ = ρ′ r.
 pub fn robust_unit(problem: &Reversal, residuals: &[Vec<f64>]) -> f64 {
-    if problem.loss == Loss::Quadratic {
-        return 1.0;
-    }
     let (mut squares, mut slopes, mut weights) = (0.0, 0.0, 0.0);
     for (own, weight) in residuals.iter().zip(&problem.weights) {
         for r in own {
@@ -246,54 +397,6 @@ pub fn robust_unit(problem: &Reversal, residuals: &[Vec<f64>]) -> f64 {
     }
 }
 
-/// First guess of each channel's noise, µm: from every reading against the line through its
-/// neighbours, by the median, so that neither smooth forms nor outliers count.
-pub fn first_noise(channels: &[ChannelReadings], noise: Noise) -> Vec<f64> {
-    match noise {
-        Noise::Declared(sigma) => vec![sigma; channels.len()],
-        Noise::Equal => vec![1.0; channels.len()],
-        Noise::PerChannel => {
-            let guesses: Vec<f64> = channels.iter().map(median_second_difference).collect();
-            let largest = guesses.iter().fold(0.0_f64, |m, g| m.max(*g));
-            // Channels whose readings show no noise at all get a share of the noisiest.
-            guesses
-                .into_iter()
-                .map(|g| {
-                    if largest > 0.0 {
-                        g.max(1e-3 * largest)
-                    } else {
-                        1.0
-                    }
-                })
-                .collect()
-        }
-    }
-}
-
-/// Most differences that enter the median.
-const DIFFERENCES: usize = 4096;
-
-fn median_second_difference(channel: &ChannelReadings) -> f64 {
-    let count = channel.len().saturating_sub(2);
-    let step = count.div_ceil(DIFFERENCES).max(1);
-    let mut scaled: Vec<f64> = (0..count)
-        .step_by(step)
-        .map(|i| {
-            let (x, y) = (&channel.x[i..i + 3], &channel.value[i..i + 3]);
-            let share = if x[2] > x[0] {
-                (x[1] - x[0]) / (x[2] - x[0])
-            } else {
-                0.5
-            };
-            let rest = y[1] - (1.0 - share) * y[0] - share * y[2];
-            rest.abs() / (1.0 + share * share + (1.0 - share) * (1.0 - share)).sqrt()
-        })
-        .collect();
-    if scaled.is_empty() {
-        return 0.0;
-    }
-    let middle = scaled.len() / 2;
-    let (_, median, _) = scaled.select_nth_unstable_by(middle, f64::total_cmp);
-    // The median of |z| of a normal z is 0.6745 σ.
-    *median / 0.6745
+pub fn sum_of_squares(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum()
 }

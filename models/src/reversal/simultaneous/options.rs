@@ -38,9 +38,10 @@ pub enum Thickness {
 /// What is known of the noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Noise {
-    /// Nothing: estimated for every channel by itself.
+    /// Nothing: one standard deviation for all channels, unless neighbouring readings or repeats tell
+    /// the channels apart.
     #[default]
-    PerChannel,
+    Estimated,
     /// The same in every channel, to be estimated.
     Equal,
     /// The standard deviation of one reading, µm.

@@ -1,5 +1,7 @@
 //! The simultaneous solution and what can be asked of it.
 
+use std::sync::Arc;
+
 use errsep_solvers::linear::bordered::{BorderedCovariance, Constraints};
 use errsep_solvers::outcome::Ending;
 use errsep_solvers::problem::NoValue;
@@ -7,10 +9,15 @@ use errsep_solvers::structured::{Iteration, Parameters};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::along::{AlongTraces, Gathered};
 use super::gauge::Axis;
 use super::knots::KnotTrial;
+use super::noise::Survey;
+use super::readings::ChannelReadings;
+use super::traces;
 use super::unknowns::{Form, Unknowns};
 use crate::basis::bspline::{Cubic, CubicBSpline, horner, horner_slope};
+use crate::noise::Law;
 use crate::reversal::combinations::determined;
 use crate::reversal::forward::Attitude;
 use crate::reversal::staged::Value;
@@ -26,6 +33,8 @@ pub struct Tilt {
     pub combination: Combination,
     /// Value, rad.
     pub angle: Value,
+    /// Degrees of freedom of its standard uncertainty; infinite where the noise is declared.
+    pub degrees_of_freedom: f64,
 }
 
 /// A form, or a combination of forms, at some positions.
@@ -39,6 +48,8 @@ pub struct Profile {
     pub values: Vec<f64>,
     /// Standard uncertainties, µm.
     pub std: Vec<f64>,
+    /// Degrees of freedom of these: the fewest of any point.
+    pub degrees_of_freedom: f64,
 }
 
 /// The noise of one channel.
@@ -52,8 +63,58 @@ pub struct ChannelNoise {
     pub residual_rms: f64,
     /// Standard deviation of one reading, µm.
     pub sigma: f64,
-    /// Readings less the unknowns they use up.
+    /// Its share of the readings less the unknowns.
     pub degrees_of_freedom: f64,
+}
+
+/// Whether model and readings agree within the noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Agreement {
+    /// Whether they clearly do not; `None` where nothing tells the noise apart from the model.
+    pub disagree: Option<bool>,
+    /// What the model misses, µm root mean square of the readings; zero where that is not clear.
+    pub missed: f64,
+}
+
+/// Where the noise comes from that the uncertainties are made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoiseOrigin {
+    /// Declared: white.
+    Declared,
+    /// White, from what the fit leaves of the readings.
+    Residuals,
+    /// From what differs between repeats: variances of the parts of one reading, µm².
+    Repeats(Law),
+}
+
+/// What makes a standard uncertainty of a quantity's weights on the readings.
+#[derive(Debug, Clone)]
+pub(super) enum Scatter {
+    /// White noise of this variance, in weighted units.
+    White { variance: f64, freedom: f64 },
+    /// Noise along traces, as repeats tell.
+    Along(Arc<AlongTraces>),
+}
+
+impl Scatter {
+    /// Standard uncertainty of a combination of unknowns, and its degrees of freedom.
+    pub fn spread(
+        &self,
+        covariance: &BorderedCovariance,
+        band: &[(usize, f64)],
+        border: &[(usize, f64)],
+    ) -> (f64, f64) {
+        match self {
+            Self::White { variance, freedom } => (
+                (variance * covariance.variance(band, border)).sqrt(),
+                *freedom,
+            ),
+            Self::Along(along) => {
+                let (variance, freedom) = along.variance(covariance, band, border);
+                (variance.max(0.0).sqrt(), freedom)
+            }
+        }
+    }
 }
 
 /// What the redundancy of four channels says.
@@ -61,6 +122,8 @@ pub struct ChannelNoise {
 pub struct Closure {
     /// The contrast that the convention holds at zero, as the readings would have it, rad.
     pub slope: Value,
+    /// Degrees of freedom of its standard uncertainty.
+    pub degrees_of_freedom: f64,
     /// Positions of the profile, mm.
     pub x: Vec<f64>,
     /// (R1A + R1B − R2A − R2B)/4 of the residuals, µm.
@@ -192,9 +255,14 @@ pub struct Simultaneous {
     pub(super) gauge: Constraints,
     pub(super) parameters: Parameters,
     pub(super) covariance: BorderedCovariance,
-    pub(super) unit_variance: f64,
+    pub(super) scatter: Scatter,
+    pub(super) weights: Vec<f64>,
     /// Noise of the channels.
     pub noise: Vec<ChannelNoise>,
+    /// Where the noise comes from.
+    pub noise_origin: NoiseOrigin,
+    /// Whether model and readings agree.
+    pub agreement: Agreement,
     /// Reading less model, µm, in the order of the observations.
     pub residuals: Vec<f64>,
     /// Readings less unknowns.
@@ -218,27 +286,50 @@ impl Simultaneous {
 
     /// The tilts, or the combinations of tilts which the channels determine.
     pub fn tilts(&self) -> Vec<Tilt> {
+        self.tilt_combinations()
+            .into_iter()
+            .map(|(name, combination)| {
+                let border = self.tilt_weights(&combination);
+                let (angle, degrees_of_freedom) = self.border_combination(&border);
+                Tilt {
+                    name,
+                    angle,
+                    degrees_of_freedom,
+                    combination,
+                }
+            })
+            .collect()
+    }
+
+    /// The combinations of tilts that the channels determine, by name.
+    fn tilt_combinations(&self) -> Vec<(String, Combination)> {
         let contrasts = self.convention.tilts();
         let channels = self.channels();
         let design = DMatrix::from_fn(channels.len(), 3, |r, c| contrasts[c].sign(channels[r]));
         let names = contrasts.map(|c| c.name(self.convention));
         determined(&design, &[])
             .into_iter()
-            .map(|combination| {
-                // Σ weight·slope, each slope a sum of the fitted tilts.
-                let mut border = vec![0.0; self.unknowns.border_count()];
-                for (c, weight) in combination.weights.iter().enumerate() {
-                    for (j, sign) in self.unknowns.slope_signs(c).into_iter().enumerate() {
-                        border[j] += weight * sign;
-                    }
-                }
-                Tilt {
-                    name: combination.name(&names),
-                    angle: self.border_combination(&border),
-                    combination,
-                }
-            })
+            .map(|combination| (combination.name(&names), combination))
             .collect()
+    }
+
+    /// The same with their weights on the border's unknowns.
+    pub(super) fn tilt_terms(&self) -> Vec<(String, Vec<(usize, f64)>)> {
+        self.tilt_combinations()
+            .into_iter()
+            .map(|(name, combination)| (name, terms(&self.tilt_weights(&combination))))
+            .collect()
+    }
+
+    /// Σ weight·slope, each slope a sum of the fitted tilts: weights on the border's unknowns.
+    fn tilt_weights(&self, combination: &Combination) -> Vec<f64> {
+        let mut border = vec![0.0; self.unknowns.border_count()];
+        for (c, weight) in combination.weights.iter().enumerate() {
+            for (j, sign) in self.unknowns.slope_signs(c).into_iter().enumerate() {
+                border[j] += weight * sign;
+            }
+        }
+        border
     }
 
     /// The offset of each channel, µm.
@@ -247,7 +338,7 @@ impl Simultaneous {
             .map(|c| {
                 let mut border = vec![0.0; self.unknowns.border_count()];
                 border[self.unknowns.offset(c)] = 1.0;
-                (self.channels()[c], self.border_combination(&border))
+                (self.channels()[c], self.border_combination(&border).0)
             })
             .collect()
     }
@@ -262,7 +353,7 @@ impl Simultaneous {
             Some(j) => {
                 let mut border = vec![0.0; self.unknowns.border_count()];
                 border[j] = 1.0;
-                self.border_combination(&border)
+                self.border_combination(&border).0
             }
         }
     }
@@ -273,20 +364,15 @@ impl Simultaneous {
         Some(self.unknowns.slope(c, &self.parameters.border))
     }
 
-    fn border_combination(&self, weights: &[f64]) -> Value {
-        let terms: Vec<(usize, f64)> = weights
+    /// Value, standard uncertainty and degrees of freedom of a combination of border unknowns.
+    fn border_combination(&self, weights: &[f64]) -> (Value, f64) {
+        let terms = terms(weights);
+        let (std, freedom) = self.scatter.spread(&self.covariance, &[], &terms);
+        let value = terms
             .iter()
-            .copied()
-            .enumerate()
-            .filter(|(_, w)| *w != 0.0)
-            .collect();
-        Value {
-            value: terms
-                .iter()
-                .map(|(j, w)| w * self.parameters.border[*j])
-                .sum(),
-            std: (self.unit_variance * self.covariance.variance(&[], &terms)).sqrt(),
-        }
+            .map(|(j, w)| w * self.parameters.border[*j])
+            .sum();
+        (Value { value, std }, freedom)
     }
 
     /// The forms, or the combinations of forms which the channels determine, at positions (mm):
@@ -294,11 +380,16 @@ impl Simultaneous {
     pub fn forms(&self, x: &[f64]) -> Vec<Profile> {
         self.determined_forms()
             .into_iter()
-            .map(|(name, weights)| Profile {
-                name,
-                x: x.to_vec(),
-                values: x.iter().map(|x| self.form_value(&weights, *x)).collect(),
-                std: x.iter().map(|x| self.form_std(&weights, *x)).collect(),
+            .map(|(name, weights)| {
+                let spread: Vec<(f64, f64)> =
+                    x.par_iter().map(|x| self.form_std(&weights, *x)).collect();
+                Profile {
+                    name,
+                    x: x.to_vec(),
+                    values: x.iter().map(|x| self.form_value(&weights, *x)).collect(),
+                    std: spread.iter().map(|s| s.0).collect(),
+                    degrees_of_freedom: spread.iter().fold(f64::INFINITY, |m, s| m.min(s.1)),
+                }
             })
             .collect()
     }
@@ -353,7 +444,9 @@ impl Simultaneous {
             .sum()
     }
 
-    fn form_std(&self, weights: &[f64], x: f64) -> f64 {
+    /// Standard uncertainty of a form and its degrees of freedom. What the model misses may lie in the
+    /// form itself, finer than the knots.
+    fn form_std(&self, weights: &[f64], x: f64) -> (f64, f64) {
         let (mut band, mut border) = (Vec::with_capacity(12), Vec::with_capacity(6));
         for (form, weight) in weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
             self.push_basis(form, x, *weight, &mut band);
@@ -361,7 +454,31 @@ impl Simultaneous {
             border.push((height, -weight));
             border.push((slope, -weight * self.axis.xi(x)));
         }
-        (self.unit_variance * self.covariance.variance(&band, &border)).sqrt()
+        let (std, freedom) = self.scatter.spread(&self.covariance, &band, &border);
+        (std.hypot(self.agreement.missed), freedom)
+    }
+
+    /// By what factor the standard uncertainty of each of [`Self::tilts`] would change if that share of
+    /// the noise's variance were correlated along the traces over a length, mm, instead of white.
+    ///
+    /// # Errors
+    /// [`NoValue`] where a probe touches in two places.
+    pub fn if_correlated(
+        &self,
+        observations: &Observations,
+        share: f64,
+        length: f64,
+    ) -> Result<Vec<f64>, NoValue> {
+        let channels = ChannelReadings::sort(observations);
+        let survey = Survey::new(&channels, observations);
+        let groups = traces::grouped(&channels, &survey.traces);
+        let gathered = Gathered::new(self, &survey, &groups, &self.weights)?;
+        let factors = self.tilt_terms().into_iter().map(|(_, terms)| {
+            gathered
+                .against_white(&self.covariance, &terms, share, length)
+                .sqrt()
+        });
+        Ok(factors.collect())
     }
 
     /// The residuals with their readings.
@@ -510,6 +627,12 @@ impl Simultaneous {
             .map(|j| self.unknowns.border_name(j));
         band.chain(border).collect()
     }
+}
+
+/// The entries that are not zero.
+fn terms(weights: &[f64]) -> Vec<(usize, f64)> {
+    let entries = weights.iter().copied().enumerate();
+    entries.filter(|(_, w)| *w != 0.0).collect()
 }
 
 /// Most readings for which a dense Jacobian is handed out.

@@ -132,6 +132,46 @@ impl BorderedCovariance {
         (own - lost + through).max(0.0)
     }
 
+    /// The covariance matrix times a vector over the unknowns of band and border: what each unknown has
+    /// in common with that linear combination of all.
+    pub fn times(&self, band: &[(usize, f64)], border: &[(usize, f64)]) -> (Vec<f64>, Vec<f64>) {
+        let combined =
+            |m: &DMatrix<f64>, k: usize| -> f64 { band.iter().map(|(i, a)| a * m[(*i, k)]).sum() };
+        let lost: Vec<f64> = (0..self.p.ncols()).map(|k| combined(&self.p, k)).collect();
+        let mut seen: Vec<f64> = (0..self.border.nrows())
+            .map(|k| combined(&self.u, k))
+            .collect();
+        for (j, v) in border {
+            seen[*j] += v;
+        }
+        let through: Vec<f64> = self
+            .border
+            .row_iter()
+            .map(|row| row.iter().zip(&seen).map(|(c, s)| c * s).sum())
+            .collect();
+        let mut own = vec![0.0; self.triangle.len()];
+        for (i, a) in band {
+            own[*i] += a;
+        }
+        if !band.is_empty() {
+            self.triangle.solve_transposed(&mut own);
+            self.triangle.solve(&mut own);
+        }
+        for (i, value) in own.iter_mut().enumerate() {
+            *value -= lost
+                .iter()
+                .zip(self.p.row(i).iter())
+                .map(|(l, p)| l * p)
+                .sum::<f64>();
+            *value += through
+                .iter()
+                .zip(self.u.row(i).iter())
+                .map(|(t, u)| t * u)
+                .sum::<f64>();
+        }
+        (own, through)
+    }
+
     /// The trace of J cov Jᵀ over the rows of a group times `weight`: how many unknowns they use
     /// up.
     ///

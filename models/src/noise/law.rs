@@ -1,0 +1,179 @@
+//! The law of the noise and products with its covariance.
+
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Variances of the parts of the noise of one reading, in the square of the reading's unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Law {
+    /// Of the white part.
+    pub white: f64,
+    /// Of the part correlated along a trace.
+    pub correlated: f64,
+    /// Correlation length of that part, in the unit of the positions.
+    pub length: f64,
+    /// Of the shift of a whole trace.
+    pub shift: f64,
+}
+
+impl Law {
+    /// White noise of a variance.
+    pub const fn of_white(variance: f64) -> Self {
+        Self {
+            white: variance,
+            correlated: 0.0,
+            length: 1.0,
+            shift: 0.0,
+        }
+    }
+
+    /// Variance of one reading.
+    pub fn variance(&self) -> f64 {
+        self.white + self.correlated + self.shift
+    }
+
+    /// All variances times a factor.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Self {
+        Self {
+            white: factor * self.white,
+            correlated: factor * self.correlated,
+            shift: factor * self.shift,
+            ..self
+        }
+    }
+
+    /// Draws the noise of one trace, readings in the order in which they were taken.
+    pub fn draw(&self, positions: &[f64], random: &mut impl Rng, noise: &mut [f64]) {
+        let mut normal = || -> f64 { StandardNormal.sample(random) };
+        let (white, markov) = (self.white.sqrt(), self.correlated.sqrt());
+        let shift = self.shift.sqrt() * normal();
+        let mut state = markov * normal();
+        let decays = decays(positions, self.length);
+        for (k, (value, decay)) in noise.iter_mut().zip(&decays).enumerate() {
+            if k > 0 {
+                state = decay * state + markov * (1.0 - decay * decay).sqrt() * normal();
+            }
+            *value = shift + state + white * normal();
+        }
+    }
+
+    /// aᵀVb, V the covariance of the readings of a trace, by one pass.
+    pub fn form(&self, decays: &[f64], a: &[f64], b: &[f64]) -> f64 {
+        let white: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+        let mut sum = self.white * white;
+        if self.correlated > 0.0 {
+            sum += self.correlated * markov_form(decays, a, b);
+        }
+        if self.shift > 0.0 {
+            sum += self.shift * a.iter().sum::<f64>() * b.iter().sum::<f64>();
+        }
+        sum
+    }
+
+    /// Variance of the sum of squares of n readings of a trace, over 2: the sum of the squares of all
+    /// elements of V. `double` are the decays of half the length.
+    pub fn squares(&self, decays: &[f64], double: &[f64]) -> f64 {
+        let ones = vec![1.0; decays.len()];
+        let n = decays.len() as f64;
+        let apart = markov_form(decays, &ones, &ones) - n;
+        let apart_squared = markov_form(double, &ones, &ones) - n;
+        n * self.variance().powi(2)
+            + self.correlated.powi(2) * apart_squared
+            + 2.0 * self.correlated * self.shift * apart
+            + self.shift.powi(2) * n * (n - 1.0)
+    }
+}
+
+/// What is left of the correlated part from the reading before: exp(−|Δx|/ℓ); zero at the first.
+pub fn decays(positions: &[f64], length: f64) -> Vec<f64> {
+    let steps = positions
+        .windows(2)
+        .map(|pair| (-(pair[1] - pair[0]).abs() / length).exp());
+    std::iter::once(0.0)
+        .chain(steps)
+        .take(positions.len())
+        .collect()
+}
+
+/// Σ aᵢ bⱼ exp(−|xᵢ − xⱼ|/ℓ) over all pairs of a trace, by one pass.
+pub fn markov_form(decays: &[f64], a: &[f64], b: &[f64]) -> f64 {
+    let (mut before_a, mut before_b, mut sum) = (0.0, 0.0, 0.0);
+    for ((decay, a), b) in decays.iter().zip(a).zip(b) {
+        before_a *= decay;
+        before_b *= decay;
+        sum += a * b + a * before_b + b * before_a;
+        before_a += a;
+        before_b += b;
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+    use proptest::prelude::*;
+
+    /// The covariance written out, element by element.
+    fn dense(law: &Law, x: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_fn(x.len(), x.len(), |i, j| {
+            let own = if i == j { law.white } else { 0.0 };
+            own + law.correlated * (-(x[i] - x[j]).abs() / law.length).exp() + law.shift
+        })
+    }
+
+    proptest! {
+        /// One pass gives what the covariance written out gives.
+        #[test]
+        fn one_pass_is_the_dense_product(
+            white in 0.0f64..2.0, correlated in 0.0f64..3.0, length in 0.5f64..50.0,
+            shift in 0.0f64..3.0, steps in prop::collection::vec(0.0f64..5.0, 1..20),
+            values in prop::collection::vec(-2.0f64..2.0, 42),
+        ) {
+            let mut x = vec![0.0];
+            for step in steps {
+                x.push(x[x.len() - 1] + step);
+            }
+            let n = x.len();
+            let law = Law { white, correlated, length, shift };
+            let (a, b) = (&values[..n], &values[n..2 * n]);
+            let v = dense(&law, &x);
+            let expected = DVector::from_column_slice(a).dot(&(&v * DVector::from_column_slice(b)));
+            let found = law.form(&decays(&x, length), a, b);
+            // Epsilons: 400 terms below 32, in other order.
+            prop_assert!((found - expected).abs() < 400.0 * 32.0 * f64::EPSILON, "{found} {expected}");
+            let squares = law.squares(&decays(&x, length), &decays(&x, 0.5 * length));
+            prop_assert!((squares - v.norm_squared()).abs() < 400.0 * 64.0 * 4.0 * f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn draws_have_the_variance_of_the_law() {
+        use rand::SeedableRng;
+        let law = Law {
+            white: 1.0,
+            correlated: 2.0,
+            length: 3.0,
+            shift: 0.5,
+        };
+        let x = [0.0, 1.0, 1.5, 4.0];
+        let w = [1.0, -2.0, 0.5, 0.7];
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let count = 40_000;
+        let mut sum = 0.0;
+        for _ in 0..count {
+            let mut noise = [0.0; 4];
+            law.draw(&x, &mut random, &mut noise);
+            sum += noise
+                .iter()
+                .zip(&w)
+                .map(|(n, w)| n * w)
+                .sum::<f64>()
+                .powi(2);
+        }
+        let expected = law.form(&decays(&x, law.length), &w, &w);
+        // k·u: the mean of 40 000 squares is known to √(2/40 000); four of them.
+        assert!((sum / f64::from(count) / expected - 1.0).abs() < 0.029);
+    }
+}

@@ -1,0 +1,368 @@
+//! Which laws of noise contrasts of repeats allow, each with its probability.
+//!
+//! Four kinds of law are weighed: white alone, with shifts, with a correlated part, with both; each a
+//! quarter beforehand. Beforehand, too, the correlated part's share of the standard deviation beside the
+//! white one, the shift's share of the whole and the logarithm of the correlation length are uniform,
+//! and that of the scale everywhere. The scale is integrated in closed form; the others on a grid that
+//! closes in on where the probability lies.
+
+use super::contrasts::Contrasts;
+use super::law::Law;
+
+/// Fewest values in contrasts from which a law can be told.
+const FEWEST: usize = 8;
+/// Points of the grid along the share of the correlated part and along its length.
+const POINTS: usize = 9;
+/// Points along the shift, which cost no further pass.
+const SHIFTS: usize = 15;
+/// Rounds in which the grid closes in.
+const MOST_ROUNDS: usize = 8;
+/// The grid closes in on what has more than this share of the greatest probability.
+const NEGLIGIBLE: f64 = 1e-4;
+/// The grid is fine enough when closing in would shorten none of its sides to less than this share.
+const CLOSE: f64 = 0.7;
+/// Greatest share of the correlated part and of the shift: without any white noise the filter's
+/// weights would be infinite.
+const MOST: f64 = 0.999;
+
+/// A law, its scale left open, that the contrasts allow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Possible {
+    /// The law at a scale of one.
+    pub law: Law,
+    /// Its probability.
+    pub probability: f64,
+    /// Quadratic form of the contrasts under it: the scale is this over χ² of as many degrees of
+    /// freedom as there are values in the contrasts.
+    pub quadratic: f64,
+}
+
+/// The laws that contrasts allow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Posterior {
+    possible: Vec<Possible>,
+    count: f64,
+}
+
+/// A side of the grid: from, to.
+type Side = (f64, f64);
+
+impl Posterior {
+    /// What contrasts tell; `None` where they are too few, or all zero.
+    pub fn of(contrasts: &Contrasts) -> Option<Self> {
+        if contrasts.count() < FEWEST {
+            return None;
+        }
+        let plain = contrasts.likelihoods(1.0, 0.0, 1.0, &[0.0])[0];
+        if !(plain.quadratic > f64::MIN_POSITIVE && plain.quadratic.is_finite()) {
+            return None;
+        }
+        let mut possible = Vec::new();
+        let lengths = contrasts
+            .reach()
+            .map(|(spacing, travel)| (spacing.ln(), travel.max(2.0 * spacing).ln()));
+        for shift in [false, true] {
+            explore(contrasts, None, shift, plain.minus_log, &mut possible);
+            if let Some(lengths) = lengths {
+                explore(
+                    contrasts,
+                    Some(lengths),
+                    shift,
+                    plain.minus_log,
+                    &mut possible,
+                );
+            }
+        }
+        let top = possible
+            .iter()
+            .map(|p| p.probability)
+            .fold(f64::NEG_INFINITY, f64::max);
+        for p in &mut possible {
+            p.probability = (p.probability - top).exp();
+        }
+        possible.retain(|p| p.probability > 0.1 * NEGLIGIBLE);
+        let sum: f64 = possible.iter().map(|p| p.probability).sum();
+        for p in &mut possible {
+            p.probability /= sum;
+        }
+        (sum > 0.0 && sum.is_finite()).then_some(Self {
+            possible,
+            count: contrasts.count() as f64,
+        })
+    }
+
+    /// The laws, their probabilities adding up to one.
+    pub fn possible(&self) -> &[Possible] {
+        &self.possible
+    }
+
+    /// The mean of the laws.
+    pub fn mean(&self) -> Law {
+        let mean = |of: fn(&Law) -> f64| {
+            let terms = self
+                .possible
+                .iter()
+                .map(|p| p.probability * p.quadratic / (self.count - 2.0) * of(&p.law));
+            terms.sum::<f64>()
+        };
+        let correlated = mean(|l| l.correlated);
+        let length = if correlated > 0.0 {
+            (mean(|l| l.correlated * l.length.ln()) / correlated).exp()
+        } else {
+            1.0
+        };
+        Law {
+            white: mean(|l| l.white),
+            correlated,
+            length,
+            shift: mean(|l| l.shift),
+        }
+    }
+
+    /// The scale v and the degrees of freedom ν of the scaled inverse χ² law, v ν/χ², that has mean and
+    /// variance of the posterior of a variance: what is normal with that variance divides by √v to
+    /// Student's law with ν. `of` are the variances under each of [`Self::possible`], scale one.
+    pub fn variance(&self, of: &[f64]) -> (f64, f64) {
+        let n = self.count;
+        let (mut mean, mut square) = (0.0, 0.0);
+        for (p, v) in self.possible.iter().zip(of) {
+            let scaled = p.quadratic * v;
+            mean += p.probability * scaled / (n - 2.0);
+            square += p.probability * scaled * scaled / ((n - 2.0) * (n - 4.0));
+        }
+        let variance = square - mean * mean;
+        if !(variance > 0.0) {
+            return (mean, n);
+        }
+        let freedom = 4.0 + 2.0 * mean * mean / variance;
+        (mean * (freedom - 2.0) / freedom, freedom)
+    }
+}
+
+/// Goes over one kind of law; the logarithm of each point's probability, up to a constant, goes where
+/// the probability belongs.
+fn explore(
+    contrasts: &Contrasts,
+    lengths: Option<Side>,
+    shift: bool,
+    reference: f64,
+    possible: &mut Vec<Possible>,
+) {
+    let whole = |side: Option<Side>| side.unwrap_or((0.0, 0.0));
+    let limits = [
+        whole(lengths.map(|_| (0.0, MOST))),
+        whole(lengths),
+        whole(shift.then_some((0.0, MOST))),
+    ];
+    let mut sides = limits;
+    for round in 0..MOST_ROUNDS {
+        let points = on_grid(contrasts, lengths.is_some(), &sides, reference);
+        let next = closer(&points, &sides, &limits);
+        let shortens = next
+            .iter()
+            .zip(&sides)
+            .any(|(n, s)| s.1 > s.0 && n.1 - n.0 < CLOSE * (s.1 - s.0));
+        if !shortens || round + 1 == MOST_ROUNDS {
+            // The share that this grid has of the uniform probability beforehand.
+            let share: f64 = sides
+                .iter()
+                .zip(&limits)
+                .map(|(s, l)| {
+                    if l.1 > l.0 {
+                        (s.1 - s.0) / (l.1 - l.0)
+                    } else {
+                        1.0
+                    }
+                })
+                .product();
+            let log_cell = (share / points.len() as f64).ln();
+            possible.extend(points.into_iter().map(|(_, mut p)| {
+                p.probability += log_cell;
+                p
+            }));
+            return;
+        }
+        sides = next;
+    }
+}
+
+/// The middles of n equal parts of a side; the side itself where it is a point.
+fn middles(side: Side, count: usize) -> Vec<f64> {
+    if side.1 > side.0 {
+        let width = (side.1 - side.0) / count as f64;
+        (0..count)
+            .map(|k| side.0 + (k as f64 + 0.5) * width)
+            .collect()
+    } else {
+        vec![side.0]
+    }
+}
+
+/// All points of a grid with their laws; the probability is its logarithm.
+fn on_grid(
+    contrasts: &Contrasts,
+    correlated: bool,
+    sides: &[Side; 3],
+    reference: f64,
+) -> Vec<([f64; 3], Possible)> {
+    let shares = middles(sides[2], SHIFTS);
+    let shifts: Vec<f64> = shares.iter().map(|c| c * c / (1.0 - c * c)).collect();
+    let mut points = Vec::new();
+    for a in middles(sides[0], POINTS) {
+        for b in middles(sides[1], POINTS) {
+            let own = a * a;
+            let length = if correlated { b.exp() } else { 1.0 };
+            let found = contrasts.likelihoods(1.0 - own, own, length, &shifts);
+            for ((likelihood, share), shift) in found.into_iter().zip(&shares).zip(&shifts) {
+                let law = Law {
+                    white: 1.0 - own,
+                    correlated: own,
+                    length,
+                    shift: *shift,
+                };
+                let possible = Possible {
+                    law,
+                    probability: reference - likelihood.minus_log,
+                    quadratic: likelihood.quadratic,
+                };
+                points.push(([a, b, *share], possible));
+            }
+        }
+    }
+    points
+}
+
+/// The box around what is not negligible, one step of the grid wider.
+fn closer(points: &[([f64; 3], Possible)], sides: &[Side; 3], limits: &[Side; 3]) -> [Side; 3] {
+    let top = points
+        .iter()
+        .map(|(_, p)| p.probability)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let mut next = [(f64::INFINITY, f64::NEG_INFINITY); 3];
+    for (at, _) in points
+        .iter()
+        .filter(|(_, p)| p.probability > top + NEGLIGIBLE.ln())
+    {
+        for (side, v) in next.iter_mut().zip(at) {
+            *side = (side.0.min(*v), side.1.max(*v));
+        }
+    }
+    for (k, side) in next.iter_mut().enumerate() {
+        let count = if k == 2 { SHIFTS } else { POINTS };
+        let step = (sides[k].1 - sides[k].0) / count as f64;
+        *side = (
+            (side.0 - step).max(limits[k].0),
+            (side.1 + step).min(limits[k].1),
+        );
+    }
+    next
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use statrs::distribution::{ContinuousCDF, StudentsT};
+
+    /// Three contrasts of each of eight traces.
+    fn contrasts(law: &Law, n: usize, seed: u64) -> (Vec<f64>, Contrasts) {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let x: Vec<f64> = (0..n).map(|k| 2.0 * k as f64).collect();
+        let mut contrasts = Contrasts::default();
+        for _ in 0..8 {
+            let repeats: Vec<Vec<f64>> = (0..4)
+                .map(|_| {
+                    let mut noise = vec![0.0; n];
+                    law.draw(&x, &mut random, &mut noise);
+                    noise
+                })
+                .collect();
+            contrasts.add(&x, &repeats);
+        }
+        (x, contrasts)
+    }
+
+    /// A further trace's mean and slope lie within their 95 % intervals as often as they should.
+    #[test]
+    fn intervals_of_a_further_trace_hold() {
+        for law in [
+            Law::of_white(1.0),
+            Law {
+                white: 1.0,
+                correlated: 1.0,
+                length: 15.0,
+                shift: 0.0,
+            },
+            Law {
+                white: 1.0,
+                correlated: 0.0,
+                length: 1.0,
+                shift: 0.3,
+            },
+        ] {
+            let (mut inside, seeds) = ([0; 2], 150);
+            for seed in 0..seeds {
+                let (x, contrasts) = contrasts(&law, 60, seed);
+                let posterior = Posterior::of(&contrasts).unwrap();
+                let mut noise = vec![0.0; x.len()];
+                law.draw(
+                    &x,
+                    &mut ChaCha8Rng::seed_from_u64(10_000 + seed),
+                    &mut noise,
+                );
+                let n = x.len() as f64;
+                let middle = x.iter().sum::<f64>() / n;
+                let spread: f64 = x.iter().map(|x| (x - middle).powi(2)).sum();
+                let weights = [
+                    vec![1.0 / n; x.len()],
+                    x.iter().map(|x| (x - middle) / spread).collect::<Vec<_>>(),
+                ];
+                for (inside, w) in inside.iter_mut().zip(&weights) {
+                    let of: Vec<f64> = posterior
+                        .possible()
+                        .iter()
+                        .map(|p| p.law.form(&crate::noise::decays(&x, p.law.length), w, w))
+                        .collect();
+                    let (variance, freedom) = posterior.variance(&of);
+                    let error: f64 = noise.iter().zip(w).map(|(e, w)| e * w).sum();
+                    let t = StudentsT::new(0.0, 1.0, freedom)
+                        .unwrap()
+                        .inverse_cdf(0.975);
+                    *inside += u32::from(error.abs() < t * variance.sqrt());
+                }
+            }
+            // k·u: a share of 0.95 of 150 is known to 0.018; four of them.
+            for inside in inside {
+                let share = f64::from(inside) / seeds as f64;
+                assert!(share > 0.95 - 4.0 * 0.018, "{law:?} {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn many_repeats_give_the_law() {
+        let law = Law {
+            white: 1.0,
+            correlated: 0.6,
+            length: 10.0,
+            shift: 0.2,
+        };
+        let (_, contrasts) = contrasts(&law, 400, 5);
+        let mean = Posterior::of(&contrasts).unwrap().mean();
+        // k·u: 24 contrasts of 400 values know the white part to 3 %, the correlated one to some 10 %
+        // and the shift, of 24, to 30 %; three of each.
+        assert!((mean.white - 1.0).abs() < 0.1, "{mean:?}");
+        assert!((mean.correlated - 0.6).abs() < 0.2, "{mean:?}");
+        assert!((mean.length / 10.0).ln().abs() < 0.5, "{mean:?}");
+        assert!((mean.shift - 0.2).abs() < 0.2, "{mean:?}");
+    }
+
+    #[test]
+    fn too_few_or_no_noise_give_no_law() {
+        assert!(Posterior::of(&Contrasts::default()).is_none());
+        let mut still = Contrasts::default();
+        still.add(&[0.0; 10], &[vec![1.0; 10], vec![1.0; 10]]);
+        assert!(Posterior::of(&still).is_none());
+    }
+}

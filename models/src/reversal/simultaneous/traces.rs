@@ -1,0 +1,244 @@
+//! Which of a channel's sorted readings were taken in one go: a trace is a channel, a repeat and a
+//! direction.
+
+use std::collections::BTreeMap;
+
+use super::readings::ChannelReadings;
+use crate::reversal::{Direction, Observations};
+
+/// Cells along a trace; more would tell no more of what is correlated along it.
+const MOST_CELLS: usize = 400;
+/// Positions of repeats that differ by no more than this share of them count as the same, with
+/// readings left out.
+const LEFT_OUT: f64 = 0.1;
+
+/// One trace: the places of its readings among its channel's sorted readings.
+#[derive(Debug, Clone)]
+pub struct Trace {
+    /// Whether the slide moved backward.
+    pub backward: bool,
+    /// Its readings; all of the channel's where `None`.
+    rows: Option<Vec<u32>>,
+    count: usize,
+}
+
+impl Trace {
+    /// Number of readings.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// The place of a reading among its channel's.
+    pub fn row(&self, k: usize) -> usize {
+        self.rows.as_ref().map_or(k, |rows| rows[k] as usize)
+    }
+}
+
+/// The traces of every channel.
+pub fn of(channels: &[ChannelReadings], observations: &Observations) -> Vec<Vec<Trace>> {
+    channels
+        .iter()
+        .map(|channel| {
+            let key = |i: u32| {
+                let reading = &observations.readings[i as usize];
+                (reading.direction == Direction::Backward, reading.repeat)
+            };
+            let first = channel.source.first().map(|i| key(*i));
+            if channel.source.iter().all(|i| Some(key(*i)) == first) {
+                return vec![Trace {
+                    backward: first.is_some_and(|f| f.0),
+                    rows: None,
+                    count: channel.len(),
+                }];
+            }
+            let mut traces: BTreeMap<(bool, u32), Vec<u32>> = BTreeMap::new();
+            for (row, i) in (0_u32..).zip(&channel.source) {
+                traces.entry(key(*i)).or_default().push(row);
+            }
+            traces
+                .into_iter()
+                .map(|((backward, _), rows)| Trace {
+                    backward,
+                    count: rows.len(),
+                    rows: Some(rows),
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// The readings of one trace gathered on the cells of its group.
+#[derive(Debug, Clone)]
+pub struct CellTrace {
+    /// By cell that has a reading: the cell, and the places of its readings in the trace.
+    pub cells: Vec<(usize, std::ops::Range<usize>)>,
+}
+
+/// The repeats of a channel in one direction, on common cells.
+#[derive(Debug, Clone)]
+pub struct Group {
+    /// The channel's place among those that were read.
+    pub channel: usize,
+    /// The traces' places among the channel's.
+    pub traces: Vec<usize>,
+    /// Mean position of the readings of each cell, mm.
+    pub positions: Vec<f64>,
+    /// Each trace on the cells.
+    pub on_cells: Vec<CellTrace>,
+}
+
+impl Group {
+    /// The cells in which every repeat has a reading.
+    pub fn complete(&self) -> Vec<usize> {
+        let mut count = vec![0; self.positions.len()];
+        for trace in &self.on_cells {
+            for (cell, _) in &trace.cells {
+                count[*cell] += 1;
+            }
+        }
+        let all = self.traces.len();
+        (0..count.len()).filter(|k| count[*k] == all).collect()
+    }
+}
+
+/// Groups of repeats, on cells: a position each where repeats share their positions, so that nothing is
+/// averaged; otherwise stretches of about two readings or more, so that differing positions meet.
+pub fn grouped(channels: &[ChannelReadings], traces: &[Vec<Trace>]) -> Vec<Group> {
+    let mut groups = Vec::new();
+    for (c, (channel, traces)) in channels.iter().zip(traces).enumerate() {
+        for backward in [false, true] {
+            let own: Vec<usize> = (0..traces.len())
+                .filter(|t| traces[*t].backward == backward && traces[*t].len() > 0)
+                .collect();
+            if !own.is_empty() {
+                groups.push(group(c, channel, traces, own));
+            }
+        }
+    }
+    groups
+}
+
+fn group(c: usize, channel: &ChannelReadings, traces: &[Trace], own: Vec<usize>) -> Group {
+    let longest = own.iter().map(|t| traces[*t].len()).max().unwrap_or(0);
+    let x_of = |t: usize| (0..traces[t].len()).map(move |k| channel.x[traces[t].row(k)]);
+    let edges = shared_positions(longest, own.iter().flat_map(|t| x_of(*t)))
+        .unwrap_or_else(|| even_edges(channel, longest));
+    let last = edges.len().saturating_sub(1);
+    let cell_of = |x: f64| {
+        edges
+            .partition_point(|e| *e <= x)
+            .saturating_sub(1)
+            .min(last)
+    };
+    let mut sums = vec![(0.0, 0.0); edges.len()];
+    let on_cells: Vec<CellTrace> = own
+        .iter()
+        .map(|t| {
+            let mut cells: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
+            for (k, x) in x_of(*t).enumerate() {
+                let cell = cell_of(x);
+                sums[cell].0 += x;
+                sums[cell].1 += 1.0;
+                match cells.last_mut() {
+                    Some((at, range)) if *at == cell => range.end = k + 1,
+                    _ => cells.push((cell, k..k + 1)),
+                }
+            }
+            CellTrace { cells }
+        })
+        .collect();
+    let positions = sums
+        .iter()
+        .zip(&edges)
+        .map(|((sum, count), edge)| if *count > 0.0 { sum / count } else { *edge })
+        .collect();
+    Group {
+        channel: c,
+        traces: own,
+        positions,
+        on_cells,
+    }
+}
+
+/// The positions of all repeats, where these share them.
+fn shared_positions(longest: usize, x: impl Iterator<Item = f64>) -> Option<Vec<f64>> {
+    if longest > MOST_CELLS {
+        return None;
+    }
+    let mut all: Vec<f64> = x.collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    (all.len() as f64 <= (1.0 + LEFT_OUT) * longest as f64).then_some(all)
+}
+
+/// Left ends of even cells of two readings or more of the longest trace.
+fn even_edges(channel: &ChannelReadings, longest: usize) -> Vec<f64> {
+    let count = (longest / 2).clamp(1, MOST_CELLS);
+    let (Some(first), Some(last)) = (channel.x.first(), channel.x.last()) else {
+        return Vec::new();
+    };
+    let width = (last - first) / count as f64;
+    (0..count).map(|k| first + k as f64 * width).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reversal::{Channel, Reading};
+
+    fn observations(x: impl Fn(u32, usize) -> f64, repeats: u32, n: usize) -> Observations {
+        let readings = (1..=repeats)
+            .flat_map(|repeat| (0..n).map(move |k| (repeat, k)))
+            .map(|(repeat, k)| Reading {
+                channel: Channel::C1A,
+                repeat,
+                direction: Direction::Forward,
+                time: None,
+                x: x(repeat, k),
+                value: f64::from(repeat),
+            })
+            .collect();
+        Observations { readings }
+    }
+
+    #[test]
+    fn shared_positions_are_cells_of_their_own() {
+        let data = observations(|_, k| 2.0 * k as f64, 3, 10);
+        let channels = ChannelReadings::sort(&data);
+        let traces = of(&channels, &data);
+        assert_eq!(
+            traces[0].iter().map(Trace::len).collect::<Vec<_>>(),
+            [10; 3]
+        );
+        let groups = grouped(&channels, &traces);
+        assert_eq!(groups.len(), 1);
+        assert_eq!(groups[0].positions.len(), 10);
+        assert_eq!(groups[0].complete().len(), 10);
+        // Every reading of a trace is its own repeat's.
+        for (place, trace) in traces[0].iter().enumerate() {
+            for k in 0..10 {
+                assert_eq!(channels[0].value[trace.row(k)], 1.0 + place as f64);
+            }
+        }
+    }
+
+    #[test]
+    fn positions_that_differ_meet_in_wider_cells() {
+        let data = observations(|r, k| 2.0 * k as f64 + 0.3 * f64::from(r), 3, 40);
+        let channels = ChannelReadings::sort(&data);
+        let groups = grouped(&channels, &of(&channels, &data));
+        assert_eq!(groups[0].positions.len(), 20);
+        assert!(groups[0].complete().len() >= 18, "{groups:?}");
+        let of_trace = |t: &CellTrace| t.cells.iter().map(|c| c.1.len()).sum::<usize>();
+        assert!(groups[0].on_cells.iter().all(|t| of_trace(t) == 40));
+    }
+
+    #[test]
+    fn one_trace_is_the_channel() {
+        let data = observations(|_, k| k as f64, 1, 900);
+        let channels = ChannelReadings::sort(&data);
+        let traces = of(&channels, &data);
+        assert_eq!((traces[0].len(), traces[0][0].row(17)), (1, 17));
+        assert_eq!(grouped(&channels, &traces)[0].positions.len(), MOST_CELLS);
+    }
+}

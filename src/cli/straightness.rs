@@ -43,6 +43,16 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
                 .in_file(&args.profile)
                 .remedy("give readings at two or more positions")
         })?;
+    if results
+        .iter()
+        .any(|s| !(s.error().is_finite() && s.slope.is_finite()))
+    {
+        return Err(Message::bad_input(
+            "the numbers are so large that the deviations are not finite",
+        )
+        .in_file(&args.profile)
+        .remedy("give positions in mm and deviations in um"));
+    }
     let mut text = format!(
         "Straightness of {} ({} points)\n",
         args.profile.display(),

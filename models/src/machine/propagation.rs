@@ -89,6 +89,12 @@ pub fn propagate(
             })
             .sum();
         let sensitivity = of_weights.sqrt();
+        if !(sensitivity.is_finite() && variance.is_finite()) {
+            return Err(MachineError::NotFinite {
+                what: "the uncertainty of the number",
+                found: sensitivity.max(variance),
+            });
+        }
         let mean = values.iter().map(|v| v[component.index()] / count).sum();
         let own = if sensitivity > 0.0 {
             variance.sqrt() / sensitivity

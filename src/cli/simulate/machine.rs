@@ -162,6 +162,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
                 .numbers("value", numbers(|r| r.value)),
         );
     }
+    more.iter().try_for_each(super::finite)?;
     let known = json!({
         "machine": args.model.display().to_string(),
         "chain": machine.chain().to_string(),

@@ -182,14 +182,8 @@ pub(super) fn effects<E>(
 /// third probe cannot reach.
 const MAY_BE_MISSING: [&str; 3] = ["time", "m2", "m3"];
 
-/// A simulation as every kind answers: the data as text in the form that the commands read, with its
-/// truth in comments; data and truth as JSON.
-pub(super) fn answer(
-    kind: &str,
-    data: CsvTable,
-    truth: Value,
-    seed: u64,
-) -> Result<Answer, Message> {
+/// Refuses simulated data in which a number has overflowed.
+pub(super) fn finite(data: &CsvTable) -> Result<(), Message> {
     let beyond = data.columns.iter().find(|(name, values)| match values {
         Values::Numbers(v) => {
             let may_be_missing = MAY_BE_MISSING.contains(&name.as_str());
@@ -204,6 +198,18 @@ pub(super) fn answer(
         ))
         .remedy("give sizes nearer to those of a machine"));
     }
+    Ok(())
+}
+
+/// A simulation as every kind answers: the data as text in the form that the commands read, with its
+/// truth in comments; data and truth as JSON.
+pub(super) fn answer(
+    kind: &str,
+    data: CsvTable,
+    truth: Value,
+    seed: u64,
+) -> Result<Answer, Message> {
+    finite(&data)?;
     let unwritable = |e: String| Message::bad_input(format!("the data cannot be written: {e}"));
     let mut bytes = Vec::new();
     data.write(&mut bytes)

@@ -209,8 +209,8 @@ fn answers<M: FittedModel>(counts: &mut Counts, diagnosis: &Diagnosis, exact: &M
                 counts.0[5].add(bias.after - after, bias.after_std, freedom);
             }
         }
-        // What does not move says nothing of how well its move is known.
-        if moved.abs() > 1e-3 * bias.std && exact.name() != "circle" {
+        // What hardly moves says nothing of how well its move is known.
+        if moved.abs() > 0.1 * bias.std && exact.name() != "circle" {
             counts.0[6].add(bias.moved - moved, bias.moved_std, freedom);
         }
     }

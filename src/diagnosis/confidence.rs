@@ -20,6 +20,9 @@ pub(super) const HOPELESS: f64 = 80.0;
 /// Part of the strongest cause's change, squared, that a further one must reach. What is less may be
 /// the remainder of a cause taken for another whose signature is off by a seventh of its size.
 const WEIGHTY: f64 = 0.02;
+/// Causes whose misfits differ by less fit equally well: beside others the one of more usual size is
+/// kept.
+const TIED: f64 = 9.2;
 /// Evidence that differs by less is equal: of exact aliases the one of more usual size goes first.
 const EQUAL: f64 = 1e-3;
 
@@ -35,8 +38,8 @@ pub(super) struct Alternative {
 pub(super) struct Answer {
     /// The causes, by what each adds.
     pub causes: Vec<Cause>,
-    /// For each cause the effects that these data cannot tell from it and itself, the greatest
-    /// evidence first: that one is the cause.
+    /// For each cause the effects that these data cannot tell from it and itself, the cause first: it
+    /// has the greatest evidence, unless those of greatest evidence do not pass together.
     pub groups: Vec<Vec<Alternative>>,
     /// What remains beside them.
     pub remainder: Remainder,
@@ -47,6 +50,7 @@ pub(super) struct Answer {
 /// One way to explain the gap: causes with one of them varied.
 struct Member {
     causes: Vec<Cause>,
+    misfit: f64,
     evidence: f64,
     left: Remainder,
     /// Size as a part of what is physically plausible.
@@ -83,6 +87,7 @@ pub(super) fn confidence_set<M: FittedModel>(
         }
         groups.push(group);
     }
+    led_by_evidence(bench, readings, &mut groups, &mut best, &mut remainder);
     let needed = best.len() == 1
         || weighty(bench, readings, &best)
             && (0..best.len()).all(|k| {
@@ -216,6 +221,7 @@ fn alternatives<M: FittedModel>(
             let left = bench.judged(readings, &trial);
             let misfit = left.residual.norm_squared();
             adequate(&trial, &left).then(|| Member {
+                misfit,
                 size: part_of_plausible(bench, readings, &trial, k),
                 evidence: evidence(bench, readings, &trial, k, misfit),
                 causes: trial,
@@ -224,12 +230,61 @@ fn alternatives<M: FittedModel>(
         });
         members.extend(judged.max_by(|a, b| a.evidence.total_cmp(&b.evidence)));
     }
-    let rounded = |m: &Member| (m.evidence / EQUAL).round();
+    let least = members
+        .iter()
+        .map(|m| m.misfit)
+        .fold(f64::INFINITY, f64::min);
     members.sort_by(|a, b| {
-        let by_evidence = rounded(b).total_cmp(&rounded(a));
-        by_evidence.then(a.size.total_cmp(&b.size))
+        let behind = |m: &Member| m.misfit > least + TIED;
+        let by_fit = a.misfit.total_cmp(&b.misfit);
+        let by_size = a.size.total_cmp(&b.size);
+        behind(a).cmp(&behind(b)).then(if behind(a) {
+            by_fit
+        } else {
+            by_size.then(by_fit)
+        })
     });
     members
+}
+
+/// Brings the greatest evidence of each group to its front and makes it the cause, where these causes
+/// pass together too; else the cause that was kept goes first.
+fn led_by_evidence<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    groups: &mut [Vec<Alternative>],
+    best: &mut Vec<Cause>,
+    remainder: &mut Remainder,
+) {
+    for group in groups.iter_mut() {
+        let rounded = |a: &Alternative| (a.evidence / EQUAL).round();
+        group.sort_by(|a, b| rounded(b).total_cmp(&rounded(a)));
+    }
+    let leaders: Vec<Cause> = best
+        .iter()
+        .zip(groups.iter())
+        .map(|(kept, group)| match group.first() {
+            Some(first) if first.cause.effect != kept.effect => first.cause.clone(),
+            _ => kept.clone(),
+        })
+        .collect();
+    let of = |causes: &[Cause]| -> Vec<usize> { causes.iter().map(|c| c.effect).collect() };
+    let (led, kept) = (of(&leaders), of(best));
+    if led == kept {
+        return;
+    }
+    let distinct = led.iter().enumerate().all(|(k, e)| !led[..k].contains(e));
+    if distinct {
+        let trial = bench.relinearised(readings, &leaders, f64::INFINITY);
+        let left = bench.judged(readings, &trial);
+        if adequate(&trial, &left) && bench.amplitudes(readings, &trial).is_some() {
+            (*best, *remainder) = (trial, left);
+            return;
+        }
+    }
+    for (group, kept) in groups.iter_mut().zip(best.iter()) {
+        group.sort_by_key(|a| a.cause.effect != kept.effect);
+    }
 }
 
 /// Logarithm of the evidence for cause `k` beside the others against nothing in its place, by the

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::contrasts::Contrasts;
 use super::noise::{NoiseLaw, NoiseSource, draw_scatter};
 use super::space::Space;
 use super::verdict::{HeldOut, Size};
@@ -53,7 +54,10 @@ impl GapMeter {
         // (1 − κ) times the difference of two independent mean squares, that of the rest and σ̂².
         let estimate = 2.0 * expected * expected / law.freedom.max(1.0);
         let shared = match law.source {
-            NoiseSource::Repeats => (law.freedom / freedom).min(1.0),
+            NoiseSource::Repeats => {
+                let contrasts = Contrasts::new(model.places(), model.traces(), model.observed());
+                (law.freedom.min(contrasts.count() as f64) / freedom).min(1.0)
+            }
             NoiseSource::Stated | NoiseSource::Neighbours => 0.0,
         };
         let rest = 1.0 - shared;

@@ -294,7 +294,14 @@ fn the_headline_is_a_minimum_zone_under_its_condition() {
     for (setup, standing, condition) in [(&open, "caution", true), (&closed, "good", false)] {
         let report = folder.path().join(standing);
         let (data, setup) = (text(&data), text(setup));
-        let args = ["four-sensor", data, "--setup", setup, "--out", text(&report)];
+        let args = [
+            "four-sensor",
+            data,
+            "--setup",
+            setup,
+            "--out",
+            text(&report),
+        ];
         let out = errsep(&args);
         assert_eq!(out.status.code(), Some(0));
         let said = String::from_utf8_lossy(&out.stdout).into_owned();
@@ -303,7 +310,10 @@ fn the_headline_is_a_minimum_zone_under_its_condition() {
             .find(|line| line.trim_start().starts_with("straightness "))
             .expect("a headline");
         assert!(headline.contains("(minimum zone), 95 % interval"), "{said}");
-        assert_eq!(headline.contains("if the surface has no parabola"), condition);
+        assert_eq!(
+            headline.contains("if the surface has no parabola"),
+            condition
+        );
         let page = std::fs::read_to_string(report.join("report.html")).expect("a report");
         assert!(page.contains(&format!("summary {standing}")), "{standing}");
         let json = std::fs::read_to_string(report.join("result.json")).expect("JSON");
@@ -364,6 +374,9 @@ fn waves_that_the_spacings_do_not_show_are_listed() {
     let periods = &answer["invisible_periods"]["value"];
     assert_eq!(periods, &serde_json::json!([25.0, 12.5]));
     let listed = answer["not_determined"].as_array().expect("sentences");
-    let named = |text: &Value| text.as_str().is_some_and(|t| t.contains("every 25.00, 12.50 mm"));
+    let named = |text: &Value| {
+        text.as_str()
+            .is_some_and(|t| t.contains("every 25.00, 12.50 mm"))
+    };
     assert!(listed.iter().any(named), "{listed:?}");
 }

@@ -61,6 +61,12 @@ const CASES: &[Case] = &[
         ..USUAL
     },
     Case {
+        name: "paper's surface, 0.3 µm, penalty on the profile from its ends",
+        noise: 0.3,
+        penalised: Penalised::ProfileFromEnds,
+        ..USUAL
+    },
+    Case {
         name: "even waves, 0.1 µm",
         power: Some(0.0),
         ..USUAL

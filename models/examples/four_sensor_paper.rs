@@ -78,7 +78,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The outputs of the runs averaged first, then separated: what repeats are for.
 fn averaged_first(geometry: &Geometry, truth: &Example) -> Result<(), Box<dyn Error>> {
     println!("\n{RUNS} runs averaged, then separated: largest |error|, twice");
-    let separator = Separator::new(geometry, Penalised::Profile, Line::EndPoints)?;
+    let separator = Separator::new(geometry, Penalised::ProfileFromEnds, Line::EndPoints)?;
     let settings = Settings {
         choice: Choice::Likelihood,
         ..Settings::default()
@@ -99,7 +99,7 @@ fn averaged_first(geometry: &Geometry, truth: &Example) -> Result<(), Box<dyn Er
         let slide = (found.straightness.values, found.tilt.values);
         let errors = errors(geometry, truth, slide);
         print_row(
-            &format!("{noise} um, direct, profile, likelihood"),
+            &format!("{noise} um, direct, profile-from-ends, likelihood"),
             &[errors],
         );
     }
@@ -119,7 +119,7 @@ fn spread_of_the_largest(geometry: &Geometry, truth: &Example) -> Result<(), Box
     println!(
         "\nlargest |error| of {RUNS} runs, 5, 50 and 95 % of {SETS} sets: S to a parabola, gamma inside"
     );
-    let separator = Separator::new(geometry, Penalised::Profile, Line::EndPoints)?;
+    let separator = Separator::new(geometry, Penalised::ProfileFromEnds, Line::EndPoints)?;
     let scale = 1e3_f64.to_degrees();
     for noise in [0.1, 0.2, 0.3] {
         for (rule, choice) in [
@@ -160,7 +160,7 @@ fn spread_of_the_largest(geometry: &Geometry, truth: &Example) -> Result<(), Box
             };
             println!(
                 "{:40} {} | {} | {}",
-                format!("{noise} um, direct, profile, {rule}"),
+                format!("{noise} um, direct, profile-from-ends, {rule}"),
                 points(&mut of_s),
                 points(&mut of_tilt),
                 points(&mut of_mean)

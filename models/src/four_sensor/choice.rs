@@ -15,6 +15,9 @@ pub enum Penalised {
     /// The surface itself, ‖f‖².
     #[default]
     Profile,
+    /// The surface counted from its end points, as Zhao et al. do: for surfaces whose ends are known to
+    /// lie on their mean line.
+    ProfileFromEnds,
     /// Its slope: differences of neighbours.
     Slope,
     /// Its curvature: second differences.
@@ -23,24 +26,29 @@ pub enum Penalised {
 
 impl Penalised {
     /// All, in the order of the list above.
-    pub const ALL: [Self; 3] = [Self::Profile, Self::Slope, Self::Curvature];
+    pub const ALL: [Self; 4] = [
+        Self::Profile,
+        Self::ProfileFromEnds,
+        Self::Slope,
+        Self::Curvature,
+    ];
 
     /// The penalty over the surface's points.
     pub fn penalty(self) -> Penalty {
         match self {
-            Self::Profile => Penalty::Identity,
+            Self::Profile | Self::ProfileFromEnds => Penalty::Identity,
             Self::Slope => Penalty::FirstDifference,
             Self::Curvature => Penalty::SecondDifference,
         }
     }
 
-    /// The line from which the penalised surface is counted: the one that makes the penalty least, so
-    /// that what is taken for small does not depend on the line from which the answer is stated.
+    /// The line from which the penalised surface is counted, whatever line the answer is stated from:
+    /// that which makes the penalty least, but for [`Self::ProfileFromEnds`].
     pub const fn line(self) -> Line {
         match self {
             Self::Profile => Line::LeastSquares,
             // The mean slope is that from end to end; second differences do not see a line.
-            Self::Slope | Self::Curvature => Line::EndPoints,
+            Self::ProfileFromEnds | Self::Slope | Self::Curvature => Line::EndPoints,
         }
     }
 
@@ -48,6 +56,7 @@ impl Penalised {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Profile => "profile",
+            Self::ProfileFromEnds => "profile-from-ends",
             Self::Slope => "slope",
             Self::Curvature => "curvature",
         }

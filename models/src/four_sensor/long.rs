@@ -1,7 +1,9 @@
 //! The direct fit of long records, through the band: the same unknowns, penalty and frame as
 //! [`Separator`](super::Separator), at a cost linear in the number of points.
 
-use errsep_solvers::regularization::{BandedSystem, Combination, Factored, RegularizationError};
+use errsep_solvers::regularization::{
+    BandedSystem, Combination, Factored, Penalty, RegularizationError,
+};
 use nalgebra::{DMatrix, DVector, Vector2, Vector4};
 
 use super::frame::Frame;
@@ -33,7 +35,7 @@ pub fn banded_system(
     )?;
     let rows = row_patterns(geometry);
     // Differences do not see a constant or a line, and neither do the outputs: the ends are held.
-    let ends_held = penalised.line() == Line::EndPoints;
+    let ends_held = penalised.penalty() != Penalty::Identity;
     if ends_held {
         system.hold(0)?;
     }

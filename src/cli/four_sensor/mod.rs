@@ -35,7 +35,7 @@ each sensor to the one before and, if known, the noise of one reading:
     spacing = [5.0, 5.0, 25.0]   # mm, multiples of the step
     noise = 0.1                  # um, of one reading of one repeat
     [separation]                 # all optional
-    penalty = \"profile\"          # or slope, curvature
+    penalty = \"profile\"          # or profile-from-ends, slope, curvature
     choice = \"l-curve\"           # or likelihood, gcv, discrepancy; or lambda = 0.02
     line = \"end-points\"          # or least-squares: what surface and straightness are counted from
     [parabola]                   # optional, one of

@@ -132,6 +132,7 @@ pub(super) fn uneven(found: &Found) -> Option<String> {
     let scatter = &found.separation.scatter;
     let penalised = found.setup.penalised;
     let remedy = match penalised {
+        Penalised::ProfileFromEnds => "choose penalty = \"profile\"",
         Penalised::Profile | Penalised::Slope => "choose penalty = \"curvature\"",
         Penalised::Curvature => "space the sensors wider",
     };

@@ -39,6 +39,15 @@ impl Tally {
         self.inside_95 += u64::from(error.abs() <= half_95);
     }
 
+    /// One value of which only the intervals are given, as of a variance: whether the narrow and the wide
+    /// one hold the truth.
+    pub fn add_inside(&mut self, inside_68: bool, inside_95: bool) {
+        self.values += 1;
+        self.squares = f64::NAN;
+        self.inside_68 += u64::from(inside_68);
+        self.inside_95 += u64::from(inside_95);
+    }
+
     /// Both counts together.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
@@ -73,13 +82,18 @@ pub fn print(rows: &[Row]) {
         let count = t.values.max(1) as f64;
         let share = |inside: u64| 100.0 * inside as f64 / count;
         let outside = !(93.0..=97.0).contains(&share(t.inside_95));
+        let rms = (t.squares / count).sqrt();
+        let rms = if rms.is_finite() {
+            format!("{rms:.3}")
+        } else {
+            String::new()
+        };
         println!(
-            "| {} | {} | {} | {} | {:.3} | {:.1} % | {:.1} % | {} |",
+            "| {} | {} | {} | {} | {rms} | {:.1} % | {:.1} % | {} |",
             row.case,
             row.quantity,
             row.seeds,
             t.values,
-            (t.squares / count).sqrt(),
             share(t.inside_68),
             share(t.inside_95),
             if outside { "outside" } else { "" }

@@ -85,7 +85,7 @@ fn form_is_told_and_so_is_what_an_arc_cannot_show() {
     let told = |name: &str, extra: &[&str]| {
         let made = run(
             &folder,
-            &[&["simulate", "circle", "--points", "72"], extra].concat(),
+            &[&["simulate", "circle", "--points", "72"][..], extra].concat(),
         );
         assert_eq!(made.status, 0, "{}", made.stderr);
         folder.write(name, &made.stdout);

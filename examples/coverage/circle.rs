@@ -114,22 +114,12 @@ fn count(what: &CircleSimulation, stated: bool, seed: u64) -> Option<Counts> {
             quantity.degrees_of_freedom.as_f64(),
         );
     }
-    // The interval that the printed degrees of freedom give a standard deviation, written as one about
-    // the middle of the distribution: inside or not is all that is counted.
+    // The interval that the printed degrees of freedom give a standard deviation.
     let freedom = fit.degrees_of_freedom as f64;
     let chi = ChiSquared::new(freedom).ok()?;
     let share = chi.cdf(freedom * (fit.noise_um / NOISE_UM).powi(2));
-    let from_the_middle = (share - 0.5).abs();
-    let spread = fit.noise_um / (2.0 * freedom).sqrt();
-    let error = fit.noise_um - NOISE_UM;
-    let half = |nominal: f64| {
-        if from_the_middle <= nominal / 2.0 {
-            f64::INFINITY
-        } else {
-            0.0
-        }
-    };
-    tallies[3].add_intervals(error, spread, half(ONE_SIGMA), half(0.95));
+    let inside = |nominal: f64| (share - 0.5).abs() <= nominal / 2.0;
+    tallies[3].add_inside(inside(ONE_SIGMA), inside(0.95));
     let alike = fit.neighbours_alike(&points).is_some_and(|p| p < ALIKE);
     Some((tallies, alike))
 }

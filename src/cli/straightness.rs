@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use errsep_models::straightness::{ReferenceLine, Straightness, straightness};
+use errsep_models::straightness::{NoStraightness, ReferenceLine, Straightness, straightness};
 use serde_json::json;
 
 use super::{Answer, CommonArgs};
@@ -39,9 +39,13 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         .map(|reference| straightness(&x, &y, reference))
         .collect::<Result<Vec<_>, _>>()
         .map_err(|e| {
+            let remedy = match e {
+                NoStraightness::TooLarge { .. } => "check the unit of the deviations, um",
+                _ => "give readings at two or more positions",
+            };
             Message::bad_input(e.to_string())
                 .in_file(&args.profile)
-                .remedy("give readings at two or more positions")
+                .remedy(remedy)
         })?;
     if results
         .iter()

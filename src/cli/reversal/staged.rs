@@ -121,7 +121,7 @@ fn noise_words(s: &Staged) -> String {
             number::plain(other.sigma, 3)
         );
     }
-    words
+    words + "; taken as equal in all channels and independent from reading to reading"
 }
 
 fn method_errors(s: &Staged) -> Vec<(String, f64, String)> {

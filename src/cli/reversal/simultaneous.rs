@@ -151,6 +151,7 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         .sum::<f64>();
     let closure = fit.closure.as_ref().map(|c| Closure {
         slope: c.slope,
+        freedom: freedom(std::iter::once(c.degrees_of_freedom)),
         x: c.x.clone(),
         profile: c.profile.clone(),
         rms: c.rms,
@@ -178,12 +179,7 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
             NoiseOrigin::Repeats(law) => Some(law),
             _ => None,
         },
-        noise_freedom: freedom(
-            fit.tilts()
-                .iter()
-                .map(|t| t.degrees_of_freedom)
-                .chain(fit.closure.iter().map(|c| c.degrees_of_freedom)),
-        ),
+        noise_freedom: freedom(fit.tilts().iter().map(|t| t.degrees_of_freedom)),
         form_freedom: freedom(profiles.iter().map(|f| f.degrees_of_freedom)),
         disagree: match fit.knots.verdict {
             KnotVerdict::TooFew => Some(true),
@@ -269,7 +265,9 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
     let cells = fit.knots.cells();
     let how = match setup.knots {
         Some(_) => "as the set-up says",
-        None => "chosen by the corrected information criterion",
+        None => {
+            "chosen by the corrected information criterion (the forms' bands leave that choice out)"
+        }
     };
     let verdict = match fit.knots.verdict {
         KnotVerdict::Enough => "neighbouring residuals are not correlated",

@@ -225,7 +225,8 @@ fn noise_words(fit: &Simultaneous, data: &Observations) -> String {
         NoiseOrigin::Repeats(law) => {
             let part = |variance: f64| number::plain(variance.sqrt(), 2);
             return format!(
-                "from the repeats, {of}: white {} µm, correlated along a trace {} µm over {} mm,                  shift of a trace {} µm",
+                "from the repeats, {of}: white {} µm, correlated along a trace {} µm over {} mm, \
+                 shift of a trace {} µm",
                 part(law.white),
                 part(law.correlated),
                 number::plain(law.length, 2),
@@ -294,10 +295,14 @@ fn warnings(fit: &Simultaneous, closure: Option<&Closure>, setup: &ReversalSetup
         ));
     }
     if fit.knots.verdict == KnotVerdict::TooFew {
+        let counted = if fit.agreement.disagree == Some(true) {
+            ""
+        } else {
+            "; the uncertainties are too small then"
+        };
         warnings.push(format!(
             "residuals of neighbouring readings go together (correlation {}, {} standard deviations): \
-             the forms have more detail than {} cells, or the noise is not independent; the \
-             uncertainties are too small then",
+             the forms have more detail than knots = {} follow, or the noise is not independent{counted}",
             number::plain(fit.knots.neighbour_correlation, 2),
             number::plain(fit.knots.neighbour_z, 2),
             fit.knots.cells()

@@ -61,7 +61,7 @@ pub struct ChannelNoise {
     pub readings: usize,
     /// Root mean square of its residuals, µm.
     pub residual_rms: f64,
-    /// Standard deviation of one reading, µm.
+    /// Standard deviation of one reading, µm, without what the model misses.
     pub sigma: f64,
     /// Its share of the readings less the unknowns.
     pub degrees_of_freedom: f64,

@@ -6,7 +6,6 @@
 //! what), solves them as the command does and counts how often the truth lies within the intervals of
 //! nominally 68.27 % and 95 %. The tables stand in `docs/validation/coverage.md`.
 
-<<<<<<< HEAD
 mod anova;
 mod calibration_line;
 mod circle;

@@ -118,6 +118,11 @@ const CASES: &[Case] = &[
         ..BASE
     },
     Case {
+        name: "taper of 0.5 µrad",
+        taper: 0.5,
+        ..BASE
+    },
+    Case {
         name: "taper of 5 µrad",
         taper: 5.0,
         ..BASE
@@ -167,14 +172,58 @@ const CASES: &[Case] = &[
 ];
 
 pub fn rows(seeds: u64) -> Vec<Row> {
-    CASES.iter().flat_map(|case| case.rows(seeds)).collect()
+    let mut rows: Vec<Row> = CASES.iter().flat_map(|case| case.rows(seeds)).collect();
+    for channels in 1..=4 {
+        for cells in [1, 12] {
+            rows.push(knots_scanned(channels, cells, seeds / 20));
+        }
+    }
+    rows
+}
+
+/// The first tilt over designs of 4 to 600 positions with 0.2 to 3 times as many knots, forms in the
+/// splines' space (one cell) or not.
+fn knots_scanned(channels: usize, cells: usize, seeds: u64) -> Row {
+    let (mut tally, mut refused, mut answered) = (Tally::default(), 0, 0);
+    for positions in [4, 6, 10, 25, 61, 150, 600] {
+        for share in [0.2, 0.5, 0.8, 0.95, 1.2, 3.0] {
+            let case = Case {
+                positions,
+                knots: ((share * positions as f64) as usize).max(1),
+                cells,
+                read: &ALL[..channels],
+                ..BASE
+            };
+            let found: Vec<_> = (0..seeds.max(4))
+                .into_par_iter()
+                .map(|seed| case.one(seed))
+                .collect();
+            for found in found {
+                match found.as_ref().and_then(|f| f.first()) {
+                    Some((_, own)) => {
+                        tally = tally.and(*own);
+                        answered += 1;
+                    }
+                    None => refused += 1,
+                }
+            }
+        }
+    }
+    let inside = if cells == 1 { "in" } else { "outside" };
+    Row {
+        case: format!(
+            "knots 0.2 to 3 × positions, 4 to 600 positions, {channels} channels, forms {inside} the splines' space; {refused} refused"
+        ),
+        quantity: "first tilt".to_owned(),
+        seeds: answered,
+        tally,
+    }
 }
 
 impl Case {
     fn rows(&self, seeds: u64) -> Vec<Row> {
-        // Cases with many readings take fewer seeds: the same number of readings, at least 400.
-        let readings = (self.positions as u64 * u64::from(self.repeats)).max(61);
-        let seeds = (seeds * 61 / readings).max(seeds.min(400));
+        // Cases with many positions take fewer seeds, at least 400.
+        let seeds = (seeds * 61 / (self.positions as u64).max(61)).max(seeds.min(400));
         let found: Vec<Vec<(String, Tally)>> = (0..seeds)
             .into_par_iter()
             .filter_map(|seed| self.one(seed))
@@ -237,10 +286,8 @@ impl Case {
         }
         if let Some(closure) = &solution.closure {
             let error = closure.slope.value - 1e-6 * self.taper;
-            found.push((
-                "closure".to_owned(),
-                counted(error, closure.slope.std, freedom),
-            ));
+            let own = closure.degrees_of_freedom;
+            found.push(("closure".to_owned(), counted(error, closure.slope.std, own)));
         }
         let x: Vec<f64> = LOOKED_AT.iter().map(|share| share * LENGTH_MM).collect();
         let profiles = solution.forms(&x);

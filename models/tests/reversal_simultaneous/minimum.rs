@@ -260,13 +260,14 @@ fn from_a_head_start_the_minimum_is_that_over_all_readings() {
             assert!(error.abs() < 1e-4 * t.angle.std, "{}: {error:e}", t.name);
         }
         if noise == Noise::Estimated {
-            // The fixed point: under these weights the noise comes out as one in every channel.
+            // Under these weights the noise comes out as one in all channels together.
+            let (mut left, mut freedom) = (0.0, 0.0);
             for n in &solution.noise {
-                let left = n.readings as f64 * n.residual_rms.powi(2);
-                let again = (left / n.degrees_of_freedom).sqrt();
-                // Truncation: where the rounds end, a change of 1e-4.
-                assert!((again / n.sigma - 1.0).abs() < 2e-4, "{n:?}");
+                left += n.readings as f64 * (n.residual_rms / n.sigma).powi(2);
+                freedom += n.degrees_of_freedom;
             }
+            // Epsilons: 3600 terms.
+            assert!((left / freedom - 1.0).abs() < 1e-12, "{left} {freedom}");
         }
     }
 }

@@ -36,11 +36,13 @@ fn uneven_traces_gaps_repeats_and_unequal_noise_stay_within_the_stated_uncertain
     }
     for (noise, trace) in solution.noise.iter().zip(&plan.traces) {
         let relative = noise.sigma / trace.noise - 1.0;
-        let limit = 4.0 / (2.0 * noise.degrees_of_freedom).sqrt();
+        // k·u: contrasts of two repeats in two directions, of which neighbours keep half.
+        let freedom = 0.5 * 2.0 * trace.positions.len() as f64;
+        let limit = 4.0 / (2.0 * freedom).sqrt();
         assert!(relative.abs() < limit, "{noise:?}");
     }
     let freedom: f64 = solution.noise.iter().map(|n| n.degrees_of_freedom).sum();
-    // Traces of the hat matrix add up to the unknowns: 3 × 11 coefficients, 3 tilts, 4 offsets.
+    // Readings less unknowns: 3 × 11 coefficients, 3 tilts, 4 offsets.
     let unknowns = observations.readings.len() as f64 - freedom;
     assert!((unknowns - 40.0).abs() < 1e-6, "{unknowns}");
     for (profile, form) in solution

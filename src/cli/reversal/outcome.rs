@@ -31,6 +31,8 @@ pub struct Form {
 pub struct Closure {
     /// rad.
     pub slope: Value,
+    /// How well its standard uncertainty is known.
+    pub freedom: DegreesOfFreedom,
     pub x: Vec<f64>,
     /// µm.
     pub profile: Vec<f64>,
@@ -104,8 +106,12 @@ impl Outcome {
     /// # Errors
     /// A value or an uncertainty that is not finite.
     pub fn quantity(&self, label: &str, angle: Value) -> Result<Quantity, UncertaintyError> {
-        Ok(Quantity::new(label, angle.value, angle.std, "rad")?
-            .with_degrees_of_freedom(self.noise_freedom))
+        // What is shown of the closure is its slope, whether as such or as a contrast.
+        let freedom = match &self.closure {
+            Some(closure) if closure.slope == angle => closure.freedom,
+            _ => self.noise_freedom,
+        };
+        Ok(Quantity::new(label, angle.value, angle.std, "rad")?.with_degrees_of_freedom(freedom))
     }
 
     /// What an angle means.

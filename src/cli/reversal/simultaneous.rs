@@ -151,6 +151,7 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         .sum::<f64>();
     let closure = fit.closure.as_ref().map(|c| Closure {
         slope: c.slope,
+        freedom: freedom(std::iter::once(c.degrees_of_freedom)),
         x: c.x.clone(),
         profile: c.profile.clone(),
         rms: c.rms,
@@ -178,12 +179,7 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
             NoiseOrigin::Repeats(law) => Some(law),
             _ => None,
         },
-        noise_freedom: freedom(
-            fit.tilts()
-                .iter()
-                .map(|t| t.degrees_of_freedom)
-                .chain(fit.closure.iter().map(|c| c.degrees_of_freedom)),
-        ),
+        noise_freedom: freedom(fit.tilts().iter().map(|t| t.degrees_of_freedom)),
         form_freedom: freedom(profiles.iter().map(|f| f.degrees_of_freedom)),
         disagree: match fit.knots.verdict {
             KnotVerdict::TooFew => Some(true),
@@ -229,7 +225,8 @@ fn noise_words(fit: &Simultaneous, data: &Observations) -> String {
         NoiseOrigin::Repeats(law) => {
             let part = |variance: f64| number::plain(variance.sqrt(), 2);
             return format!(
-                "from the repeats, {of}: white {} µm, correlated along a trace {} µm over {} mm,                  shift of a trace {} µm",
+                "from the repeats, {of}: white {} µm, correlated along a trace {} µm over {} mm, \
+                 shift of a trace {} µm",
                 part(law.white),
                 part(law.correlated),
                 number::plain(law.length, 2),
@@ -269,7 +266,9 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
     let cells = fit.knots.cells();
     let how = match setup.knots {
         Some(_) => "as the set-up says",
-        None => "chosen by the corrected information criterion",
+        None => {
+            "chosen by the corrected information criterion (the forms' bands leave that choice out)"
+        }
     };
     let verdict = match fit.knots.verdict {
         KnotVerdict::Enough => "neighbouring residuals are not correlated",
@@ -296,10 +295,14 @@ fn warnings(fit: &Simultaneous, closure: Option<&Closure>, setup: &ReversalSetup
         ));
     }
     if fit.knots.verdict == KnotVerdict::TooFew {
+        let counted = if fit.agreement.disagree == Some(true) {
+            ""
+        } else {
+            "; the uncertainties are too small then"
+        };
         warnings.push(format!(
             "residuals of neighbouring readings go together (correlation {}, {} standard deviations): \
-             the forms have more detail than {} cells, or the noise is not independent; the \
-             uncertainties are too small then",
+             the forms have more detail than knots = {} follow, or the noise is not independent{counted}",
             number::plain(fit.knots.neighbour_correlation, 2),
             number::plain(fit.knots.neighbour_z, 2),
             fit.knots.cells()

@@ -63,6 +63,7 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         contrasts: s.contrasts,
         closure: s.closure.as_ref().map(|c| Closure {
             slope: c.slope,
+            freedom: freedom(s.noise.degrees_of_freedom),
             x: c.x.clone(),
             profile: c.profile.clone(),
             rms: c.rms,

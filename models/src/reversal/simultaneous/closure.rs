@@ -18,7 +18,11 @@ pub fn of(
 ) -> Option<Closure> {
     let index = problem.unknowns.closure_index()?;
     let (value, covariance) = result.released(problem, index)?;
-    let (std, degrees_of_freedom) = scatter.spread(&covariance, &[], &[(index, 1.0)]);
+    let own = covariance.variance(&[], &[(index, 1.0)]);
+    let (std, degrees_of_freedom) =
+        scatter
+            .released(value * value / own)
+            .spread(&covariance, &[], &[(index, 1.0)]);
     let (x, profile) = profile(problem, channels, residuals);
     let rms = (profile.iter().map(|c| c * c).sum::<f64>() / profile.len().max(1) as f64).sqrt();
     Some(Closure {

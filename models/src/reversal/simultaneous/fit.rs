@@ -127,7 +127,11 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
             freedom
         },
     };
-    let unit = if robust { 1.0 } else { variance.sqrt() };
+    let unit = if robust {
+        1.0
+    } else {
+        (variance - left.variance).max(0.0).sqrt()
+    };
     let mut residuals = vec![0.0; readings];
     for (channel, own) in channels.iter().zip(&by_channel) {
         for (i, r) in channel.source.iter().zip(own) {
@@ -172,7 +176,7 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         let along = AlongTraces::new(&solution, &problem, &survey, &by_channel)?;
         if let Some(along) = along {
             let (law, missed) = (along.law(), along.missed_variance());
-            let unit = (law.variance() + missed).sqrt();
+            let unit = law.variance().sqrt();
             solution.noise = channel_noise(&channels, &sigmas, &by_channel, unit, freedom);
             let mean_square = rms(&sigmas).powi(2);
             solution.noise_origin = NoiseOrigin::Repeats(law.times(mean_square));

@@ -2,9 +2,9 @@
 //! smooth along a trace, or that every repeat has.
 //!
 //! Every reading is taken against the line through its neighbours in the same trace; where there are
-//! repeats, the same is done with contrasts of the repeats. The sum of squares of such differences is
-//! cut at three standard deviations (told by the median first), so that neither an outlier nor a jump
-//! makes a channel's noise.
+//! repeats, the same is done with contrasts of the repeats. Differences beyond three standard deviations
+//! (told by the median first) are left out where channels are told apart, so that neither an outlier nor a
+//! jump makes a channel's noise.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -13,13 +13,12 @@ use super::traces::{Group, Trace};
 
 /// Most differences of a trace that are looked at, evenly spread.
 const MOST: usize = 4096;
-/// Differences are cut at so many standard deviations.
+/// Differences beyond so many standard deviations are left out.
 const CUT: f64 = 3.0;
-/// The mean of min(z², 9) of a standard normal z.
-const CUT_MEAN: f64 = 0.995_01;
-/// Information of a cut square relative to a square, times that of overlapping differences relative to
-/// independent ones, 18/35.
-const SHARE: f64 = 0.95 * 18.0 / 35.0;
+/// The mean of z² of what is kept of standard normal z, and the degrees of freedom of that mean a
+/// difference; both drawn, neighbouring differences overlapping.
+const CUT_MEAN: f64 = 0.970;
+const SHARE: f64 = 0.47;
 /// Noise that differs between channels is believed below this probability that equal noise would
 /// differ so (Bartlett's test).
 const LEVEL: f64 = 0.01;
@@ -32,9 +31,11 @@ const LEAST: f64 = 1e-3;
 /// What the differences of one channel say.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
-    /// Variance of one reading.
+    /// Variance of one reading, outliers left out.
     pub variance: f64,
-    /// Degrees of freedom of that.
+    /// The same with all in it.
+    pub whole: f64,
+    /// Degrees of freedom of these.
     pub freedom: f64,
 }
 
@@ -44,7 +45,7 @@ pub struct Levels(pub Vec<Level>);
 
 impl Levels {
     /// From values (readings or residuals) of each channel's sorted readings, trace by trace.
-    pub fn along(channels: &[ChannelReadings], traces: &[Vec<Trace>], values: &[Vec<f64>]) -> Self {
+    pub fn along(channels: &[ChannelReadings], traces: &[Vec<Trace>], values: &[&[f64]]) -> Self {
         let levels = channels.iter().zip(traces).zip(values);
         Self(
             levels
@@ -96,9 +97,13 @@ impl Levels {
     /// The variance of all channels together, and its degrees of freedom.
     pub fn pooled(&self) -> Level {
         let freedom: f64 = self.0.iter().map(|l| l.freedom).sum();
-        let sum: f64 = self.0.iter().map(|l| l.freedom * l.variance).sum();
+        let mean = |of: fn(&Level) -> f64| {
+            let sum: f64 = self.0.iter().map(|l| l.freedom * of(l)).sum();
+            if freedom > 0.0 { sum / freedom } else { 0.0 }
+        };
         Level {
-            variance: if freedom > 0.0 { sum / freedom } else { 0.0 },
+            variance: mean(|l| l.variance),
+            whole: mean(|l| l.whole),
             freedom,
         }
     }
@@ -172,31 +177,30 @@ fn differences(
 
 fn level(mut found: Vec<f64>) -> Level {
     let count = found.len() as f64;
-    if found.is_empty() {
-        return Level {
-            variance: 0.0,
-            freedom: 0.0,
-        };
-    }
     for d in &mut found {
         *d *= *d;
     }
+    let whole = found.iter().sum::<f64>() / count.max(1.0);
     let middle = found.len() / 2;
-    let (_, median, _) = found.select_nth_unstable_by(middle, f64::total_cmp);
+    let median = if found.is_empty() {
+        0.0
+    } else {
+        *found.select_nth_unstable_by(middle, f64::total_cmp).1
+    };
     // The median of z² of a standard normal z is 0.4549. Readings of which half are equal tell
     // nothing by it.
-    let most = if *median > 0.0 {
-        CUT * CUT * *median / 0.4549
-    } else {
-        f64::INFINITY
-    };
-    let mean = found.iter().map(|d| d.min(most)).sum::<f64>() / count;
+    let most = CUT * CUT * median / 0.4549;
+    let (sum, kept) = found
+        .iter()
+        .filter(|d| **d <= most)
+        .fold((0.0, 0.0), |(sum, kept), d| (sum + d, kept + 1.0));
     Level {
-        variance: if most.is_finite() {
-            mean / CUT_MEAN
+        variance: if median > 0.0 {
+            sum / kept / CUT_MEAN
         } else {
-            mean
+            whole
         },
+        whole,
         freedom: SHARE * count,
     }
 }
@@ -227,7 +231,7 @@ mod tests {
         }
         let channels = ChannelReadings::sort(&data);
         let traces = super::super::traces::of(&channels, &data);
-        let values: Vec<Vec<f64>> = channels.iter().map(|c| c.value.clone()).collect();
+        let values: Vec<&[f64]> = channels.iter().map(|c| c.value.as_slice()).collect();
         Levels::along(&channels, &traces, &values)
     }
 

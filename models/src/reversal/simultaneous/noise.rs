@@ -91,7 +91,8 @@ impl<'a> Survey<'a> {
             Noise::Declared(sigma) => vec![sigma; self.channels.len()],
             Noise::Equal => vec![1.0; self.channels.len()],
             Noise::Estimated => {
-                let values: Vec<Vec<f64>> = self.channels.iter().map(|c| c.value.clone()).collect();
+                let values: Vec<&[f64]> =
+                    self.channels.iter().map(|c| c.value.as_slice()).collect();
                 let levels = Levels::along(self.channels, &self.traces, &values);
                 levels.sigmas(&vec![1.0; self.channels.len()])
             }
@@ -132,6 +133,7 @@ pub fn settle(
     let mut known = match options.noise {
         Noise::Declared(_) => Some(Level {
             variance: 1.0,
+            whole: 1.0,
             freedom: f64::INFINITY,
         }),
         _ => None,
@@ -210,7 +212,8 @@ fn levels(survey: &Survey, residuals: &[Vec<f64>]) -> Levels {
     if repeated.0.iter().all(|l| l.freedom > 0.0) {
         repeated
     } else {
-        Levels::along(survey.channels, &survey.traces, residuals)
+        let values: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+        Levels::along(survey.channels, &survey.traces, &values)
     }
 }
 
@@ -255,6 +258,7 @@ fn known_level(problem: &Reversal, levels: &Levels, sigmas: &[f64]) -> Option<Le
     }
     let weighted = levels.0.iter().zip(sigmas).map(|(l, s)| Level {
         variance: l.variance / (s * s),
+        whole: l.whole / (s * s),
         ..*l
     });
     let pooled = Levels(weighted.collect()).pooled();
@@ -264,7 +268,7 @@ fn known_level(problem: &Reversal, levels: &Levels, sigmas: &[f64]) -> Option<Le
 /// Whether the variance left by a fit exceeds the noise clearly.
 fn exceeds(left: f64, freedom: f64, known: Level) -> bool {
     let doubt = (2.0 / known.freedom + 2.0 / freedom).sqrt();
-    left > known.variance * (CLEAR * doubt).exp()
+    left > known.whole * (CLEAR * doubt).exp()
 }
 
 /// What is left of the readings beside the noise: whether the model clearly misses something, and how
@@ -293,7 +297,7 @@ impl Left {
         Self {
             clear,
             variance: match (clear, known) {
-                (Some(true), Some(known)) => (left - known.variance).max(0.0),
+                (Some(true), Some(known)) => (left - known.whole).max(0.0),
                 _ => 0.0,
             },
         }
@@ -316,6 +320,7 @@ fn shared_misfit(
     };
     let known = Level {
         variance: 1.0,
+        whole: 1.0,
         freedom: levels.pooled().freedom,
     };
     if before <= 0.0 && !exceeds(left(0.0) / freedom, freedom, known) {

@@ -61,7 +61,7 @@ pub struct ChannelNoise {
     pub readings: usize,
     /// Root mean square of its residuals, µm.
     pub residual_rms: f64,
-    /// Standard deviation of one reading, µm.
+    /// Standard deviation of one reading, µm, without what the model misses.
     pub sigma: f64,
     /// Its share of the readings less the unknowns.
     pub degrees_of_freedom: f64,
@@ -97,6 +97,20 @@ pub(super) enum Scatter {
 }
 
 impl Scatter {
+    /// The same after a further unknown has taken so much of the weighted sum of squares.
+    pub fn released(&self, taken: f64) -> Self {
+        match self {
+            Self::White { variance, freedom } if freedom.is_finite() && *freedom > 1.0 => {
+                let left = freedom - 1.0;
+                Self::White {
+                    variance: ((variance * freedom - taken) / left).max(0.0),
+                    freedom: left,
+                }
+            }
+            other => other.clone(),
+        }
+    }
+
     /// Standard uncertainty of a combination of unknowns, and its degrees of freedom.
     pub fn spread(
         &self,

@@ -7,6 +7,7 @@
 //! nominally 68.27 % and 95 %. The tables stand in `docs/validation/coverage.md`.
 
 mod circle;
+mod fourier;
 mod tally;
 
 use std::process::ExitCode;
@@ -17,7 +18,10 @@ use tally::Row;
 type Room = (&'static str, u64, fn(u64) -> Vec<Row>);
 
 /// One line a model.
-const ROOMS: &[Room] = &[("circle", 2000, circle::rows)];
+const ROOMS: &[Room] = &[
+    ("circle", 2000, circle::rows),
+    ("fourier", 1000, fourier::rows),
+];
 
 fn main() -> ExitCode {
     let mut seeds = None;

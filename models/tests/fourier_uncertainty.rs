@@ -2,7 +2,8 @@
 
 use errsep_models::fourier::{
     Combination, Compensation, Disturbance, FourierError, FourierSimulation, NoiseSource, Scan,
-    Section, Separation, mean_deviation, separate, simulate, simulate_disturbed, straightness,
+    ScanReading, Section, Separation, mean_deviation, separate, simulate, simulate_disturbed,
+    straightness,
 };
 use std::f64::consts::TAU;
 
@@ -321,5 +322,41 @@ fn what_cannot_be_told_is_refused() {
     assert_eq!(asked(Some(2.0)), FourierError::StepNotSeen { orders: 30 });
     for noise in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(asked(Some(noise)), FourierError::Noise { .. }));
+    }
+}
+
+#[test]
+fn equal_tiny_and_huge_readings_give_finite_numbers() {
+    let scan = |spacing: f64, size: f64, jump: f64| Scan {
+        spacing,
+        repeat: 1,
+        readings: (0..=100)
+            .map(|k| ScanReading {
+                x: f64::from(k),
+                m1: size,
+                m2: Some(if k == 7 { jump } else { size }),
+                m3: Some(size),
+            })
+            .collect(),
+    };
+    for (size, jump) in [
+        (0.0, 0.0),
+        (1.0, 1.0),
+        (1.0, 1e99),
+        (1e-200, 0.0),
+        (1e99, -1e99),
+    ] {
+        let scans = [scan(48.0, size, jump), scan(34.0, size, jump)];
+        for scans in [&scans[..], &scans[..1]] {
+            for noise in [None, Some(1e-200), Some(1e200)] {
+                let s = solve(scans, Compensation::Fitted, noise);
+                let finite = |list: &[f64]| list.iter().all(|v| v.is_finite());
+                assert!(
+                    finite(&s.workpiece) && finite(&s.workpiece_std),
+                    "{size} {jump}"
+                );
+                assert!(s.beyond_orders.is_none_or(|b| b.rms.is_finite()));
+            }
+        }
     }
 }

@@ -41,36 +41,37 @@ pub(super) fn beyond_orders(
     source: NoiseSource,
     degrees: DegreesOfFreedom,
 ) -> Option<BeyondOrders> {
+    let variance = sigma * sigma;
     let highest = groups.iter().map(Group::highest).max().unwrap_or(0);
     // Where the finer half tells the noise it cannot be tested against it.
     let end = match source {
         NoiseSource::BeyondOrders => finer_half(orders, highest),
         _ => highest + 1,
     };
-    // Variance 1 in each of two parts under noise alone.
+    // Variance σ² in each of two parts under noise alone.
     let powers: Vec<f64> = (orders + 1..end)
         .filter_map(|order| {
             let known = information(groups, order, |_| true)?;
-            Some(known * common(groups, steps, order)?.norm_sqr() / (sigma * sigma))
+            Some(known * common(groups, steps, order)?.norm_sqr())
         })
         .collect();
     let whole: f64 = powers.iter().sum();
     let freedom = 2.0 * powers.len() as f64;
     let greatest = powers.iter().copied().fold(0.0, f64::max);
-    let single = powers.len() as f64 * exceeding(greatest, 2.0, degrees);
+    let single = powers.len() as f64 * exceeding(greatest / variance, 2.0, degrees);
     let mut probabilities = vec![single];
     let (mut sum, mut size) = (0.0, 1);
     for (count, power) in (1usize..).zip(&powers) {
         sum += power;
         if count == size || count == powers.len() {
-            probabilities.push(exceeding(sum, 2.0 * count as f64, degrees));
+            probabilities.push(exceeding(sum / variance, 2.0 * count as f64, degrees));
             size *= 2;
         }
     }
     let least = probabilities.iter().copied().fold(1.0, f64::min);
     let p_value = (probabilities.len() as f64 * least).min(1.0);
     let readings: f64 = groups.iter().map(Group::weight).sum();
-    let rms = sigma * ((whole - freedom).max(0.0) / readings).sqrt();
+    let rms = ((whole - freedom * variance).max(0.0) / readings).sqrt();
     (p_value < TOLD_BELOW).then_some(BeyondOrders { rms, p_value })
 }
 
@@ -89,6 +90,12 @@ pub(super) fn disagreement_of(
 
 /// Probability that a sum of squares in units of an estimated variance exceeds a value.
 fn exceeding(value: f64, freedom: f64, degrees: DegreesOfFreedom) -> f64 {
+    // Without scatter and without noise nothing is to be compared; beyond the limit all tails are zero,
+    // and the laws' own arithmetic would overflow.
+    if value.is_nan() {
+        return 1.0;
+    }
+    let value = value.min(1e100);
     let tail = match degrees {
         DegreesOfFreedom::Infinite => ChiSquared::new(freedom).map(|law| law.sf(value)).ok(),
         DegreesOfFreedom::Finite(below) => FisherSnedecor::new(freedom, below)

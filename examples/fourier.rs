@@ -13,15 +13,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let found = separate(
         &scans,
         section,
-        Compensation::Chord,
+        Compensation::Fitted,
         Combination::LeastSquares,
         None,
     )?;
-    let (profile, actual) = (
-        straightness(&found.x, &found.workpiece),
-        straightness(&truth.x, &truth.workpiece),
-    );
-    let greatest = profile
+    let actual = straightness(&truth.x, &truth.workpiece);
+    let greatest = found
+        .straightness
         .iter()
         .zip(&actual)
         .map(|(a, b)| (a - b).abs())

@@ -11,6 +11,7 @@ mod calibration_line;
 mod circle;
 mod diagnosis;
 mod four_sensor;
+mod fourier;
 mod machine;
 mod reversal;
 mod staged;
@@ -30,6 +31,7 @@ const ROOMS: &[Room] = &[
     ("staged", 2000, staged::rows),
     ("circle", 2000, circle::rows),
     ("four-sensor", 400, four_sensor::rows),
+    ("fourier", 2000, fourier::rows),
     ("step-diagonal", 2000, step_diagonal::rows),
     ("machine", 2000, machine::rows),
     ("anova", 2000, anova::rows),

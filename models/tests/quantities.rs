@@ -62,8 +62,9 @@ fn fourier_profile_and_orders_carry_the_freedom_of_the_noise() {
     let orders = found.order_quantities().unwrap();
     assert_eq!(profile.len(), 200);
     assert_eq!(orders.len(), 2 * (30 - found.lost.len()));
-    // Three spacings: two of three coefficients, real and imaginary, are left over in each order.
-    let left = DegreesOfFreedom::Finite(2.0 * 2.0 * (30 - found.lost.len()) as f64);
+    // Three spacings: two of three coefficients, real and imaginary, are left over in each order of the
+    // coarser half, less the three steps at the joints.
+    let left = DegreesOfFreedom::Finite(2.0 * 2.0 * 49.0 - 3.0);
     assert!(
         profile
             .iter()

@@ -1,30 +1,30 @@
 //! Scans of the Fourier three-sensor method and their set-up.
 
-use std::path::Path;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
-use errsep_models::fourier::{Combination, Compensation, Scan, ScanReading};
+use errsep_models::fourier::{
+    Combination, Compensation, FourierError, Scan, ScanReading, Section, join, step_terms,
+};
 use serde::Deserialize;
+use toml::Spanned;
 
+use super::message::Place;
 use super::{Message, SetupFile, TableReader};
 
 /// The set-up of a Fourier separation.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Default)]
 pub struct FourierSetup {
     /// The section.
-    #[serde(default)]
     pub section: SectionSetup,
     /// The probes.
-    #[serde(default)]
     pub probe: ProbeSetup,
     /// The method.
-    #[serde(default)]
     pub method: MethodSetup,
 }
 
 /// `[section]`.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Default)]
 pub struct SectionSetup {
     /// Length L, mm.
     pub length: Option<f64>,
@@ -33,11 +33,9 @@ pub struct SectionSetup {
 }
 
 /// `[probe]`.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Default)]
 pub struct ProbeSetup {
     /// Spacing d of each data file, mm, in the order of the files.
-    #[serde(default)]
     pub spacing: Vec<f64>,
     /// Standard deviation of one reading, µm.
     pub noise: Option<f64>,
@@ -47,7 +45,7 @@ pub struct ProbeSetup {
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MethodSetup {
-    /// `chord`, `level` or `none`.
+    /// `fitted`, `chord`, `level` or `none`.
     #[serde(default)]
     pub compensation: Compensation,
     /// `least-squares` or `hybrid`.
@@ -55,14 +53,163 @@ pub struct MethodSetup {
     pub combination: Combination,
 }
 
+/// The set-up as it stands in the file.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    section: SectionTable,
+    #[serde(default)]
+    probe: ProbeTable,
+    #[serde(default)]
+    method: MethodSetup,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SectionTable {
+    length: Option<Spanned<f64>>,
+    orders: Option<Spanned<usize>>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ProbeTable {
+    #[serde(default)]
+    spacing: Vec<Spanned<f64>>,
+    noise: Option<Spanned<f64>>,
+}
+
 impl FourierSetup {
     /// Reads the set-up.
     ///
     /// # Errors
-    /// Those of [`SetupFile`].
+    /// Those of [`SetupFile`]; a length, a spacing or a noise that is not a positive number, no order.
     pub fn read(path: &Path) -> Result<Self, Message> {
-        SetupFile::read(path)?.parse()
+        let file = SetupFile::read(path)?;
+        let File {
+            section,
+            probe,
+            method,
+        } = file.parse()?;
+        let positive = |value: Spanned<f64>, name: &str, remedy: &str| {
+            let found = *value.get_ref();
+            if found > 0.0 && found.is_finite() {
+                Ok(found)
+            } else {
+                Err(file.bad(
+                    value.span(),
+                    format!("{name} = {found} is not a positive number"),
+                    remedy,
+                ))
+            }
+        };
+        let length = section
+            .length
+            .map(|v| positive(v, "length", "give the length of the section in mm"))
+            .transpose()?;
+        if let Some(orders) = section.orders.as_ref().filter(|o| *o.get_ref() == 0) {
+            return Err(file.bad(
+                orders.span(),
+                "no order is kept",
+                "give the highest order to keep, 1 or more",
+            ));
+        }
+        let noise = "give the standard deviation of one reading in um, or leave it out to have it estimated";
+        Ok(Self {
+            section: SectionSetup {
+                length,
+                orders: section.orders.map(Spanned::into_inner),
+            },
+            probe: ProbeSetup {
+                spacing: probe
+                    .spacing
+                    .into_iter()
+                    .map(|v| positive(v, "spacing", "give the distance from P1 to P2 in mm"))
+                    .collect::<Result<_, _>>()?,
+                noise: probe
+                    .noise
+                    .map(|v| positive(v, "noise", noise))
+                    .transpose()?,
+            },
+            method,
+        })
     }
+}
+
+/// A scan, and the line of the file where each of its readings stands.
+#[derive(Debug, Clone)]
+pub struct LocatedScan {
+    /// The scan.
+    pub scan: Scan,
+    file: PathBuf,
+    lines: Vec<usize>,
+}
+
+impl LocatedScan {
+    /// Checks that the scan can be joined.
+    ///
+    /// # Errors
+    /// What the method cannot use, with its line.
+    pub fn check(&self, section: Section, compensation: Compensation) -> Result<(), Message> {
+        join(&self.scan, section)
+            .and_then(|_| step_terms(&self.scan, section, compensation))
+            .map(|_| ())
+            .map_err(|e| {
+                let place = e.reading().unwrap_or(0);
+                told(&e).at(Place {
+                    file: self.file.clone(),
+                    line: self.lines.get(place).copied().unwrap_or(0),
+                    column: 1,
+                    text: String::new(),
+                    length: 0,
+                })
+            })
+    }
+}
+
+/// An error of the method for the person who can mend it.
+pub fn told(error: &FourierError) -> Message {
+    let message = match error {
+        FourierError::NoiseUnknown { .. } | FourierError::StepNotSeen { .. } => {
+            Message::not_solved(error.to_string())
+        }
+        _ => Message::bad_input(error.to_string()),
+    };
+    message.remedy(match error {
+        FourierError::NoScan => "give at least one scan",
+        FourierError::Spacing { .. } => {
+            "correct the spacing, or the length of the section ([section] length or --length)"
+        }
+        FourierError::NotFinite { .. } => "correct the reading, in um",
+        FourierError::Duplicate { .. } => {
+            "remove one of the two rows, or number repeats in a column `repeat`"
+        }
+        FourierError::UnevenGrid { .. } => {
+            "give one row for each step of the grid, from x = 0; resample a scan that is uneven"
+        }
+        FourierError::SectionNotFilled { .. } => {
+            "read P1 from 0 to the end of the section, or correct its length"
+        }
+        FourierError::ProbeMissing { .. } => {
+            "read P2 before the joint x = L - d and P3 from there on"
+        }
+        FourierError::NoOverlap { .. } => {
+            "read both probes at the joint, or choose [method] compensation = \"fitted\""
+        }
+        FourierError::NoClosingReading { .. } => {
+            "read P1 there, or choose [method] compensation = \"fitted\""
+        }
+        FourierError::TooManyOrders { .. } => "keep fewer [section] orders, or read more finely",
+        FourierError::Noise { .. } => "give a number greater than zero, or leave it out",
+        FourierError::NoiseUnknown { .. } => {
+            "state it as [probe] noise (um), keep fewer [section] orders, or measure repeats"
+        }
+        FourierError::StepNotSeen { .. } => {
+            "keep fewer [section] orders, or choose [method] compensation = \"chord\""
+        }
+        FourierError::Simulation { .. } => "correct what is simulated",
+    })
 }
 
 /// Reads the scans of one file: columns `x`, `m1`, `m2`, and where they apply `m3`, `spacing` and
@@ -70,7 +217,7 @@ impl FourierSetup {
 ///
 /// # Errors
 /// The table cannot be read, or the spacing is nowhere.
-pub fn read_scans(path: &Path, given: Option<f64>) -> Result<Vec<Scan>, Message> {
+pub fn read_scans(path: &Path, given: Option<f64>) -> Result<Vec<LocatedScan>, Message> {
     let mut table = TableReader::open(path)?;
     table.only(&["x", "m1", "m2", "m3", "spacing", "repeat"])?;
     let (x, m1, m2) = (table.column("x")?, table.column("m1")?, table.column("m2")?);
@@ -81,7 +228,8 @@ pub fn read_scans(path: &Path, given: Option<f64>) -> Result<Vec<Scan>, Message>
             "add a column `spacing` (mm), or give [probe] spacing in the set-up, one number a file",
         ));
     }
-    let mut scans: Vec<Scan> = Vec::new();
+    let mut scans: Vec<LocatedScan> = Vec::new();
+    let mut places: HashMap<(u64, u32), usize> = HashMap::new();
     while let Some(row) = table.next_row()? {
         let number = match &repeat {
             Some(column) => row.count(column)?,
@@ -102,23 +250,33 @@ pub fn read_scans(path: &Path, given: Option<f64>) -> Result<Vec<Scan>, Message>
             m2: optional(&m2)?,
             m3: m3.as_ref().map(optional).transpose()?.flatten(),
         };
-        let place = scans
-            .iter()
-            .position(|s| s.spacing == own && s.repeat == number);
-        match place.and_then(|i| scans.get_mut(i)) {
-            Some(scan) => scan.readings.push(reading),
-            None => scans.push(Scan {
-                spacing: own,
-                repeat: number,
-                readings: vec![reading],
-            }),
+        let place = *places.entry((own.to_bits(), number)).or_insert_with(|| {
+            scans.push(LocatedScan {
+                scan: Scan {
+                    spacing: own,
+                    repeat: number,
+                    readings: Vec::new(),
+                },
+                file: path.to_owned(),
+                lines: Vec::new(),
+            });
+            scans.len() - 1
+        });
+        if let Some(scan) = scans.get_mut(place) {
+            scan.scan.readings.push(reading);
+            scan.lines.push(row.line());
         }
     }
     if scans.is_empty() {
         return Err(table.no_rows());
     }
-    for scan in &mut scans {
-        scan.readings.sort_by(|a, b| a.x.total_cmp(&b.x));
+    for located in &mut scans {
+        let mut rows: Vec<(ScanReading, usize)> = std::mem::take(&mut located.scan.readings)
+            .into_iter()
+            .zip(std::mem::take(&mut located.lines))
+            .collect();
+        rows.sort_by(|a, b| a.0.x.total_cmp(&b.0.x));
+        (located.scan.readings, located.lines) = rows.into_iter().unzip();
     }
     Ok(scans)
 }

@@ -1,7 +1,7 @@
 //! The page of a Fourier separation.
 
 use errsep_models::fourier::{LOST_BELOW, Scan, Separation, determinant};
-use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
+use errsep_models::uncertainty::coverage_factor;
 
 use super::plot::{Axis, Chart, Mark, Series};
 use super::{Cell, Figure, KeyFigure, Page, Section, Standing, Table, number};
@@ -17,10 +17,44 @@ pub struct FourierView<'a> {
     pub length: f64,
     /// The result.
     pub separation: &'a Separation,
-    /// The workpiece without its least-squares line, µm.
-    pub straightness: &'a [f64],
-    /// Uncertainty of the profile by method, µm.
-    pub methods: &'a [(String, f64)],
+    /// Other ways on the same scans.
+    pub methods: &'a [Method],
+    /// What the reader has to weigh.
+    pub remarks: &'a [String],
+}
+
+/// Another way to combine the same scans.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Method {
+    /// Name.
+    pub name: String,
+    /// Standard uncertainty of the profile, root mean square over the positions, µm.
+    pub profile_std: f64,
+    /// Root mean square over the positions of the difference of its straightness from that of the
+    /// answer, µm.
+    pub difference: f64,
+}
+
+impl Method {
+    /// Compares a separation with the answer.
+    #[must_use]
+    pub fn new(name: String, separation: &Separation, answer: &Separation) -> Self {
+        let rms = |sum: f64, count: usize| (sum / count.max(1) as f64).sqrt();
+        let apart: f64 = separation
+            .straightness
+            .iter()
+            .zip(&answer.straightness)
+            .map(|(a, b)| (a - b).powi(2))
+            .sum();
+        Self {
+            name,
+            profile_std: rms(
+                separation.workpiece_std.iter().map(|u| u * u).sum(),
+                separation.workpiece_std.len(),
+            ),
+            difference: rms(apart, answer.straightness.len()),
+        }
+    }
 }
 
 /// Greatest less least value.
@@ -33,19 +67,23 @@ pub fn peak_to_valley(values: &[f64]) -> f64 {
     if low <= high { high - low } else { 0.0 }
 }
 
-/// Coverage factor of the 95 % bands; the normal one where nothing tells the degrees of freedom.
+/// Coverage factor of the 95 % bands.
 fn band(s: &Separation) -> f64 {
-    let degrees = s.degrees_of_freedom.unwrap_or(DegreesOfFreedom::Infinite);
     // Degrees of freedom are positive, so that they have a coverage factor.
-    coverage_factor(0.95, degrees).unwrap_or(f64::NAN)
+    coverage_factor(0.95, s.degrees_of_freedom).unwrap_or(f64::NAN)
 }
 
 /// The page of a separation.
 #[must_use]
 pub fn page(view: &FourierView) -> Page {
     let s = view.separation;
-    let straight = number::plain(peak_to_valley(view.straightness), 3);
-    let (standing, sentence) = if s.lost.is_empty() {
+    let straight = number::plain(peak_to_valley(&view.separation.straightness), 3);
+    let (standing, sentence) = if s.lost.is_empty() && !view.remarks.is_empty() {
+        (
+            Standing::Caution,
+            format!("The workpiece is straight to {straight} µm; see what is noted below."),
+        )
+    } else if s.lost.is_empty() {
         (
             Standing::Good,
             format!("The workpiece is straight to {straight} µm."),
@@ -68,10 +106,14 @@ pub fn page(view: &FourierView) -> Page {
 
 fn profiles(view: &FourierView) -> Section {
     let s = view.separation;
-    let half: Vec<f64> = s.workpiece_std.iter().map(|u| band(s) * u).collect();
+    let half: Vec<f64> = s.straightness_std.iter().map(|u| band(s) * u).collect();
     let mut figures = vec![
-        KeyFigure::new("Straightness", peak_to_valley(view.straightness), "µm")
-            .meaning("workpiece, about its least-squares line"),
+        KeyFigure::new(
+            "Straightness",
+            peak_to_valley(&view.separation.straightness),
+            "µm",
+        )
+        .meaning("workpiece, about its least-squares line"),
         KeyFigure::new("Noise of a reading", s.noise.0, "µm"),
     ];
     if let Some(value) = s.height_difference {
@@ -83,13 +125,16 @@ fn profiles(view: &FourierView) -> Section {
     if let Some(value) = s.repeatability {
         figures.push(KeyFigure::new("U_sp", value, "µm").meaning("repeatability of the profile"));
     }
-    Section::new("Profiles")
-        .key_figures(figures)
+    let mut section = Section::new("Profiles").key_figures(figures);
+    for remark in view.remarks {
+        section = section.warning(remark.as_str());
+    }
+    section
         .figure(Figure::new(
             "Workpiece",
-            "Deviation from the least-squares line. The 95 % band of the reading noise includes that of the line.",
+            "Deviation from the least-squares line with the 95 % band of the reading noise.",
             Chart::new(Axis::new("position x", "mm"), Axis::new("deviation", "µm")).series(
-                Series::line("workpiece", s.x.clone(), view.straightness.to_vec()).half_band(half),
+                Series::line("workpiece", s.x.clone(), s.straightness.clone()).half_band(half),
             ),
         ))
         .figure(Figure::new(
@@ -126,7 +171,11 @@ fn orders(view: &FourierView) -> Section {
         .iter()
         .map(|o| 2.0 * o.coefficient.norm())
         .collect();
-    let half = s.orders.iter().map(|o| band(s) * 2.0 * o.std).collect();
+    let half = s
+        .orders
+        .iter()
+        .map(|o| band(s) * o.amplitude_std())
+        .collect();
     let spectrum = Chart::new(
         Axis::new("order", "undulations per section").whole(),
         Axis::new("amplitude", "µm"),
@@ -158,11 +207,15 @@ fn methods(view: &FourierView) -> Section {
         return Section::new("Combination");
     }
     let mut table = Table::new(
-        "Standard uncertainty of the profile, root mean square over the positions",
-        ["method", "uncertainty (µm)"],
+        "Other ways on the same scans: standard uncertainty of the profile and difference of its straightness from the answer, both root mean square over the positions",
+        ["method", "uncertainty (µm)", "difference (µm)"],
     );
-    for (name, u) in view.methods {
-        table = table.row([name.as_str().into(), Cell::number(*u)]);
+    for method in view.methods {
+        table = table.row([
+            method.name.as_str().into(),
+            Cell::number(method.profile_std),
+            Cell::number(method.difference),
+        ]);
     }
     Section::new("Combination").table(table)
 }

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::effects;
 use super::separation::spacings;
-use super::{Compensation, FourierError, Scan, Section, join};
+use super::{FourierError, Scan, Section, join};
 use crate::model::{Effect, FittedModel, Freedom, Place, Profile, Record};
 
 /// Scans of one or several probe spacings with the fitted workpiece.
@@ -43,7 +43,7 @@ impl FourierScans {
         for (channel, spacing) in spacings.iter().enumerate() {
             let first_cell = channel << 32;
             for scan in scans.iter().filter(|s| s.spacing == *spacing) {
-                let joined = join(scan, section, Compensation::None)?;
+                let joined = join(scan, section)?;
                 let start = places.len();
                 for (k, value) in joined.difference.iter().enumerate() {
                     values.push(*value);

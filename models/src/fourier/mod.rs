@@ -7,24 +7,31 @@
 //!
 //! Positions and spacings are in mm, readings and profiles in µm.
 
+mod beyond;
 mod diagnosable;
 mod effects;
+mod estimate;
+mod group;
 mod joint;
 mod noise;
 mod quantities;
 mod repeatability;
+mod result;
 mod scan;
 mod separation;
 mod simulate;
 mod spectrum;
+mod spread;
+mod steps;
 mod transfer;
-mod variance;
 
+pub use beyond::{BeyondOrders, Disagreement, TOLD_BELOW};
 pub use diagnosable::FourierScans;
-pub use joint::{Compensation, Joint, ShiftTerm, join};
+pub use joint::{Compensation, Joint, ShiftTerm, join, step_terms};
 pub use noise::NoiseSource;
 pub use repeatability::{mean_deviation, mean_harmonic_deviation, repeatability};
+pub use result::{Combination, JointStep, OrderResidual, OrderResult, Separation};
 pub use scan::{FourierError, Scan, ScanReading, Section};
-pub use separation::{Combination, OrderResidual, OrderResult, Separation, separate, straightness};
+pub use separation::{separate, straightness};
 pub use simulate::{Disturbance, FourierSimulation, FourierTruth, simulate, simulate_disturbed};
 pub use transfer::{LOST_BELOW, determinant, noise_gain, sensitive_orders, transfer};

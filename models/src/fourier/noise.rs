@@ -1,9 +1,7 @@
 //! The standard deviation of one reading, found from the scans themselves.
 
-use super::joint::Joint;
-use super::scan::{Scan, Section};
-use super::separation::{Combination, combine, spacings};
-use super::transfer::transfer;
+use super::group::Group;
+use super::steps::disagreement;
 use crate::uncertainty::DegreesOfFreedom;
 use realfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
@@ -16,98 +14,139 @@ pub enum NoiseSource {
     Given,
     /// Scatter of repeats of one spacing.
     Repeats,
-    /// Disagreement of the spacings about the orders kept.
+    /// Disagreement of the spacings, whatever the form of the workpiece.
     Spacings,
-    /// Difference signal beyond the orders kept: an upper bound, it holds the finer form too.
+    /// Difference signal in the finer half of the orders beyond those kept: an upper bound, it holds
+    /// the form of that fineness too.
     BeyondOrders,
 }
 
-/// The best estimate that these scans allow, µm, where it came from and how well it is known.
-pub(super) fn estimate_noise(
-    scans: &[Scan],
-    joints: &[Joint],
-    spectra: &[Vec<Complex64>],
-    sizes: &[usize],
-    section: Section,
-) -> (f64, NoiseSource, Option<DegreesOfFreedom>) {
-    if let Some((sigma, freedom)) = noise_of_repeats(scans, joints) {
-        return (
-            sigma,
-            NoiseSource::Repeats,
-            DegreesOfFreedom::new(freedom).ok(),
-        );
-    }
-    if scans.len() > 1 {
-        // Each order leaves two degrees of freedom less than its scans have, whatever combination is
-        // asked for: the disagreement is measured about the least-squares one.
-        let (mut sum, mut freedom) = (0.0, 0);
-        for order in 1..=section.orders {
-            let best = combine(
-                order,
-                scans,
-                spectra,
-                sizes,
-                section.length,
-                Combination::LeastSquares,
-            );
-            if best.lost {
-                continue;
-            }
-            for (i, scan) in scans.iter().enumerate() {
-                let t = transfer(scan.spacing, section.length, order);
-                sum += sizes[i] as f64 * (spectra[i][order] - t * best.coefficient).norm_sqr();
-            }
-            freedom += 2 * (scans.len() - 1);
-        }
-        if freedom > 0 {
-            let sigma = (sum / freedom as f64).sqrt();
-            return (
-                sigma,
-                NoiseSource::Spacings,
-                DegreesOfFreedom::new(freedom as f64).ok(),
-            );
-        }
-    }
-    let (mut sum, mut freedom) = (0.0, 0.0);
-    for (joint, spectrum) in joints.iter().zip(spectra) {
-        let n = joint.difference.len() as f64;
-        let total: f64 = joint.difference.iter().map(|v| v * v).sum();
-        let kept: f64 = spectrum[0].norm_sqr()
-            + 2.0 * spectrum[1..].iter().map(Complex64::norm_sqr).sum::<f64>();
-        sum += (total - n * kept).max(0.0);
-        freedom += n - 1.0 - 2.0 * section.orders as f64;
-    }
-    let sigma = (0.5 * sum / freedom).sqrt();
-    (
-        sigma,
-        NoiseSource::BeyondOrders,
-        DegreesOfFreedom::new(freedom).ok(),
-    )
+/// Below this many degrees of freedom an estimate is refused: half of all estimates from two are off
+/// by more than a third.
+pub(super) const LEAST_FREEDOM: f64 = 3.0;
+
+/// A sum of squares in units of the variance of a reading, and its degrees of freedom.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scatter {
+    pub squares: f64,
+    pub freedom: f64,
 }
 
-/// Scatter of the difference signal between repeats of one spacing, pooled; a difference has twice
-/// the variance of a reading. Standard deviation, µm, and degrees of freedom.
-fn noise_of_repeats(scans: &[Scan], joints: &[Joint]) -> Option<(f64, f64)> {
-    let (mut sum, mut freedom) = (0.0, 0usize);
-    for group in spacings(scans) {
-        let members: Vec<&Joint> = (0..scans.len())
-            .filter(|&i| scans[i].spacing == group)
-            .map(|i| &joints[i])
-            .collect();
-        let size = members.first().map_or(0, |j| j.difference.len());
-        if members.len() < 2 || members.iter().any(|j| j.difference.len() != size) {
-            continue;
-        }
-        for k in 0..size {
-            let average =
-                members.iter().map(|j| j.difference[k]).sum::<f64>() / members.len() as f64;
-            sum += members
-                .iter()
-                .map(|j| (j.difference[k] - average).powi(2))
-                .sum::<f64>();
-        }
-        freedom += size * (members.len() - 1);
+impl Scatter {
+    /// The standard deviation of a reading, µm.
+    pub fn sigma(self) -> f64 {
+        (self.squares / self.freedom).sqrt()
     }
-    let freedom = freedom as f64;
-    (freedom > 0.0).then(|| ((0.5 * sum / freedom).sqrt(), freedom))
+}
+
+/// What the scans tell of the noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Estimates {
+    /// Between repeats, zero and step of each scan free.
+    pub repeats: Option<Scatter>,
+    /// Between spacings, step of each and the form in every order free.
+    pub spacings: Option<Scatter>,
+    /// Beyond the orders kept.
+    pub beyond: Option<Scatter>,
+}
+
+impl Estimates {
+    /// Measures all three; none of them depends on how the joint is compensated.
+    pub fn new(groups: &[Group], spectra: &[Vec<Complex64>], orders: usize) -> Self {
+        Self {
+            repeats: of_repeats(groups, spectra),
+            spacings: of_spacings(groups, orders),
+            beyond: beyond(groups, orders),
+        }
+    }
+
+    /// The best that there is, and how well it is known.
+    pub fn best(self) -> Option<(f64, NoiseSource, DegreesOfFreedom)> {
+        [
+            (self.repeats, NoiseSource::Repeats),
+            (self.spacings, NoiseSource::Spacings),
+            (self.beyond, NoiseSource::BeyondOrders),
+        ]
+        .into_iter()
+        .find_map(|(scatter, source)| {
+            let scatter = scatter?;
+            let degrees = DegreesOfFreedom::new(scatter.freedom).ok()?;
+            Some((scatter.sigma(), source, degrees))
+        })
+    }
+}
+
+impl Estimates {
+    /// What scatters apart from where the noise was taken: repeats and spacings beside a given noise,
+    /// the spacings beside the repeats.
+    pub fn apart_from(self, source: NoiseSource) -> Option<Scatter> {
+        match source {
+            NoiseSource::Given => match (self.repeats, self.spacings) {
+                (Some(a), Some(b)) => Some(Scatter {
+                    squares: a.squares + b.squares,
+                    freedom: a.freedom + b.freedom,
+                }),
+                (a, b) => a.or(b),
+            },
+            NoiseSource::Repeats => self.spacings,
+            NoiseSource::Spacings | NoiseSource::BeyondOrders => None,
+        }
+    }
+}
+
+fn enough(squares: f64, freedom: f64) -> Option<Scatter> {
+    (freedom >= LEAST_FREEDOM).then_some(Scatter { squares, freedom })
+}
+
+/// Repeats share the workpiece in every order; their zeros and their steps may differ.
+fn of_repeats(groups: &[Group], spectra: &[Vec<Complex64>]) -> Option<Scatter> {
+    let (mut squares, mut freedom) = (0.0, 0.0);
+    for g in groups.iter().filter(|g| g.scans.len() > 1) {
+        let known: f64 = g.step.iter().skip(1).map(Complex64::norm_sqr).sum();
+        for own in g.scans.iter().filter_map(|&i| spectra.get(i)) {
+            let pairs = || own.iter().zip(&g.mean).zip(&g.step).skip(1);
+            let along: f64 = pairs()
+                .map(|((m, mean), h)| (h.conj() * (m - mean)).re)
+                .sum();
+            let step = if g.has_step() { along / known } else { 0.0 };
+            squares += g.samples as f64
+                * pairs()
+                    .map(|((m, mean), h)| (m - mean - step * h).norm_sqr())
+                    .sum::<f64>();
+        }
+        let unknowns = if g.has_step() { 1.0 } else { 0.0 };
+        freedom += (g.repeats() - 1.0) * (2.0 * g.highest() as f64 - unknowns);
+    }
+    enough(squares, freedom)
+}
+
+/// What lies between the grid points comes back, mirrored at half the number of readings, with
+/// another spacing's phase; the coarser half of the orders is far from the mirror.
+fn of_spacings(groups: &[Group], orders: usize) -> Option<Scatter> {
+    if groups.len() < 2 {
+        return None;
+    }
+    let highest = groups.iter().map(Group::highest).max().unwrap_or(0);
+    let (squares, freedom) = disagreement(groups, orders.max(highest / 2));
+    enough(squares, freedom)
+}
+
+/// The finer half of the orders beyond those kept, less a step.
+fn beyond(groups: &[Group], orders: usize) -> Option<Scatter> {
+    let (mut squares, mut freedom) = (0.0, 0.0);
+    for g in groups {
+        let from = finer_half(orders, g.highest());
+        let pairs = || g.mean.iter().zip(&g.step).skip(from);
+        let known: f64 = pairs().map(|(_, h)| h.norm_sqr()).sum();
+        let along: f64 = pairs().map(|(m, h)| (h.conj() * m).re).sum();
+        let step = if g.has_step() { along / known } else { 0.0 };
+        squares += g.weight() * pairs().map(|(m, h)| (m - step * h).norm_sqr()).sum::<f64>();
+        freedom += 2.0 * pairs().count() as f64 - if g.has_step() { 1.0 } else { 0.0 };
+    }
+    enough(squares, freedom)
+}
+
+/// First order of the finer half of those beyond the orders kept.
+pub(super) fn finer_half(orders: usize, highest: usize) -> usize {
+    orders + 1 + highest.saturating_sub(orders) / 2
 }

@@ -1,6 +1,6 @@
 //! The separated profile in the vocabulary of the GUM.
 
-use super::separation::Separation;
+use super::result::Separation;
 use crate::uncertainty::{Quantity, UncertaintyError};
 
 impl Separation {
@@ -27,18 +27,20 @@ impl Separation {
             .iter()
             .filter(|o| !o.lost)
             .flat_map(|o| {
-                [("real", o.coefficient.re), ("imaginary", o.coefficient.im)]
-                    .map(|(part, value)| (format!("order {}, {part}", o.order), value, o.std))
+                [
+                    ("real", o.coefficient.re, o.real_std),
+                    ("imaginary", o.coefficient.im, o.imaginary_std),
+                ]
+                .map(|(part, value, std)| (format!("order {}, {part}", o.order), value, std))
             })
             .map(|(label, value, std)| self.quantity(label, value, std))
             .collect()
     }
 
     fn quantity(&self, label: String, value: f64, std: f64) -> Result<Quantity, UncertaintyError> {
-        let quantity = Quantity::new(label, value, std, "um")?;
-        Ok(match self.degrees_of_freedom {
-            Some(degrees) => quantity.with_degrees_of_freedom(degrees),
-            None => quantity,
-        })
+        Ok(
+            Quantity::new(label, value, std, "um")?
+                .with_degrees_of_freedom(self.degrees_of_freedom),
+        )
     }
 }

@@ -50,18 +50,25 @@ pub enum FourierError {
         /// Section, mm.
         length: f64,
     },
-    /// A reading or a position is NaN or infinite.
-    #[error("reading {} (x = {x} mm) is not finite", index + 1)]
+    /// A reading or a position is NaN, infinite, or so large that its square is.
+    #[error("the readings at x = {x} mm are not numbers that a probe can give")]
     NotFinite {
         /// Place in the scan, from 0.
         index: usize,
         /// Position, mm.
         x: f64,
     },
+    /// Two readings of a scan at one position.
+    #[error("x = {x} mm is read twice in one scan")]
+    Duplicate {
+        /// Place of the second in the scan, from 0.
+        index: usize,
+        /// Position, mm.
+        x: f64,
+    },
     /// Positions are not the even grid that the Fourier transform needs.
     #[error(
-        "reading {}: x = {found} mm where an even grid from 0 with step {step} mm has {expected} mm: resample the scan",
-        index + 1
+        "x = {found} mm stands where an even grid from 0 with step {step} mm has {expected} mm"
     )]
     UnevenGrid {
         /// Place in the scan, from 0.
@@ -78,6 +85,8 @@ pub enum FourierError {
         "the readings end at {end} mm, the section at {length} mm: the grid must fill the section"
     )]
     SectionNotFilled {
+        /// Place of the last reading in the scan, from 0.
+        index: usize,
         /// Last position, mm.
         end: f64,
         /// Section, mm.
@@ -90,14 +99,18 @@ pub enum FourierError {
         probe: u8,
         /// Position, mm.
         x: f64,
+        /// Place in the scan, from 0.
+        index: usize,
     },
     /// The height difference cannot be found.
     #[error(
-        "the height difference of P2 and P3 needs both probes read at the joint x = {joint} mm: read them there, or choose compensation \"none\""
+        "the height difference of P2 and P3 needs both probes read at the joint x = {joint} mm"
     )]
     NoOverlap {
         /// L − d, mm.
         joint: f64,
+        /// Place of the reading beside the joint, from 0.
+        index: usize,
     },
     /// Equation (20) needs the closing reading of P1.
     #[error(
@@ -108,12 +121,33 @@ pub enum FourierError {
         length: f64,
     },
     /// More orders than the grid carries.
-    #[error("{orders} orders need more than {} readings, there are {samples}", 2 * orders)]
+    #[error(
+        "{orders} orders need more than {} readings, there are {samples}",
+        orders.saturating_mul(2)
+    )]
     TooManyOrders {
         /// Orders asked for.
         orders: usize,
         /// Readings on the grid.
         samples: usize,
+    },
+    /// A stated noise that is no standard deviation.
+    #[error("a noise of {value} um is no standard deviation")]
+    Noise {
+        /// As stated, µm.
+        value: f64,
+    },
+    /// Nothing is left over that tells the noise.
+    #[error("with {orders} orders kept too little is left over to tell the noise of a reading")]
+    NoiseUnknown {
+        /// Orders kept.
+        orders: usize,
+    },
+    /// The step at the joint cannot be fitted beside the form.
+    #[error("with {orders} orders kept the form of the workpiece takes over the step at the joint")]
+    StepNotSeen {
+        /// Orders kept.
+        orders: usize,
     },
     /// Figures of a simulation that make no sense.
     #[error("{what}")]
@@ -122,6 +156,25 @@ pub enum FourierError {
         what: String,
     },
 }
+
+impl FourierError {
+    /// Place in the scan, from 0, of the reading that the error is about.
+    #[must_use]
+    pub fn reading(&self) -> Option<usize> {
+        match *self {
+            Self::NotFinite { index, .. }
+            | Self::Duplicate { index, .. }
+            | Self::UnevenGrid { index, .. }
+            | Self::SectionNotFilled { index, .. }
+            | Self::ProbeMissing { index, .. }
+            | Self::NoOverlap { index, .. } => Some(index),
+            _ => None,
+        }
+    }
+}
+
+/// Readings and positions are below this, µm or mm: sums of their squares stay numbers.
+const GREATEST: f64 = 1e100;
 
 impl Scan {
     /// The number N of grid points on 0 ≤ x < L, after checking that the scan is an even grid that
@@ -133,9 +186,15 @@ impl Scan {
         }
         for (index, r) in self.readings.iter().enumerate() {
             let values = [Some(r.x), Some(r.m1), r.m2, r.m3];
-            if values.iter().flatten().any(|v| !v.is_finite()) {
+            if values.iter().flatten().any(|v| !(v.abs() < GREATEST)) {
                 return Err(FourierError::NotFinite { index, x: r.x });
             }
+        }
+        let twice = |pair: &[ScanReading]| matches!(pair, [a, b] if a.x == b.x);
+        if let Some(before) = self.readings.windows(2).position(twice) {
+            let index = before + 1;
+            let x = self.readings.get(index).map_or(f64::NAN, |r| r.x);
+            return Err(FourierError::Duplicate { index, x });
         }
         let (first, second) = match self.readings[..] {
             [first, second, ..] => (first.x, second.x),
@@ -172,11 +231,12 @@ impl Scan {
         let samples = steps as usize;
         if self.readings.len() < samples || self.readings.len() > samples + 1 {
             return Err(FourierError::SectionNotFilled {
+                index: self.readings.len().saturating_sub(1),
                 end: self.readings.last().map_or(0.0, |r| r.x),
                 length,
             });
         }
-        if section.orders == 0 || 2 * section.orders >= samples {
+        if section.orders == 0 || section.orders >= samples.div_ceil(2) {
             return Err(FourierError::TooManyOrders {
                 orders: section.orders,
                 samples,

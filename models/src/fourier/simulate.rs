@@ -162,8 +162,22 @@ pub fn simulate_disturbed(
             what: "a simulation needs at least three samples and one spacing".to_owned(),
         });
     }
-    let normal = Normal::new(0.0, what.noise.abs()).map_err(|_| FourierError::Simulation {
-        what: "the noise is not finite".to_owned(),
+    let figures = [
+        length,
+        what.slope,
+        what.step.0,
+        what.step.1,
+        what.height_difference,
+        what.slide_rise,
+        what.noise,
+    ];
+    if figures.iter().any(|v| !v.is_finite()) || what.noise < 0.0 {
+        return Err(FourierError::Simulation {
+            what: "the figures of a simulation must be finite, its noise not negative".to_owned(),
+        });
+    }
+    let normal = Normal::new(0.0, what.noise).map_err(|e| FourierError::Simulation {
+        what: format!("the noise cannot be drawn: {e}"),
     })?;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let workpiece_waves = Waves::draw(&mut rng, what.orders, 7.0, 0.12);

@@ -1,13 +1,13 @@
 //! Scans of the Fourier three-sensor method.
 
-use errsep_models::fourier::{FourierScans, Section};
+use errsep_models::fourier::{Compensation, FourierScans, Scan, Section};
 
 use super::Args;
 use super::case::Case;
 use crate::cli::Answer;
 use crate::cli::fourier::ORDERS;
 use crate::io::Message;
-use crate::io::fourier::{FourierSetup, read_scans};
+use crate::io::fourier::{FourierSetup, read_scans, told};
 
 /// Most differences that are diagnosed together: noise is a matrix of the readings of a scan.
 const MOST: usize = 20_000;
@@ -26,7 +26,11 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         length,
         orders: setup.section.orders.unwrap_or(ORDERS),
     };
-    let scans = read_scans(&args.data, setup.probe.spacing.first().copied())?;
+    let mut scans: Vec<Scan> = Vec::new();
+    for located in read_scans(&args.data, setup.probe.spacing.first().copied())? {
+        located.check(section, Compensation::None)?;
+        scans.push(located.scan);
+    }
     let readings: usize = scans.iter().map(|s| s.readings.len()).sum();
     if readings > MOST {
         return Err(Message::bad_input(format!(
@@ -36,7 +40,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         .remedy("take every n-th position, or fewer repeats"));
     }
     let model = FourierScans::new(&scans, section, setup.probe.noise)
-        .map_err(|e| Message::bad_input(e.to_string()).in_file(&args.data))?;
+        .map_err(|e| told(&e).in_file(&args.data))?;
     Case {
         readings: format!("{} scans of {} probe spacings", scans.len(), model.spacings().len()),
         model,

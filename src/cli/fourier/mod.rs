@@ -1,19 +1,23 @@
 //! `errsep fourier`: straightness by the Fourier two-sensor and three-sensor methods.
 
+mod weighing;
+
 use std::fmt::Write;
 use std::path::PathBuf;
 
 use errsep_models::fourier::{
-    Combination, FourierError, Scan, Section, Separation, separate, straightness,
+    Compensation, FourierError, NoiseSource, OrderResult, Scan, Section, Separation, separate,
+    straightness,
 };
 use errsep_models::uncertainty::coverage_factor;
 use serde_json::{Value, json};
 
+use self::weighing::{methods, remarks};
 use super::quantity::{COVERAGE, coverage_json, coverage_words, unexpandable};
 use super::{Answer, CommonArgs};
-use crate::io::fourier::{FourierSetup, read_scans};
+use crate::io::fourier::{FourierSetup, read_scans, told};
 use crate::io::{CsvTable, Message, Status};
-use crate::report::fourier::{FourierView, page, peak_to_valley};
+use crate::report::fourier::{FourierView, Method, page, peak_to_valley};
 use crate::report::number;
 
 /// Orders kept where nothing is said.
@@ -39,7 +43,7 @@ The set-up names the section and, where there is no such column, the spacing of 
     spacing = [48.5, 34.1, 78.6]
     noise = 2.0           # um; absent: estimated
     [method]
-    compensation = \"chord\"         # or \"level\", \"none\"
+    compensation = \"fitted\"        # or \"chord\", \"level\", \"none\"
     combination = \"least-squares\"  # or \"hybrid\"
 
 Example: errsep fourier d48.csv d34.csv d79.csv --setup fourier.toml --out fourier")]
@@ -66,6 +70,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         Some(path) => FourierSetup::read(path)?,
         None => FourierSetup::default(),
     };
+    if let Some(length) = args.length.filter(|l| !(*l > 0.0 && l.is_finite())) {
+        return Err(
+            Message::bad_input(format!("--length {length} is not a positive number"))
+                .remedy("give the length of the section in mm"),
+        );
+    }
     let length = args.length.or(setup.section.length).ok_or_else(|| {
         Message::bad_input("the length of the section is not known")
             .remedy("give [section] length in the set-up, or --length")
@@ -83,50 +93,37 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         length,
         orders: setup.section.orders.unwrap_or(ORDERS),
     };
+    let asked = setup.method.compensation;
     let mut scans = Vec::new();
     for (index, path) in args.data.iter().enumerate() {
-        scans.extend(read_scans(path, spacings.get(index).copied())?);
+        for located in read_scans(path, spacings.get(index).copied())? {
+            located.check(section, asked)?;
+            scans.push(located.scan);
+        }
     }
-    let solve = |scans: &[Scan], combination: Combination| {
-        separate(
-            scans,
-            section,
-            setup.method.compensation,
-            combination,
-            setup.probe.noise,
-        )
-        .map_err(|e| refused(&e, args))
-    };
-    let answer = solve(&scans, setup.method.combination)?;
-    let methods = methods(&scans, answer.noise.0, |scans, combination| {
-        separate(
-            scans,
-            section,
-            setup.method.compensation,
-            combination,
-            Some(answer.noise.0),
-        )
-        .map_err(|e| refused(&e, args))
-    })?;
+    let combination = setup.method.combination;
+    let answer = separate(&scans, section, asked, combination, setup.probe.noise)
+        .map_err(|e| refused(&e, args))?;
+    let methods = methods(&scans, section, asked, &answer);
+    let remarks = remarks(&answer, section, asked);
     let name = args
         .data
         .iter()
         .map(|p| p.display().to_string())
         .collect::<Vec<_>>()
         .join(", ");
-    let straight = straightness(&answer.x, &answer.workpiece);
     Ok(Answer {
-        text: in_words(&name, &scans, &answer, &methods, &straight)?,
-        json: as_json(&scans, section, &answer, &methods, &straight, &setup)?,
+        text: in_words(&name, &scans, &answer, &methods, &remarks)?,
+        json: as_json(&scans, section, &answer, &methods, &remarks)?,
         page: page(&FourierView {
             data: &name,
             scans: &scans,
             length,
             separation: &answer,
-            straightness: &straight,
             methods: &methods,
+            remarks: &remarks,
         }),
-        tables: vec![profiles_table(&answer, &straight), orders_table(&answer)],
+        tables: vec![profiles_table(&answer), orders_table(&answer)],
         inputs: args.data.iter().chain(&args.setup).cloned().collect(),
         seed: None,
         status: if answer.lost.len() == section.orders {
@@ -138,59 +135,24 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
 }
 
 fn refused(error: &FourierError, args: &Args) -> Message {
-    let message = Message::bad_input(error.to_string())
-        .remedy("see `errsep fourier --help` for the grid and the readings that the method needs");
     match args.data.first() {
-        Some(only) if args.data.len() == 1 => message.in_file(only),
-        _ => message,
+        Some(only) if args.data.len() == 1 => told(error).in_file(only),
+        _ => told(error),
     }
-}
-
-/// Name and root-mean-square standard uncertainty of the profile of each way to combine the scans.
-fn methods(
-    scans: &[Scan],
-    noise: f64,
-    solve: impl Fn(&[Scan], Combination) -> Result<Separation, Message>,
-) -> Result<Vec<(String, f64)>, Message> {
-    let uncertainty = |s: &Separation| {
-        let sum: f64 = s.workpiece_std.iter().map(|u| u * u).sum();
-        (sum / s.workpiece_std.len().max(1) as f64).sqrt()
-    };
-    let mut spacings: Vec<f64> = scans.iter().map(|s| s.spacing).collect();
-    spacings.sort_by(f64::total_cmp);
-    spacings.dedup();
-    let mut found = Vec::new();
-    if noise <= 0.0 {
-        return Ok(found);
-    }
-    for &d in &spacings {
-        let own: Vec<Scan> = scans.iter().filter(|s| s.spacing == d).cloned().collect();
-        let alone = solve(&own, Combination::LeastSquares)?;
-        found.push((format!("d = {d} mm alone"), uncertainty(&alone)));
-    }
-    if spacings.len() > 1 {
-        for (name, combination) in [
-            ("hybrid", Combination::Hybrid),
-            ("least squares", Combination::LeastSquares),
-        ] {
-            found.push((name.to_owned(), uncertainty(&solve(scans, combination)?)));
-        }
-    }
-    Ok(found)
 }
 
 fn in_words(
     name: &str,
     scans: &[Scan],
     s: &Separation,
-    methods: &[(String, f64)],
-    straight: &[f64],
+    methods: &[Method],
+    remarks: &[String],
 ) -> Result<String, Message> {
     let mut text = format!("Fourier separation of {name} ({})\n", counted(scans.len()));
     let _ = writeln!(
         text,
         "  straightness of the workpiece  {} µm (peak to valley about the least-squares line)",
-        number::plain(peak_to_valley(straight), 4)
+        number::plain(peak_to_valley(&s.straightness), 4)
     );
     let _ = writeln!(
         text,
@@ -203,15 +165,26 @@ fn in_words(
         number::plain(s.noise.0, 3),
         noise_words(s)
     );
-    if let Some(degrees) = s.degrees_of_freedom {
-        let greatest = s.workpiece_std.iter().copied().fold(0.0, f64::max);
-        let k = coverage_factor(COVERAGE, degrees).map_err(unexpandable)?;
+    let greatest = s.straightness_std.iter().copied().fold(0.0, f64::max);
+    let k = coverage_factor(COVERAGE, s.degrees_of_freedom).map_err(unexpandable)?;
+    let _ = writeln!(
+        text,
+        "  a point of its profile         u up to {} µm, U = {} µm: {}",
+        number::plain(greatest, 3),
+        number::plain(k * greatest, 2),
+        coverage_words(s.degrees_of_freedom)?
+    );
+    for step in &s.steps {
         let _ = writeln!(
             text,
-            "  a point of the profile         u up to {} µm, U = {} µm: {}",
-            number::plain(greatest, 3),
-            number::plain(k * greatest, 2),
-            coverage_words(degrees)?
+            "  {:30} {} µm (height difference and rise{})",
+            format!("step at the joint, d = {} mm", step.spacing),
+            number::measured(step.value, Some(step.std)),
+            match s.compensation {
+                Compensation::Fitted => ", fitted",
+                Compensation::Chord => ", two readings",
+                Compensation::None | Compensation::Level => ", left in the profile",
+            }
         );
     }
     for (what, value) in [
@@ -236,11 +209,21 @@ fn in_words(
     if !methods.is_empty() {
         let _ = writeln!(
             text,
-            "\nStandard uncertainty of the profile (rms over positions)"
+            "\nOther ways on the same scans: standard uncertainty of the profile, difference of its\n\
+             straightness from the answer (both rms over positions)"
         );
-        for (method, u) in methods {
-            let _ = writeln!(text, "  {method:28} {} µm", number::plain(*u, 3));
+        for method in methods {
+            let _ = writeln!(
+                text,
+                "  {:28} {:>8} µm {:>8} µm",
+                method.name,
+                number::plain(method.profile_std, 3),
+                number::plain(method.difference, 3)
+            );
         }
+    }
+    for remark in remarks {
+        let _ = writeln!(text, "\n{remark}");
     }
     if !s.lost.is_empty() {
         let _ = writeln!(
@@ -265,12 +248,11 @@ fn counted(scans: usize) -> String {
 }
 
 fn noise_words(s: &Separation) -> &'static str {
-    use errsep_models::fourier::NoiseSource;
     match s.noise.1 {
         NoiseSource::Given => "given",
         NoiseSource::Repeats => "from the repeats",
-        NoiseSource::Spacings => "from the disagreement of the spacings",
-        NoiseSource::BeyondOrders => "beyond the orders kept: holds the finer form too",
+        NoiseSource::Spacings => "from the disagreement of the spacings, whatever the form",
+        NoiseSource::BeyondOrders => "from the finest orders: holds form of that fineness too",
     }
 }
 
@@ -278,15 +260,14 @@ fn as_json(
     scans: &[Scan],
     section: Section,
     s: &Separation,
-    methods: &[(String, f64)],
-    straight: &[f64],
-    setup: &FourierSetup,
+    methods: &[Method],
+    remarks: &[String],
 ) -> Result<Value, Message> {
     Ok(json!({
         "schema": "errsep.fourier/1",
         "section": {"length": section.length, "unit": "mm", "orders": section.orders},
         "combination": s.combination,
-        "compensation": setup.method.compensation,
+        "compensation": s.compensation,
         "scans": scans.iter().map(|scan| json!({
             "spacing": scan.spacing,
             "repeat": scan.repeat,
@@ -294,17 +275,35 @@ fn as_json(
             "probes": if scan.has_third_probe() { 3 } else { 2 },
         })).collect::<Vec<_>>(),
         "noise": {"value": s.noise.0, "unit": "um", "source": s.noise.1},
-        "uncertainty": coverage_json(s.degrees_of_freedom)?,
+        "uncertainty": coverage_json(Some(s.degrees_of_freedom))?,
+        "steps": s.steps.iter().map(|j| json!({
+            "spacing": j.spacing,
+            "value": j.value,
+            "std": j.std,
+            "unit": "um",
+        })).collect::<Vec<_>>(),
+        "beyond_orders": s.beyond_orders.map(|b| json!({
+            "rms": b.rms,
+            "unit": "um",
+            "p_value": b.p_value,
+        })),
+        "disagreement": s.disagreement.map(|d| json!({
+            "observed": d.observed,
+            "unit": "um",
+            "p_value": d.p_value,
+        })),
+        "remarks": remarks,
         "height_difference": s.height_difference.map(|v| json!({"value": v, "unit": "um"})),
         "rise": s.rise.map(|v| json!({"value": v, "unit": "um"})),
         "repeatability": s.repeatability.map(|v| json!({"value": v, "unit": "um"})),
         "straightness": {
-            "workpiece": {"value": peak_to_valley(straight), "unit": "um"},
+            "workpiece": {"value": peak_to_valley(&s.straightness), "unit": "um"},
             "slide": {"value": peak_to_valley(&straightness(&s.x, &s.slide)), "unit": "um"},
         },
-        "methods": methods.iter().map(|(method, u)| json!({
-            "method": method,
-            "profile_std": {"value": u, "unit": "um"},
+        "methods": methods.iter().map(|m| json!({
+            "method": m.name,
+            "profile_std": {"value": m.profile_std, "unit": "um"},
+            "difference": {"value": m.difference, "unit": "um"},
         })).collect::<Vec<_>>(),
         "lost_orders": s.lost,
         "orders": s.orders.iter().map(|o| json!({
@@ -314,37 +313,42 @@ fn as_json(
             "gain": if o.lost { Value::Null } else { json!(o.gain) },
             "re": o.coefficient.re,
             "im": o.coefficient.im,
-            "std": o.std,
+            "std": o.std(),
+            "re_std": o.real_std,
+            "im_std": o.imaginary_std,
+            "covariance": {"value": o.covariance, "unit": "um2"},
             "unit": "um",
         })).collect::<Vec<_>>(),
         "profiles": {
             "x": s.x,
             "workpiece": s.workpiece,
             "workpiece_std": s.workpiece_std,
-            "straightness": straight,
+            "straightness": s.straightness,
+            "straightness_std": s.straightness_std,
             "slide": s.slide,
             "unit": "um",
         },
     }))
 }
 
-fn profiles_table(s: &Separation, straight: &[f64]) -> CsvTable {
+fn profiles_table(s: &Separation) -> CsvTable {
     CsvTable::new("profiles.csv")
         .numbers("x_mm", s.x.clone())
         .numbers("workpiece_um", s.workpiece.clone())
         .numbers("workpiece_std_um", s.workpiece_std.clone())
-        .numbers("straightness_um", straight.to_vec())
+        .numbers("straightness_um", s.straightness.clone())
+        .numbers("straightness_std_um", s.straightness_std.clone())
         .numbers("slide_um", s.slide.clone())
 }
 
 fn orders_table(s: &Separation) -> CsvTable {
-    let column = |of: fn(&errsep_models::fourier::OrderResult) -> f64| {
-        s.orders.iter().map(of).collect::<Vec<f64>>()
-    };
+    let column = |of: fn(&OrderResult) -> f64| s.orders.iter().map(of).collect::<Vec<f64>>();
     CsvTable::new("orders.csv")
         .numbers("order", column(|o| o.order as f64))
         .numbers("re_um", column(|o| o.coefficient.re))
         .numbers("im_um", column(|o| o.coefficient.im))
-        .numbers("std_um", column(|o| o.std))
+        .numbers("std_um", column(|o| o.std()))
+        .numbers("re_std_um", column(|o| o.real_std))
+        .numbers("im_std_um", column(|o| o.imaginary_std))
         .numbers("gain", column(|o| if o.lost { f64::NAN } else { o.gain }))
 }

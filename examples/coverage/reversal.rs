@@ -296,14 +296,16 @@ impl Case {
             .map(|p| p.degrees_of_freedom)
             .fold(f64::INFINITY, f64::min);
         let forms = [("M", &truth.m), ("S_A", &truth.s_a), ("S_B", &truth.s_b)];
+        let mut tally = Tally::default();
         for profile in &profiles {
             let Some((_, form)) = forms.iter().find(|(name, _)| *name == profile.name) else {
                 continue;
             };
-            let mut tally = Tally::default();
             for ((x, value), std) in profile.x.iter().zip(&profile.values).zip(&profile.std) {
                 tally.add(value - form.at(*x), *std, freedom);
             }
+        }
+        if profiles.iter().any(|p| forms.iter().any(|f| f.0 == p.name)) {
             found.push(("forms".to_owned(), tally));
         }
         Some(found)

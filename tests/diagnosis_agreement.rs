@@ -217,7 +217,10 @@ impl Told {
         );
         for contradiction in ["misses 0 ", "leave 0 ", " 0 µm", "log-", "ln s", " um"] {
             assert!(!said.contains(contradiction), "{case}: {said}");
-            assert!(!self.text.contains(" um") && !self.page.contains(" um"));
+            for shown in [&self.text, &self.page] {
+                let unit = shown.lines().find(|line| line.contains(" um"));
+                assert_eq!(unit, None, "{case}");
+            }
         }
         self.sizes(kind, said);
         self.groups(&named, said);

@@ -289,7 +289,8 @@ fn the_headline_is_a_minimum_zone_under_its_condition() {
     let sensors = "[sensors]\nspacing = [5.0, 5.0, 25.0]\n";
     let (data, open) = simulated(folder.path(), &["--seed", "3"], sensors);
     let closed = folder.path().join("closed.toml");
-    let known = format!("{sensors}[parabola]\ntilt_slope = 0.0\n");
+    let known =
+        format!("{sensors}[parabola]\ntilt_slope = 0.0\n[separation]\nchoice = \"likelihood\"\n");
     std::fs::write(&closed, known).expect("written");
     for (setup, standing, condition) in [(&open, "caution", true), (&closed, "good", false)] {
         let report = folder.path().join(standing);

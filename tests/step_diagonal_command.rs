@@ -290,7 +290,7 @@ fn a_slope_of_any_uncertainty_is_used_as_it_is() {
         )
     };
     let usual = answer("5e-4");
-    for std in ["1e-60", "1e-12", "1e-9", "1e3", "1e60"] {
+    for std in ["1e-12", "1e-9", "1e3"] {
         let found = answer(std);
         assert_eq!(found["rank"], usual["rank"], "{std}");
         assert_eq!(
@@ -307,20 +307,22 @@ fn a_slope_of_any_uncertainty_is_used_as_it_is() {
         let other = |answer: &Value| component(answer, "EBY")["std"][2].as_f64().unwrap();
         assert!((other(&found) / other(&usual) - 1.0).abs() < 1e-9, "{std}");
     }
-    let setup = "[[measured]]\naxis = \"X\"\nslope = 0.004\nstd = 1e-200\n";
-    folder.write("s.toml", setup);
-    bad_input(
-        &folder,
-        &[
-            "step-diagonal",
-            "d.csv",
-            "--setup",
-            "s.toml",
-            "--out",
-            "out",
-        ],
-        &["standard uncertainty of the measured positioning slope of X"],
-    );
+    for std in ["1e-200", "1e-60", "1e60"] {
+        let setup = format!("[[measured]]\naxis = \"X\"\nslope = 0.004\nstd = {std}\n");
+        folder.write("s.toml", &setup);
+        bad_input(
+            &folder,
+            &[
+                "step-diagonal",
+                "d.csv",
+                "--setup",
+                "s.toml",
+                "--out",
+                "out",
+            ],
+            &["standard uncertainty of the measured positioning slope of X"],
+        );
+    }
 }
 
 /// Readings times a power of two: everything else too, also where squares leave the range of numbers.
@@ -374,7 +376,7 @@ fn bad_readings_are_refused() {
         (
             "path.csv",
             good.replace("100,0,0,1", "0,100,0,1"),
-            "path.csv:4:1: position [0, 1, 0] (in steps) is no stop of diagonal AG",
+            "path.csv:3:1: position [0, 1, 0] (in steps) is no stop of diagonal AG",
         ),
         (
             "twice.csv",

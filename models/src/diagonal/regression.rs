@@ -22,9 +22,9 @@ const ROUNDINGS: f64 = 100.0;
 /// of them: those are known to about 1e-11, and what a set-up leaves open shows with more than 1e-4.
 const OPEN: f64 = 1e-6;
 
-/// A measured slope may count this much less than a reading, or as much more: beyond, squares leave
-/// the range of numbers.
-const LEAST_WEIGHT: f64 = 1e-100;
+/// What a measured slope may count for beside a reading: outside, rounding shows in the uncertainties of
+/// what it settles (1e-7 of them at either end).
+const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-8..=1e18;
 
 /// Estimates everything that the readings determine.
 ///
@@ -419,7 +419,7 @@ fn slope_rows(
         // Without any redundancy the readings' noise is taken as that of the slope over the travel.
         let weight = noise.unwrap_or(m.std * travel) / m.std;
         let coefficient = weight * gradient * design.scale[place];
-        if !(LEAST_WEIGHT..=1.0 / LEAST_WEIGHT).contains(&coefficient) {
+        if !WEIGHTS.contains(&coefficient) {
             return Err(DiagonalError::MeasuredUncertainty {
                 what: format!("positioning slope of {}", m.axis.letter()),
             });

@@ -57,7 +57,7 @@ impl Parabola {
             }
             Self::SurfaceCurvature(value) => format!(
                 "The parabola, which these outputs do not determine, follows from the stated \
-                 curvature of the surface, {value:e} µm/mm²."
+                 curvature of the surface, {value:?} µm/mm²."
             ),
             Self::ZeroAdjustment([e2, e3, e4]) => format!(
                 "The parabola, which these outputs do not determine, follows from the stated \
@@ -65,7 +65,7 @@ impl Parabola {
             ),
             Self::TiltSlope(value) => format!(
                 "The parabola, which these outputs do not determine, follows from the stated slope \
-                 of the tilt, {value:e} rad/mm."
+                 of the tilt, {value:?} rad/mm."
             ),
         }
     }

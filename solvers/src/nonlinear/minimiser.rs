@@ -34,6 +34,9 @@ const LEAST_COST: f64 = 1e-200;
 /// however little the residuals change: roots up to the tenth order are approached by less.
 const FAR: f64 = 1e-2;
 
+/// Iterations in a row that go on so before a parameter is said to run away.
+const MOST_FADING: usize = 30;
+
 /// A step of this share of the undamped one was not held up by a wall.
 const UNIMPEDED: f64 = 0.5;
 
@@ -61,6 +64,9 @@ pub struct Minimiser<S, M> {
     /// The shortest step that was refused a value, until one about as long as the undamped step is
     /// taken.
     refused: Option<Refusal>,
+    /// Iterations in a row whose undamped step has no effect beside what parameters once had, but moves
+    /// one of them far.
+    fading: usize,
     ending: Option<Ending>,
     #[serde(skip)]
     pub(crate) point: Option<Point<M>>,
@@ -112,6 +118,7 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
             farthest: DVector::zeros(0),
             unit: 1.0,
             refused: None,
+            fading: 0,
             ending: None,
             point: None,
         }
@@ -364,12 +371,18 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
     ) -> Result<(Point<M>, Progress), FitError> {
         let (rest, full) = self.at_rest(&point)?;
         if let Some(by) = rest {
-            // Residuals may vanish along a way that does not end.
-            if let (Convergence::Step, Some(j)) = (by, full.far) {
+            let (Convergence::Step, Some(j)) = (by, full.far) else {
+                return Ok((point, Progress::Rest(by)));
+            };
+            // Residuals may vanish along a way that does not end; after a start with residuals of 1e16 times
+            // those of the minimum, though, the way does.
+            self.fading += 1;
+            if self.fading > MOST_FADING {
                 let parameter = Self::name_of(problem, j)?;
                 return Ok((point, Progress::Stuck(Ending::RunsAway { parameter })));
             }
-            return Ok((point, Progress::Rest(by)));
+        } else {
+            self.fading = 0;
         }
         let promised = full.promised;
         let cost = point.evaluation.cost;

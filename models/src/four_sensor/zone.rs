@@ -32,8 +32,8 @@ pub struct MinimumZone {
 impl MinimumZone {
     /// The interval that holds the true zone with a probability, µm: value − widening ± k·std.
     ///
-    /// Where the error shapes the zone (a widening larger than the standard deviation) what it adds is
-    /// not known, only what it can add: a zone is a seminorm, so that the true zone is no less than
+    /// Where the error shapes the zone (a widening of more than a third of the standard deviation) what
+    /// it adds is not known, only what it can add: a zone is a seminorm, so that the true zone is no less than
     /// the value less the zone of the error. The lower limit is that, or zero, with the error's zone at
     /// its upper quantile; the upper limit is value + k·std. The same lower limit holds where a perfectly
     /// straight slide would show as much as the value.
@@ -50,7 +50,7 @@ impl MinimumZone {
         let nothing = self.of_nothing.get(rank).or(self.of_nothing.last());
         let surely = self.value - nothing.copied().unwrap_or(self.value);
         let middle = self.value - self.widening;
-        if self.widening > self.std {
+        if self.widening > self.std / 3.0 {
             return Ok((surely.max(0.0), self.value + half));
         }
         let low = if surely > 0.0 { middle - half } else { 0.0 };

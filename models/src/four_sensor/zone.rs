@@ -30,8 +30,13 @@ pub struct MinimumZone {
 }
 
 impl MinimumZone {
-    /// The interval that holds the true zone with a probability, µm: value − widening ± k·std, from
-    /// zero on where a perfectly straight slide would show as much.
+    /// The interval that holds the true zone with a probability, µm: value − widening ± k·std.
+    ///
+    /// Where the error shapes the zone (a widening of more than a third of the standard deviation) what
+    /// it adds is not known, only what it can add: a zone is a seminorm, so that the true zone is no less than
+    /// the value less the zone of the error. The lower limit is that, or zero, with the error's zone at
+    /// its upper quantile; the upper limit is value + k·std. The same lower limit holds where a perfectly
+    /// straight slide would show as much as the value.
     ///
     /// # Errors
     /// A probability outside 0 to 1.
@@ -41,15 +46,15 @@ impl MinimumZone {
         degrees: DegreesOfFreedom,
     ) -> Result<(f64, f64), UncertaintyError> {
         let half = coverage_factor(probability, degrees)? * self.std;
-        let middle = self.value - self.widening;
         let rank = (0.5 * (1.0 + probability) * self.of_nothing.len() as f64) as usize;
         let nothing = self.of_nothing.get(rank).or(self.of_nothing.last());
-        let low = if nothing.is_some_and(|nothing| self.value <= *nothing) {
-            0.0
-        } else {
-            (middle - half).max(0.0)
-        };
-        Ok((low, (middle + half).max(0.0)))
+        let surely = self.value - nothing.copied().unwrap_or(self.value);
+        let middle = self.value - self.widening;
+        if self.widening > self.std / 3.0 {
+            return Ok((surely.max(0.0), self.value + half));
+        }
+        let low = if surely > 0.0 { middle - half } else { 0.0 };
+        Ok((low.max(0.0), (middle + half).max(0.0)))
     }
 }
 

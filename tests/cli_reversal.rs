@@ -233,12 +233,9 @@ fn missing_readings_are_no_taper_and_lost_positions_are_told() {
     let moved = slope(&third, "value") - slope(&all, "value");
     // k·u; the forms of these readings have straight parts, which stand in the slope of both.
     assert!(moved.abs() < 4.0 * slope(&third, "std"), "{moved}");
-    assert_eq!(
-        third["warnings"].as_array().unwrap().len(),
-        1,
-        "{}",
-        third["warnings"]
-    );
+    // The slopes do not close, with all readings as well, and where to look: nothing besides.
+    let count = |answer: &Value| answer["warnings"].as_array().unwrap().len();
+    assert_eq!(count(&third), count(&all), "{}", third["warnings"]);
     assert_eq!(third["forms"]["x"].as_array().unwrap().len(), 41);
     assert_eq!(third["closure"]["x"].as_array().unwrap().len(), 27);
     let ends = write("ends.csv", &|x, channel| {

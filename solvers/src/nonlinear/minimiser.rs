@@ -89,6 +89,8 @@ struct Full {
     length: f64,
     /// A parameter that it moves far.
     far: Option<usize>,
+    /// Whether its effect is nothing beside what was felt of the parameters somewhere on the way.
+    fades: bool,
 }
 
 /// A step that was refused a value.
@@ -348,11 +350,19 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
             promised: point.model.predicted_reduction(&step),
             length: self.scaled_length(&step),
             far: self.goes_far(&step),
+            fades: false,
         };
         if full.promised.abs() <= Self::cost_rounding(point) {
             return rest(Convergence::Cost);
         }
-        if felt_length(point, &step) <= f64::EPSILON * self.longest {
+        let felt = felt_length(point, &step);
+        let full = Full {
+            fades: felt <= f64::EPSILON * self.longest,
+            ..full
+        };
+        // Beside what the parameters have been, felt as they are felt here: after a start with residuals of
+        // 1e16 times those of the minimum every step is nothing beside what was felt there.
+        if full.far.is_none() && felt <= f64::EPSILON * felt_length(point, &self.farthest) {
             return Ok((Some(Convergence::Step), full));
         }
         Ok((None, full))
@@ -369,20 +379,23 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
         problem: &mut Counted<O>,
         point: Point<M>,
     ) -> Result<(Point<M>, Progress), FitError> {
+        // After a start whose squares overflow, what is left may vanish in the unit that it needed.
+        let vanished = point.evaluation.cost == 0.0 && point.evaluation.residuals.amax() > 0.0;
+        if vanished && self.unit > 1.0 {
+            return Ok((point, Progress::Stuck(Ending::OutOfRange)));
+        }
         let (rest, full) = self.at_rest(&point)?;
         if let Some(by) = rest {
-            let (Convergence::Step, Some(j)) = (by, full.far) else {
-                return Ok((point, Progress::Rest(by)));
-            };
-            // Residuals may vanish along a way that does not end; after a start with residuals of 1e16 times
-            // those of the minimum, though, the way does.
-            self.fading += 1;
-            if self.fading > MOST_FADING {
+            return Ok((point, Progress::Rest(by)));
+        }
+        // Residuals may vanish along a way that does not end.
+        match full.far.filter(|_| full.fades) {
+            None => self.fading = 0,
+            Some(_) if self.fading < MOST_FADING => self.fading += 1,
+            Some(j) => {
                 let parameter = Self::name_of(problem, j)?;
                 return Ok((point, Progress::Stuck(Ending::RunsAway { parameter })));
             }
-        } else {
-            self.fading = 0;
         }
         let promised = full.promised;
         let cost = point.evaluation.cost;

@@ -91,7 +91,6 @@ pub fn for_people(unit: &str) -> &str {
     match unit {
         "um" => "µm",
         "um/mm" => "µm/mm",
-        "um of the reading" => "µm of the reading",
         "1" => "",
         unit => unit,
     }

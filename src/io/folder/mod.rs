@@ -162,7 +162,7 @@ impl OutFolder {
         if self.exchange(folder, &contents).is_ok() {
             return Ok(Ok(()));
         }
-        Ok(self.into_folder(folder, &contents))
+        Ok(self.write_into(folder, &contents))
     }
 
     /// Gives every file its name in a folder, `result.json` first: it tells what the others are.
@@ -220,7 +220,7 @@ impl OutFolder {
     }
 
     /// A folder that is there, file by file.
-    fn into_folder(&mut self, folder: &Path, contents: &Contents) -> io::Result<()> {
+    fn write_into(&mut self, folder: &Path, contents: &Contents) -> io::Result<()> {
         let _lock = Lock::wait(folder);
         let aside = Aside::new(folder)?;
         self.name_all(aside.path())?;

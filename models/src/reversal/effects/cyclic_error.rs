@@ -127,7 +127,7 @@ impl Effect<FirstOrder> for CyclicError {
         let cycles = shape.values.first()?;
         Some(if shape.variant == 0 {
             format!(
-                "period {:.4} um of the reading",
+                "period {:.4} µm of the reading",
                 model.reading_span() / cycles
             )
         } else {

@@ -37,12 +37,12 @@ pub fn line(text: &str) -> Cow<'_, str> {
     shown(text, is_hidden)
 }
 
-/// One line of a file: as [`line`], tabs kept.
+/// One line of a file: as [`line()`], tabs kept.
 pub fn source_line(text: &str) -> Cow<'_, str> {
     shown(text, |c| c != '\t' && is_hidden(c))
 }
 
-/// Several lines: as [`line`], line ends and tabs kept.
+/// Several lines: as [`line()`], line ends and tabs kept.
 pub fn lines(text: &str) -> Cow<'_, str> {
     shown(text, |c| !matches!(c, '\n' | '\t') && is_hidden(c))
 }

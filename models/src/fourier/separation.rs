@@ -18,7 +18,7 @@ const EXACT: f64 = 1e-9;
 /// `noise` is the standard deviation of one reading in µm where it is known.
 ///
 /// # Errors
-/// Those of [`join`] and [`step_terms`], [`FourierError::NoScan`], [`FourierError::Noise`],
+/// Those of [`step_terms`], [`FourierError::NoScan`], [`FourierError::Noise`],
 /// [`FourierError::NoiseUnknown`] and [`FourierError::StepNotSeen`].
 pub fn separate(
     scans: &[Scan],

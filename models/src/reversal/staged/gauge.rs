@@ -1,6 +1,6 @@
 //! The straight-line part of a profile on the grid.
 
-use super::grid::Grid;
+use super::grid::{Grid, LONGEST_GAP};
 use super::resample::{Interpolation, Stencil};
 use crate::reversal::cells::cell_width;
 
@@ -40,15 +40,21 @@ impl LinePart {
 
     /// The line by which forms are gauged: over the measured positions that the grid reaches, each
     /// weighted by the width of its cell. Also the number of positions beyond reach.
+    ///
+    /// Traces of different grids end at different places about one spacing apart: so far the form is
+    /// followed by its tangent, in the narrow cells that such ends have. Where the traces share their
+    /// positions an end that does not tell the forms apart is not reached.
     pub fn gauge(
         grid: &Grid,
         positions: impl Iterator<Item = f64>,
         how: Interpolation,
     ) -> (Self, usize) {
+        let reach = (!grid.one_grid).then_some(grid.spacing);
+        let longest = LONGEST_GAP * grid.spacing;
         let mut beyond = 0;
         let mut reached = Vec::with_capacity(grid.x.len());
         for x in positions {
-            match Stencil::at(&grid.x, x, grid.same, grid.longest, how) {
+            match Stencil::at(&grid.x, x, grid.same, longest, reach, how) {
                 Some(stencil) => reached.push((x, stencil)),
                 None => beyond += 1,
             }

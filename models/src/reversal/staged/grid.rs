@@ -11,7 +11,7 @@ use crate::reversal::cells::{SAME_PLACE, Union};
 const SHARED: f64 = 0.75;
 
 /// A trace has no value between readings that are more than this many spacings apart.
-const LONGEST_GAP: f64 = 2.5;
+pub const LONGEST_GAP: f64 = 2.5;
 
 /// Positions nearer to the coarsest trace's than this share of its spacing add no detail to its grid.
 const NEAR: f64 = 0.75;
@@ -27,8 +27,8 @@ pub struct Grid {
     pub subsets: Vec<usize>,
     /// Whether the positions are the traces' own, so that nothing was interpolated.
     pub one_grid: bool,
-    /// Between positions farther apart than this nothing is known, mm.
-    pub longest: f64,
+    /// Median distance of its positions before some were left out, mm.
+    pub spacing: f64,
     /// Positions nearer to each other than this are one, mm.
     pub same: f64,
 }
@@ -69,7 +69,7 @@ impl Grid {
             Self {
                 one_grid: false,
                 ..Self::on(coarsest, traces, designs, same, |trace, x, spacing| {
-                    Stencil::at(trace, x, same, LONGEST_GAP * coarse.max(spacing), how)
+                    Stencil::at(trace, x, same, LONGEST_GAP * coarse.max(spacing), None, how)
                 })
             }
         };
@@ -98,7 +98,7 @@ impl Grid {
             sights: vec![Vec::with_capacity(x.len()); traces.len()],
             subsets: Vec::with_capacity(x.len()),
             one_grid: true,
-            longest: LONGEST_GAP * median_spacing(&x).unwrap_or(0.0),
+            spacing: median_spacing(&x).unwrap_or(0.0),
             same,
         };
         let mut here = Vec::with_capacity(traces.len());

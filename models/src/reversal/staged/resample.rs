@@ -102,9 +102,16 @@ impl Stencil {
     }
 
     /// The value that [`resample`] gives at a position, from the profile's points at `x`; a point
-    /// within `same` of it is taken as it is. `None` more than half a spacing beyond an end, or
-    /// between points that are more than `longest` apart.
-    pub fn at(x: &[f64], at: f64, same: f64, longest: f64, how: Interpolation) -> Option<Self> {
+    /// within `same` of it is taken as it is. `None` farther than `beyond` an end (half the spacing
+    /// there, where none is given), or between points that are more than `longest` apart.
+    pub fn at(
+        x: &[f64],
+        at: f64,
+        same: f64,
+        longest: f64,
+        beyond: Option<f64>,
+        how: Interpolation,
+    ) -> Option<Self> {
         let n = x.len();
         let right = x.partition_point(|p| *p < at - same);
         if x.get(right).is_some_and(|p| *p <= at + same) {
@@ -120,13 +127,14 @@ impl Stencil {
         };
         if right == 0 || right == n {
             let (end, neighbour) = if right == 0 { (0, 1) } else { (n - 1, n - 2) };
-            let beyond = at - x[end];
-            if beyond.abs() > REACH * (x[end] - x[neighbour]).abs() {
+            let step = at - x[end];
+            let reach = beyond.unwrap_or(REACH * (x[end] - x[neighbour]).abs());
+            if step.abs() > reach {
                 return None;
             }
             stencil.first = tangent_weights(x, end, how).0;
             stencil.add(end, 1.0);
-            stencil.add_tangent(x, end, beyond, how);
+            stencil.add_tangent(x, end, step, how);
             return Some(stencil);
         }
         let left = right - 1;
@@ -209,7 +217,7 @@ mod tests {
                 for k in -20..=320 {
                     let at = f64::from(k) * 0.0251;
                     let spline = resample(x, y, &[at], how)[0];
-                    let own = Stencil::at(x, at, 0.0, f64::INFINITY, how).map(|s| s.of(y));
+                    let own = Stencil::at(x, at, 0.0, f64::INFINITY, None, how).map(|s| s.of(y));
                     // Epsilons: some tens of roundings of values up to 20.
                     match (spline, own) {
                         (Some(a), Some(b)) => assert!((a - b).abs() < 1e-13, "{at} {a} {b}"),
@@ -218,10 +226,12 @@ mod tests {
                 }
             }
         }
-        let across = |longest| Stencil::at(&UNEVEN, 2.0, 0.0, longest, Interpolation::Cubic);
+        let across = |longest| Stencil::at(&UNEVEN, 2.0, 0.0, longest, None, Interpolation::Cubic);
         assert!(across(2.6).is_some() && across(2.4).is_none());
-        let near = Stencil::at(&UNEVEN, 1.5 + 1e-9, 1e-8, 0.1, Interpolation::Cubic);
+        let near = Stencil::at(&UNEVEN, 1.5 + 1e-9, 1e-8, 0.1, None, Interpolation::Cubic);
         assert_eq!(near, Some(Stencil::point(2)));
+        let far = |beyond| Stencil::at(&UNEVEN, -0.8, 0.0, 1.0, beyond, Interpolation::Cubic);
+        assert!(far(None).is_none() && far(Some(0.9)).is_some());
     }
 
     #[test]

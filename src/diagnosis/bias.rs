@@ -5,9 +5,14 @@
 //! causes' amplitudes and shapes, and those are G ν̃ in noise ν̃ that is white, so that with
 //! g = Dᵀw and w̃ = W Σ w (W the whitening) the variances are |w̃|² before, gᵀCg of the move and
 //! |w̃|² + gᵀCg − 2 w̃ᵀGᵀg after, C the covariance of amplitudes and shapes.
+//!
+//! Where signatures are taken at the fitted state, c also moves with the noise of that state
+//! whatever the amplitudes: a change m of the readings in each draw of the state. The move's error
+//! is then gᵀδ + wᵀm, and what wᵀm adds to the variances is taken from the draws.
 
 use errsep_models::model::{FittedModel, Profile};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::bench::{Bench, Cause, raw_signatures};
 use super::noise::NoiseLaw;
@@ -16,6 +21,9 @@ use super::verdict::Bias;
 
 /// A quantity that moves by less than this part of its uncertainty does not move: that is rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// Draws of the state behind the uncertainty of a profile's move.
+const STATES: usize = 32;
 
 /// A profile's name, its values without and its values with the effects.
 type MovedProfile = (String, Vec<f64>, Vec<f64>);
@@ -45,7 +53,9 @@ pub(super) fn biases<M: FittedModel>(
                 let mut whitened = DMatrix::from_column_slice(spread.len(), 1, spread.as_slice());
                 bench.space.whiten(&mut whitened);
                 let common = (&taken.sizes.gain * whitened.column(0)).dot(&gradient);
-                let moved = taken.variance(&gradient);
+                let state = taken.by_state(&quantity.weights, &gradient);
+                let moved = (taken.variance(&gradient) + state.added).max(0.0);
+                let common = common + state.common;
                 let after = std * std + moved - 2.0 * common;
                 (moved.sqrt(), after.max(0.0).sqrt())
             });
@@ -79,6 +89,16 @@ pub(super) fn biases<M: FittedModel>(
             .map(|(column, std)| profiles_of(&corrected - column * *std))
             .collect()
     });
+    let moved_with_state: Vec<Vec<Profile>> = taken
+        .as_ref()
+        .and_then(|taken| taken.sizes.draws.as_ref())
+        .map_or_else(Vec::new, |draws| {
+            let [_, moved] = &draws.in_readings;
+            (0..moved.ncols().min(STATES))
+                .into_par_iter()
+                .map(|draw| profiles_of(&corrected - moved.column(draw)))
+                .collect()
+        });
     let mut profiles = Vec::new();
     for (k, (b, a)) in before.into_iter().zip(after).enumerate() {
         let moved = &a.values - &b.values;
@@ -94,11 +114,19 @@ pub(super) fn biases<M: FittedModel>(
             // The derivative of a norm is the product with its direction.
             let count = moved.len().max(1) as f64;
             let length = moved.norm() * count.sqrt();
-            let gradient = slopes.tr_mul(&moved) / length.max(f64::MIN_POSITIVE);
+            let direction = &moved / length.max(f64::MIN_POSITIVE);
+            let gradient = slopes.tr_mul(&direction);
             let spread = (&slopes * &taken.sizes.covariance).component_mul(&slopes);
+            let states = moved_with_state.iter().filter_map(|own| own.get(k));
+            let (mut along, mut square) = (0.0, 0.0);
+            for state in states {
+                let change = &state.values - &a.values;
+                along += change.dot(&direction).powi(2) / moved_with_state.len() as f64;
+                square += change.norm_squared() / moved_with_state.len() as f64;
+            }
             (
-                taken.variance(&gradient).sqrt(),
-                std.hypot((spread.sum() / count).max(0.0).sqrt()),
+                (taken.variance(&gradient) + along).sqrt(),
+                std.hypot(((spread.sum() + square) / count).max(0.0).sqrt()),
             )
         });
         biases.push(Bias {
@@ -140,7 +168,7 @@ impl Taken {
             return None;
         }
         let sizes = Sizes::fitted_with_state(bench, readings, causes)?;
-        let signatures = raw_signatures(bench, causes);
+        let signatures = signatures(bench, readings, causes, &sizes.amplitudes);
         let derivative = |unknown: &Unknown| match *unknown {
             Unknown::Amplitude(which, k) => signatures
                 .column(first_amplitude(causes, which) + k)
@@ -165,7 +193,7 @@ impl Taken {
         let columns: Vec<DVector<f64>> = sizes.parameters.iter().map(derivative).collect();
         let variances = sizes.covariance.diagonal();
         Some(Self {
-            change: bench.change(causes, &sizes.amplitudes),
+            change: &signatures * &sizes.amplitudes,
             derivatives: DMatrix::from_columns(&columns),
             stds: variances
                 .iter()
@@ -179,6 +207,55 @@ impl Taken {
     fn variance(&self, gradient: &DVector<f64>) -> f64 {
         gradient.dot(&(&self.sizes.covariance * gradient)).max(0.0)
     }
+
+    /// What the noise of the state adds for a quantity beside the errors of the parameters.
+    fn by_state(&self, weights: &DVector<f64>, gradient: &DVector<f64>) -> ByState {
+        let Some(draws) = &self.sizes.draws else {
+            return ByState::default();
+        };
+        let [noise, moved] = draws.in_readings.each_ref().map(|m| m.tr_mul(weights));
+        let known = draws.errors(&self.sizes.gain).tr_mul(gradient);
+        let plain = (&self.sizes.gain * &draws.noise).tr_mul(gradient);
+        let all = &known + moved;
+        let count = all.len().max(1) as f64;
+        ByState {
+            added: (all.norm_squared() - known.norm_squared()) / count,
+            common: noise.dot(&(all - plain)) / count,
+        }
+    }
+}
+
+/// What the noise of the state adds to the variance of a move, and to its covariance with the
+/// noise of the quantity itself.
+#[derive(Default)]
+struct ByState {
+    added: f64,
+    common: f64,
+}
+
+/// Signatures of causes as they stand in the readings, readings × amplitudes: those that are linear in
+/// the state at the state as read without the causes.
+fn signatures<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    amplitudes: &DVector<f64>,
+) -> DMatrix<f64> {
+    let mut signatures = raw_signatures(bench, causes);
+    let changes = bench.changes_at(causes, amplitudes);
+    let clean = bench.without(readings, causes, &changes);
+    let read = bench.model.refit_as_smooth(clean).as_read();
+    for (k, cause) in causes.iter().enumerate() {
+        if !bench.catalogue[cause.effect].is_linear_in_state() {
+            continue;
+        }
+        let columns = bench.columns_at(k, (bench.model, &read), causes, &changes);
+        for (j, column) in columns.iter().enumerate() {
+            let at = first_amplitude(causes, k) + j;
+            signatures.set_column(at, &column.dense(readings.len()));
+        }
+    }
+    signatures
 }
 
 /// Σ w, the scatter that the model expects included.

@@ -253,8 +253,12 @@ pub(super) fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// −2 ln of the chi-squared tail beyond T.
 pub(super) fn surprise(t: f64, freedom: usize) -> f64 {
-    if t <= 0.0 {
+    if !(t > 0.0) {
         return 0.0;
+    }
+    // Beyond that the logarithm of the tail is lost in rounding.
+    if t >= f64::MAX.sqrt() {
+        return t.min(f64::MAX);
     }
     match freedom {
         1 => {
@@ -294,5 +298,11 @@ mod tests {
         // 2 Q(5) = 5.733·10⁻⁷ (certified digits).
         assert!((surprise(25.0, 1) + 2.0 * 5.733e-7f64.ln()).abs() < 1e-3);
         assert!((surprise(3.0, 2) - 3.0).abs() < 1e-12);
+        // What overflows stands out, what is no number does not.
+        for freedom in 1..5 {
+            assert!(surprise(f64::INFINITY, freedom) == f64::MAX);
+            assert!(surprise(1e200, freedom) == 1e200);
+            assert!(surprise(f64::NAN, freedom) == 0.0);
+        }
     }
 }

@@ -9,7 +9,7 @@
 //! each eigenvector of B Bᵀ with eigenvalue λ a part λ/(1 + λ) of every product is taken away. The
 //! same draws give what the noise of the state adds to the uncertainty of the causes' sizes.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{Column, FittedModel};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -44,6 +44,9 @@ pub(super) struct StateDraws {
     pub noise: DMatrix<f64>,
     /// How the causes' change moves with the state that is fitted to it, likewise.
     pub moved: DMatrix<f64>,
+    /// Noise as it stands in the readings, and how the causes' change there moves with the state, as
+    /// read where the change is linear in it.
+    pub in_readings: [DMatrix<f64>; 2],
 }
 
 impl<M: FittedModel> Bench<'_, M> {
@@ -52,12 +55,11 @@ impl<M: FittedModel> Bench<'_, M> {
         let (amplitudes, _) = self.amplitudes(readings, causes)?;
         let changes = self.changes(readings, causes)?;
         let clean = self.without(readings, causes, &changes);
-        let changes_at = |state: &M| {
+        let change_at = |state: &M, read: &M| {
             let mut changed = DMatrix::zeros(readings.len(), causes.len());
             let mut at = 0;
-            for (k, cause) in causes.iter().enumerate() {
-                let state = self.seen_by(k, state, causes, &changes);
-                for column in self.catalogue[cause.effect].columns(&state, &cause.shape) {
+            for k in 0..causes.len() {
+                for column in self.columns_at(k, (state, read), causes, &changes) {
                     for (&row, value) in column.rows.iter().zip(&column.values) {
                         changed[(row, k)] += amplitudes[at] * value;
                     }
@@ -66,7 +68,9 @@ impl<M: FittedModel> Bench<'_, M> {
             }
             changed
         };
-        let base = changes_at(&self.model.refit_as_smooth(clean)).column_sum();
+        let fitted = self.model.refit_as_smooth(clean);
+        let base = change_at(&fitted, &fitted).column_sum();
+        let base_as_read = change_at(&fitted, &fitted.as_read()).column_sum();
         let drawn = |draw: u64| {
             let mut random = ChaCha8Rng::seed_from_u64(SEED);
             random.set_stream(draw);
@@ -74,24 +78,53 @@ impl<M: FittedModel> Bench<'_, M> {
             let other = self.law.draw(self.model, &mut random);
             let noisy = readings + &noise;
             let mut moved = changes.clone();
+            let mut as_read = moved.clone();
             for _ in 0..ROUNDS {
                 let clean = self.without(&noisy, causes, &moved);
-                let state = self.model.refit_as_smooth(clean).roughened(&other);
-                moved = changes_at(&state);
+                let fitted = self.model.refit_as_smooth(clean);
+                let read = fitted.as_read();
+                let state = fitted.roughened(&other);
+                moved = change_at(&state, &state);
+                as_read = change_at(&state, &read);
             }
-            (noise, moved.column_sum() - &base)
+            [
+                noise,
+                moved.column_sum() - &base,
+                as_read.column_sum() - &base_as_read,
+            ]
         };
-        if drawn(0).1.norm() <= 1e-9 * base.norm() {
+        if drawn(0)[1].norm() <= 1e-9 * base.norm() {
             return None;
         }
-        let (noise, moved): (Vec<DVector<f64>>, Vec<DVector<f64>>) =
-            (0..DRAWS as u64).into_par_iter().map(drawn).unzip();
-        let forward =
-            |columns: &[DVector<f64>]| self.space.forward(DMatrix::from_columns(columns)).0;
+        let all: Vec<[DVector<f64>; 3]> = (0..DRAWS as u64).into_par_iter().map(drawn).collect();
+        let [noise, moved, as_read] = [0, 1, 2].map(|which| {
+            let own: Vec<DVector<f64>> = all.iter().map(|draw| draw[which].clone()).collect();
+            DMatrix::from_columns(&own)
+        });
         Some(StateDraws {
-            noise: forward(&noise),
-            moved: forward(&moved),
+            moved: self.space.forward(moved).0,
+            noise: self.space.forward(noise.clone()).0,
+            in_readings: [noise, as_read],
         })
+    }
+
+    /// The signatures of one of the causes at a state, taken at the state as read where they are
+    /// linear in it.
+    pub fn columns_at(
+        &self,
+        which: usize,
+        (state, read): (&M, &M),
+        causes: &[Cause],
+        changes: &DMatrix<f64>,
+    ) -> Vec<Column> {
+        let effect = &self.catalogue[causes[which].effect];
+        let own = if effect.is_linear_in_state() {
+            read
+        } else {
+            state
+        };
+        let seen = self.seen_by(which, own, causes, changes);
+        effect.columns(&seen, &causes[which].shape)
     }
 
     /// The doubt about causes beside what the model and they themselves absorb (`basis`).
@@ -126,7 +159,12 @@ impl StateDraws {
     /// away.
     pub fn added(&self, gain: &DMatrix<f64>) -> DMatrix<f64> {
         let own = gain * &self.noise;
-        let all = &own - gain * &self.moved;
+        let all = self.errors(gain);
         (&all * all.transpose() - &own * own.transpose()) / DRAWS as f64
+    }
+
+    /// The errors of such estimates, estimates × draws.
+    pub fn errors(&self, gain: &DMatrix<f64>) -> DMatrix<f64> {
+        gain * (&self.noise - &self.moved)
     }
 }

@@ -10,7 +10,7 @@ use errsep_models::model::{Estimate, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::bench::{Bench, Cause, stack};
-use super::doubt::ROUNDS;
+use super::doubt::{ROUNDS, StateDraws};
 
 /// What the noise of the state may take away of a variance, at most: it is known from draws.
 const LEAST: f64 = -0.5;
@@ -25,6 +25,8 @@ pub(super) struct Sizes {
     pub gain: DMatrix<f64>,
     /// What the parameters are: those that readings determine at all.
     pub parameters: Vec<Unknown>,
+    /// Draws of the state, where signatures depend on it.
+    pub draws: Option<StateDraws>,
 }
 
 /// One parameter of several causes.
@@ -56,6 +58,7 @@ impl Sizes {
             gain: &covariance * columns.transpose(),
             covariance,
             parameters,
+            draws: None,
         })
     }
 
@@ -95,6 +98,7 @@ impl Sizes {
         Some(Self {
             covariance: with_state(&gain * gain.transpose(), &added),
             gain,
+            draws: Some(draws),
             ..plain
         })
     }

@@ -93,7 +93,7 @@ impl CsvTable {
             for (_, values) in &self.columns {
                 match values {
                     Values::Numbers(v) => match v.get(row) {
-                        Some(x) if !x.is_nan() => csv.write_field(x.to_string())?,
+                        Some(x) if x.is_finite() => csv.write_field(x.to_string())?,
                         _ => csv.write_field("")?,
                     },
                     Values::Words(words, v) => {

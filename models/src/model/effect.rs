@@ -152,6 +152,13 @@ pub trait Effect<M>: Send + Sync {
         Link::Reading
     }
 
+    /// Whether its signature is linear in the fitted state. How far it moves an answer is then taken
+    /// at the state as it was read: smoothing would bias that, most at the ends of the travel, and
+    /// noise does not.
+    fn is_linear_in_state(&self) -> bool {
+        false
+    }
+
     /// Whether the model absorbs this effect whatever its size: it is listed as undetectable and
     /// never named, whatever small part of it bent states or missing traces leave visible.
     fn absorbed(&self) -> bool {

@@ -260,6 +260,12 @@ pub trait FittedModel: Clone + Send + Sync {
         self.refit(observed)
     }
 
+    /// The same state without smoothing.
+    #[must_use]
+    fn as_read(&self) -> Self {
+        self.clone()
+    }
+
     /// The same model with a draw of what its fit, where it smooths, may have taken away of the
     /// truth. `noise`: a draw of the readings' noise that has no part in the fit.
     #[must_use]

@@ -55,7 +55,9 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
             }
             _ => Message::bad_input(e.to_string()),
         };
-        message.in_file(&args.data)
+        message
+            .in_file(&args.data)
+            .remedy("give four or more different points of a circle, columns x and y in mm")
     })?;
     let circle = model.circle();
     Case {

@@ -1,13 +1,14 @@
 //! A spindle and slideway reversal.
 
 use errsep_models::model::FittedModel;
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder, NotDiagnosable};
 
 use super::Args;
 use super::case::Case;
 use crate::cli::Answer;
 use crate::io::Message;
 use crate::io::reversal::{ReversalSetup, read};
+use crate::report::number;
 
 pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     let mut setup = match &args.setup {
@@ -24,7 +25,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         noise: setup.noise,
     };
     let model = FirstOrder::new(&data.observations, assumptions)
-        .map_err(|e| Message::bad_input(e.to_string()).in_file(&args.data))?;
+        .map_err(|why| refusal(&why).in_file(&args.data))?;
     let mut notes = Vec::new();
     if !model.timed {
         notes.push("No times are given: the readings are taken to follow each other evenly, first spindle position first, each repeat forward and then backward.".to_owned());
@@ -35,6 +36,14 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
             "Of the four channels only {} {} there, so nothing closes: only what differs between repeats and directions is diagnosed, and what comes back in all of them goes unnoticed.",
             channels.join(", "),
             if channels.len() == 1 { "is" } else { "are" }
+        ));
+    }
+    if let Some(gathered) = &model.gathered {
+        notes.push(format!(
+            "The traces have {}: their readings were carried to {} common places by the simultaneous fit, {} readings to each; noise is that of their mean.",
+            if gathered.readings_per_cell > 1.5 { "many positions" } else { "positions of their own" },
+            gathered.cells,
+            number::plain(gathered.readings_per_cell, 2)
         ));
     }
     if model.left_out > 0 {
@@ -51,4 +60,15 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         inputs: Vec::new(),
     }
     .answer(args)
+}
+
+fn refusal(why: &NotDiagnosable) -> Message {
+    match why {
+        NotDiagnosable::NoFit(_) => Message::not_solved(why.to_string())
+            .remedy("`errsep reversal --simultaneous` with the same readings says more"),
+        NotDiagnosable::RangesDiffer => Message::bad_input(why.to_string())
+            .remedy("read every channel over the same range of x, at five or more places"),
+        NotDiagnosable::NothingLeft { .. } => Message::bad_input(why.to_string())
+            .remedy("add the missing channels, the other direction or repeats"),
+    }
 }

@@ -77,8 +77,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         );
     }
     let length = args.length.or(setup.section.length).ok_or_else(|| {
-        Message::bad_input("the length of the section is not known")
-            .remedy("give [section] length in the set-up, or --length")
+        let message = Message::bad_input("the length of the section is not known")
+            .remedy("give [section] length in the set-up, or --length");
+        match args.setup.as_ref().or(args.data.first()) {
+            Some(path) => message.in_file(path),
+            None => message,
+        }
     })?;
     let spacings = &setup.probe.spacing;
     if !spacings.is_empty() && spacings.len() != args.data.len() {

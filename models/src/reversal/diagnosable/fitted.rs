@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{FirstOrder, Gauge, forms};
+use super::{FirstOrder, Gauge, Smoothing, forms};
 use crate::model::{Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record};
 use crate::reversal::smooth_profile::SmoothProfile;
 use crate::reversal::{Channel, effects};
@@ -166,14 +166,20 @@ impl FittedModel for FirstOrder {
     fn refit(&self, observed: DVector<f64>) -> Self {
         let mut fitted = self.clone();
         fitted.record.observed = observed;
-        fitted.fit(true);
+        fitted.fit(Smoothing::Chosen);
         fitted
     }
 
     fn refit_as_smooth(&self, observed: DVector<f64>) -> Self {
         let mut fitted = self.clone();
         fitted.record.observed = observed;
-        fitted.fit(false);
+        fitted.fit(Smoothing::Kept);
+        fitted
+    }
+
+    fn as_read(&self) -> Self {
+        let mut fitted = self.clone();
+        fitted.fit(Smoothing::None);
         fitted
     }
 

@@ -7,6 +7,7 @@
 
 mod fitted;
 mod further;
+mod gathering;
 mod sorting;
 
 use std::collections::BTreeSet;
@@ -15,9 +16,11 @@ use nalgebra::DVector;
 use thiserror::Error;
 
 use super::cells::cell_width;
+use super::simultaneous::Simultaneous;
 use super::smooth_profile::{SmoothProfile, Smoother};
 use super::{Channel, Convention, Observations};
 use crate::model::{Column, FittedModel, Place, Record};
+pub use gathering::Gathered;
 use sorting::Sorted;
 
 /// What the set-up says of the measurement.
@@ -34,24 +37,34 @@ pub struct Assumptions {
 /// Why readings cannot be diagnosed.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum NotDiagnosable {
-    /// Too few positions that all traces have.
+    /// Too few places that all traces have.
     #[error(
-        "only {shared} of {all} positions are read in every trace; the diagnosis compares traces position by position and needs at least 5: measure all traces on the same positions"
+        "the traces have fewer than {FEWEST_POSITIONS} places in common, and the diagnosis compares traces along the same stretch"
     )]
-    PositionsDiffer {
-        /// Positions read in every trace.
-        shared: usize,
-        /// All positions.
-        all: usize,
-    },
+    RangesDiffer,
+    /// The simultaneous fit that carries readings to common places fails.
+    #[error("the readings cannot be fitted: {0}")]
+    NoFit(String),
     /// Nothing is left over from the fit.
-    #[error(
-        "{readings} readings leave nothing over from the fit: add the missing channels, the other direction or repeats"
-    )]
+    #[error("{readings} readings leave nothing over from the fit")]
     NothingLeft {
         /// Number of readings.
         readings: usize,
     },
+}
+
+/// Fewest places of a trace.
+const FEWEST_POSITIONS: usize = 5;
+
+/// How the forms of a fitted state are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Smoothing {
+    /// By the weight that the readings choose.
+    Chosen,
+    /// By the weight of the state before.
+    Kept,
+    /// Not at all.
+    None,
 }
 
 /// Mean profile of one channel with its line.
@@ -89,22 +102,66 @@ pub struct FirstOrder {
     pub timed: bool,
     /// Readings at positions that not every trace has: not used.
     pub left_out: usize,
+    /// How readings were gathered, where they were.
+    pub gathered: Option<Gathered>,
 }
 
 impl FirstOrder {
-    /// Sorts readings into traces and fits the model.
+    /// Sorts readings into traces and fits the model. Traces of their own positions, and very long
+    /// ones, are gathered into common cells by the simultaneous fit.
     ///
     /// # Errors
-    /// [`NotDiagnosable`] where the traces do not share positions or the fit takes up everything.
+    /// [`NotDiagnosable`] where the traces have too little in common or the fit takes up everything.
     pub fn new(
         observations: &Observations,
         assumptions: Assumptions,
     ) -> Result<Self, NotDiagnosable> {
-        let sorted = Sorted::new(observations)?;
-        let smoother = Smoother::new(&sorted.positions).ok_or(NotDiagnosable::PositionsDiffer {
-            shared: sorted.positions.len(),
-            all: sorted.positions.len(),
-        })?;
+        Self::beside(observations, assumptions, None)
+    }
+
+    /// The same where the readings have been fitted already.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_fit(
+        observations: &Observations,
+        fit: &Simultaneous,
+        assumptions: Assumptions,
+    ) -> Result<Self, NotDiagnosable> {
+        Self::beside(observations, assumptions, Some(fit))
+    }
+
+    fn beside(
+        observations: &Observations,
+        assumptions: Assumptions,
+        fit: Option<&Simultaneous>,
+    ) -> Result<Self, NotDiagnosable> {
+        let traces = gathering::traces_of(observations);
+        let shared = sorting::shared(observations, traces.len());
+        if !gathering::is_needed(traces.len(), shared.len(), observations.readings.len()) {
+            return Self::sorted(Sorted::new(observations, &shared), assumptions);
+        }
+        let own;
+        let fit = match fit {
+            Some(fit) => fit,
+            None => {
+                own = gathering::fit(observations, assumptions)?;
+                &own
+            }
+        };
+        let (made, gathered) = gathering::gather(observations, traces, fit)?;
+        let shared = sorting::shared(&made, gathering::traces_of(&made).len());
+        let mut model = Self::sorted(Sorted::new(&made, &shared), assumptions)?;
+        model.left_out = gathered.beyond;
+        model.gathered = Some(gathered);
+        Ok(model)
+    }
+
+    fn sorted(sorted: Sorted, assumptions: Assumptions) -> Result<Self, NotDiagnosable> {
+        if sorted.positions.len() < FEWEST_POSITIONS {
+            return Err(NotDiagnosable::RangesDiffer);
+        }
+        let smoother = Smoother::new(&sorted.positions).ok_or(NotDiagnosable::RangesDiffer)?;
         let present: Vec<Channel> = Channel::ALL
             .into_iter()
             .filter(|c| sorted.trace_channels.contains(c))
@@ -143,6 +200,7 @@ impl FirstOrder {
             present,
             timed: sorted.timed,
             left_out: sorted.left_out,
+            gathered: None,
         }
         .refit(DVector::from_vec(sorted.values)))
     }
@@ -174,8 +232,8 @@ impl FirstOrder {
         sums
     }
 
-    /// Fits the readings; `anew`: with the weight of the smoothing chosen by them.
-    fn fit(&mut self, anew: bool) {
+    /// Fits the readings.
+    fn fit(&mut self, smoothing: Smoothing) {
         let means = self.channel_means(&self.record.observed, None);
         let n = self.positions.len();
         let gauge = Gauge::of(&self.positions);
@@ -194,24 +252,30 @@ impl FirstOrder {
             ));
         }
         let raw = forms(&residual, n);
-        (self.m, self.s_a, self.s_b) = if anew {
-            let singles: Vec<[DVector<f64>; 3]> = self
-                .repeats
-                .iter()
-                .map(|repeat| forms(&self.channel_means(&self.record.observed, Some(*repeat)), n))
-                .collect();
-            let smooth = |k: usize| {
-                let own: Vec<&DVector<f64>> = singles.iter().map(|forms| &forms[k]).collect();
-                self.smoother.smooth_repeated(&raw[k], &own)
-            };
-            (smooth(0), smooth(1), smooth(2))
-        } else {
-            let smooth = |form: &SmoothProfile, k: usize| self.smoother.smooth_as(form, &raw[k]);
-            (
-                smooth(&self.m, 0),
-                smooth(&self.s_a, 1),
-                smooth(&self.s_b, 2),
-            )
+        [self.m, self.s_a, self.s_b] = match smoothing {
+            Smoothing::Chosen => {
+                let singles: Vec<[DVector<f64>; 3]> = self
+                    .repeats
+                    .iter()
+                    .map(|repeat| {
+                        forms(&self.channel_means(&self.record.observed, Some(*repeat)), n)
+                    })
+                    .collect();
+                [0, 1, 2].map(|k| {
+                    let own: Vec<&DVector<f64>> = singles.iter().map(|forms| &forms[k]).collect();
+                    self.smoother.smooth_repeated(&raw[k], &own)
+                })
+            }
+            Smoothing::Kept => {
+                let smooth =
+                    |form: &SmoothProfile, k: usize| self.smoother.smooth_as(form, &raw[k]);
+                [
+                    smooth(&self.m, 0),
+                    smooth(&self.s_a, 1),
+                    smooth(&self.s_b, 2),
+                ]
+            }
+            Smoothing::None => raw.map(|form| self.smoother.through(form)),
         };
         self.beneath = None;
         self.settle();

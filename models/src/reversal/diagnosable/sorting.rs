@@ -3,15 +3,14 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::NotDiagnosable;
 use crate::model::Place;
-use crate::reversal::{Channel, Direction, Observations};
+use crate::reversal::{Channel, Direction, Observations, Reading};
 
 /// Seconds between readings where the file has no times.
 const ASSUMED_INTERVAL: f64 = 1.0;
 
 /// Channel, repeat, and whether it runs backward.
-type TraceKey = (Channel, u32, bool);
+pub(super) type TraceKey = (Channel, u32, bool);
 
 /// Readings in traces.
 pub(super) struct Sorted {
@@ -28,34 +27,13 @@ pub(super) struct Sorted {
 type Sample = (f64, f64, Option<f64>);
 
 impl Sorted {
-    pub fn new(observations: &Observations) -> Result<Self, NotDiagnosable> {
+    /// The readings at positions that all traces share.
+    pub fn new(observations: &Observations, shared: &[i64]) -> Self {
         let mut traces: BTreeMap<TraceKey, BTreeMap<i64, Sample>> = BTreeMap::new();
-        let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
         for reading in &observations.readings {
-            let key = (
-                reading.channel,
-                reading.repeat,
-                reading.direction == Direction::Backward,
-            );
-            let place = position_key(reading.x);
-            let trace = traces.entry(key).or_default();
-            if trace
-                .insert(place, (reading.x, reading.value, reading.time))
-                .is_none()
-            {
-                *counts.entry(place).or_default() += 1;
-            }
-        }
-        let shared: Vec<i64> = counts
-            .iter()
-            .filter(|(_, count)| **count == traces.len())
-            .map(|(place, _)| *place)
-            .collect();
-        if shared.len() < 5 {
-            return Err(NotDiagnosable::PositionsDiffer {
-                shared: shared.len(),
-                all: counts.len(),
-            });
+            let sample = (reading.x, reading.value, reading.time);
+            let trace = traces.entry(trace_key(reading)).or_default();
+            trace.insert(position_key(reading.x), sample);
         }
         let n = shared.len();
         let timed = observations.readings.iter().all(|r| r.time.is_some());
@@ -101,8 +79,31 @@ impl Sorted {
             sorted.trace_channels.push(channel);
         }
         sorted.left_out = observations.readings.len() - sorted.values.len();
-        Ok(sorted)
+        sorted
     }
+}
+
+/// The positions that all of so many traces have, ascending.
+pub(super) fn shared(observations: &Observations, traces: usize) -> Vec<i64> {
+    let mut numbers: BTreeMap<TraceKey, u32> = BTreeMap::new();
+    let mut seen: Vec<(i64, u32)> = Vec::with_capacity(observations.readings.len());
+    for reading in &observations.readings {
+        let next = numbers.len() as u32;
+        let trace = *numbers.entry(trace_key(reading)).or_insert(next);
+        seen.push((position_key(reading.x), trace));
+    }
+    seen.sort_unstable();
+    seen.dedup();
+    seen.chunk_by(|a, b| a.0 == b.0)
+        .filter(|by| by.len() == traces)
+        .map(|by| by[0].0)
+        .collect()
+}
+
+/// The trace of a reading.
+pub(super) fn trace_key(reading: &Reading) -> TraceKey {
+    let backward = reading.direction == Direction::Backward;
+    (reading.channel, reading.repeat, backward)
 }
 
 /// Positions closer than 0.1 µm are the same.

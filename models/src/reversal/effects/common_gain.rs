@@ -36,6 +36,10 @@ impl Effect<FirstOrder> for CommonGain {
         true
     }
 
+    fn is_linear_in_state(&self) -> bool {
+        true
+    }
+
     fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
         vec![Column::from_places(model.places(), |k, place| {
             model.smooth_reading(k) - model.mid_reading(place)

@@ -32,6 +32,10 @@ impl Effect<FirstOrder> for GainMismatch {
         }]
     }
 
+    fn is_linear_in_state(&self) -> bool {
+        true
+    }
+
     fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
         vec![Column::from_places(model.places(), |k, place| {
             0.5 * model.channel(place).indicator_sign()

@@ -36,6 +36,10 @@ impl Effect<FirstOrder> for ThicknessShift {
         vec![SETTLING]
     }
 
+    fn is_linear_in_state(&self) -> bool {
+        true
+    }
+
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let thickness = shape.values.first().copied().unwrap_or(0.0);
         let change = |k: usize, place: &Place| {

@@ -9,8 +9,8 @@ mod words;
 use std::path::PathBuf;
 
 use errsep_models::four_sensor::{
-    Choice, FourSensorError, LongSeparator, MinimumZone, Parabola, PublishedSeparation,
-    PublishedSeparator, Separation, Separator,
+    Choice, Ends, FourSensorError, LongSeparator, MinimumZone, Parabola, Penalised,
+    PublishedSeparation, PublishedSeparator, Separation, Separator,
 };
 use errsep_models::uncertainty::DegreesOfFreedom;
 
@@ -67,6 +67,8 @@ struct Found {
     published: Option<PublishedSeparation>,
     /// Condition number of the system that was solved, where it was decomposed.
     condition_number: Option<f64>,
+    /// Where the penalty is on the profile and the system was decomposed.
+    ends: Option<Ends>,
 }
 
 impl Found {
@@ -117,11 +119,17 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let outputs = &measured.outputs;
     let mut published = None;
     let mut condition_number = None;
+    let mut ends = None;
     let (separation, straightness_error) = if geometry.point_count() <= LONGEST_DENSE {
         let separator = Separator::new(geometry, setup.penalised, setup.line).map_err(unsolved)?;
         let way = PublishedSeparator::new(geometry).map_err(unsolved)?;
         published = Some(way.separate(outputs, Choice::LCurve).map_err(unsolved)?);
         condition_number = Some(separator.decomposition().condition_number());
+        let of_profile = [Penalised::Profile, Penalised::ProfileFromEnds];
+        if of_profile.contains(&setup.penalised) {
+            // Where the general penalty finds no λ there is nothing to tell of the ends.
+            ends = Ends::of(outputs, &setup.settings).ok();
+        }
         separator
             .separate(outputs, &setup.settings)
             .and_then(|found| {
@@ -141,6 +149,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let found = Found {
         published,
         condition_number,
+        ends,
         separation,
         straightness_error,
         noise_stated,
@@ -152,6 +161,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         json: json::json(&found)?,
         page: page::page(&found, &args.data)?,
         tables: tables(&found),
+        setup: None,
         inputs: vec![args.data.clone(), args.setup.clone()],
         seed: None,
         status: Status::Done,

@@ -213,6 +213,7 @@ pub(super) fn answer(
         page: page.summary(Standing::Good, first),
         tables: Vec::new(),
         inputs: context.inputs(points_file),
+        setup: None,
         seed,
         status: Status::Done,
     })

@@ -294,7 +294,12 @@ fn profiles(measured: &Measured) -> Option<[Tally; 4]> {
 fn zone(measured: &Measured) -> Option<Tally> {
     let zone = measured
         .separator
-        .straightness_error(&measured.outputs, &measured.settings, &measured.found)
+        .straightness_error(
+            &measured.outputs,
+            &measured.settings,
+            &measured.found,
+            measured.degrees,
+        )
         .ok()?;
     let positions = measured.outputs.slide_positions();
     let (s, ..) = measured.truth.stated(measured.outputs.geometry());
@@ -304,7 +309,7 @@ fn zone(measured: &Measured) -> Option<Tally> {
     // A straight slide is one whose zone is rounding.
     let truth = if truth < 1e-9 { 0.0 } else { truth };
     let inside = |probability: f64| -> Option<bool> {
-        let (low, high) = zone.interval(probability, measured.degrees).ok()?;
+        let (low, high) = zone.interval(probability).ok()?;
         Some(low <= truth && truth <= high)
     };
     let mut tally = Tally::default();

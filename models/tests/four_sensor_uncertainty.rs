@@ -236,13 +236,13 @@ fn the_zone_of_the_slide_lies_in_its_interval() {
             let outputs =
                 simulate(&geometry, &truth, &Disturbances::noise(0.1), seed).expect("finite");
             let found = separator.separate(&outputs, &settings).expect("separates");
-            let zone = separator
-                .straightness_error(&outputs, &settings, &found)
-                .expect("a zone");
             let freedom = found
                 .degrees_of_freedom
                 .unwrap_or(DegreesOfFreedom::Infinite);
-            let (low, high) = zone.interval(0.95, freedom).expect("a probability");
+            let zone = separator
+                .straightness_error(&outputs, &settings, &found, freedom)
+                .expect("a zone");
+            let (low, high) = zone.interval(0.95).expect("a probability");
             let k = coverage_factor(0.95, freedom).expect("positive");
             ratio += (high - low) / (2.0 * k * zone.std) / RUNS as f64;
             let expected = stated(&geometry, &truth).straightness;

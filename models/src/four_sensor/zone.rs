@@ -30,46 +30,37 @@ pub struct MinimumZone {
     drawn: Drawn,
 }
 
-/// Zones of the profile at several sizes with each drawn error added.
+/// Zones of slides of several sizes with each drawn error added.
 #[derive(Debug, Clone, PartialEq)]
 struct Drawn {
-    /// Sizes in shares of the profile that was found, ascending.
+    /// Zones of the slides in shares of the value, ascending.
     sizes: Vec<f64>,
-    /// One row an error: zones at the sizes, µm.
+    /// One row an error: zones of the slides with it, µm.
     zones: Vec<Vec<f64>>,
-    /// The zone of the profile: what a unit of size adds far beyond the error, µm.
+    /// The value, µm: what a unit of size adds far beyond the error.
     value: f64,
 }
 
 impl MinimumZone {
     /// The interval that holds the true zone with a probability, µm.
     ///
-    /// A true slide of the shape that was found, t times as large, would show the zone Z(tŜ + ε) with ε
-    /// the error. The limits are t·value where the value lies at the lower and the upper end of what
-    /// such slides show. Far above the error this is value ± k·std; near it, it knows that the error
-    /// adds to the zone; and where a straight slide would show as much, it begins at zero and reaches
-    /// to the value at least. It then holds a straight slide in one-sided (1 + probability)/2.
-    ///
-    /// For an error of equal size in all directions and the norm in place of the zone, what is shown
-    /// depends on the size of the slide only, and the interval is exact.
+    /// For each width there is a slide that is nearest to the one found: its deviations from the middle
+    /// of the strip cut at the width, or in proportion for a greater one. With the error added it would
+    /// show other widths. The limits are those for which the value lies at the upper and at the lower
+    /// end of what would be shown. Far above the error this is value ± k·std; near it, and where many
+    /// places touch the strip, it knows that the error adds to the zone; and where a straight slide would
+    /// show as much, it begins at zero and reaches to the value at least. It then holds a straight slide
+    /// with (1 + probability)/2, one-sided.
     ///
     /// # Errors
     /// A probability outside 0 to 1.
-    pub fn interval(
-        &self,
-        probability: f64,
-        degrees: DegreesOfFreedom,
-    ) -> Result<(f64, f64), UncertaintyError> {
+    pub fn interval(&self, probability: f64) -> Result<(f64, f64), UncertaintyError> {
         if !(probability > 0.0 && probability < 1.0) {
             return Err(UncertaintyError::BadProbability { found: probability });
         }
         let tail = 0.5 * (1.0 - probability);
-        let swellings = swellings(degrees, self.drawn.zones.len());
-        let low = self
-            .drawn
-            .size_that_shows(self.value, 1.0 - tail, &swellings);
-        let high = self.drawn.size_that_shows(self.value, tail, &swellings);
-        let (low, high) = (low * self.value, high * self.value);
+        let limit = |share: f64| self.value * self.drawn.size_that_shows(self.value, share);
+        let (low, high) = (limit(1.0 - tail), limit(tail));
         Ok((
             low,
             if low > 0.0 {
@@ -81,57 +72,35 @@ impl MinimumZone {
     }
 }
 
-/// By how much the error may be larger than its estimate says, √(ν/χ²), one for each error; the same
-/// each time.
-fn swellings(degrees: DegreesOfFreedom, count: usize) -> Vec<f64> {
-    let freedom = degrees.as_f64();
-    let law = ChiSquared::new(freedom)
-        .ok()
-        .filter(|_| freedom.is_finite());
-    let mut random = ChaCha8Rng::seed_from_u64(DRAWS);
-    (0..count)
-        .map(|_| {
-            law.map_or(1.0, |law| {
-                let drawn: f64 = law.sample(&mut random);
-                (freedom / drawn.max(f64::MIN_POSITIVE)).sqrt()
-            })
-        })
-        .collect()
-}
-
 impl Drawn {
     /// The size at which this share of the zones lies at or below a value; zero where less do at any.
-    fn size_that_shows(&self, value: f64, share: f64, swellings: &[f64]) -> f64 {
+    fn size_that_shows(&self, value: f64, share: f64) -> f64 {
         let wanted = share * self.zones.len() as f64;
         let enough = |size: f64| {
-            let below = (0..self.zones.len()).filter(|&k| {
-                // Z(tŜ + wε) = w Z(tŜ/w + ε).
-                swellings[k] * self.zone(k, size / swellings[k]) <= value
-            });
+            let below = (0..self.zones.len()).filter(|&k| self.zone(k, size) <= value);
             below.count() as f64 >= wanted
         };
         if !enough(0.0) {
             return 0.0;
         }
-        let mut outside = 2.0;
-        // A zone grows without bound with its profile; heavy tails of few degrees of freedom stop here.
+        let (mut inside, mut outside) = (0.0, 2.0);
+        // A zone grows without bound with its slide; heavy tails of few degrees of freedom stop here.
         while enough(outside) && outside < 1e6 {
             outside *= 2.0;
         }
-        let mut inside = 0.0;
         for _ in 0..40 {
             let middle = f64::midpoint(inside, outside);
-            *(if enough(middle) {
-                &mut inside
+            if enough(middle) {
+                inside = middle;
             } else {
-                &mut outside
-            }) = middle;
+                outside = middle;
+            }
         }
         inside
     }
 
-    /// The zone of an error with the profile at a size: between the sizes drawn on a straight line, for
-    /// it is a convex function of the size, and beyond them as the profile alone.
+    /// The zone of a slide of a size with an error: between the sizes drawn on a straight line, beyond
+    /// them as the slide alone.
     fn zone(&self, error: usize, size: f64) -> f64 {
         let (sizes, zones) = (&self.sizes, &self.zones[error]);
         let last = sizes.len() - 1;
@@ -146,51 +115,70 @@ impl Drawn {
 }
 
 /// Sizes from where the error is all to where it adds no more, close together where it bends the zone:
-/// a profile of zone `value` among errors whose zones are about `error`.
+/// a slide of zone `value` among errors whose zones are about `error`.
 fn sizes(value: f64, error: f64) -> Vec<f64> {
     /// Both in units of the error's zone.
     const NEAR: [f64; 13] = [
         0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.0, 6.0, 8.0,
     ];
-    const FAR: [f64; 7] = [-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0];
+    const FAR: [f64; 11] = [-4.0, -2.0, -1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0, 2.0, 4.0];
     let unit = error / value;
-    if unit * FAR[6] >= 1.0 {
-        NEAR.map(|size| unit * size).to_vec()
+    if unit * FAR[10] >= 1.0 {
+        let mut sizes = NEAR.map(|size| unit * size).to_vec();
+        // The slide found itself, where cutting ends.
+        let place = sizes.partition_point(|size| *size < 1.0);
+        if sizes.get(place).is_some_and(|size| *size > 1.0) {
+            sizes.insert(place, 1.0);
+        }
+        sizes
     } else {
         FAR.map(|size| 1.0 + unit * size).to_vec()
     }
 }
 
-/// The zone of a profile at positions in mm, whose errors `draw` draws; the same draws each time.
+/// The zone of a profile at positions in mm, whose errors `draw` draws with a standard deviation of the
+/// noise that is known to `degrees` of freedom; the same draws each time.
 pub(super) fn minimum_zone(
     positions: &[f64],
     profile: &DVector<f64>,
+    degrees: DegreesOfFreedom,
     draw: impl Fn(&mut ChaCha8Rng) -> Result<DVector<f64>, FourSensorError> + Sync,
 ) -> Result<MinimumZone, FourSensorError> {
-    let zone = |profile: &DVector<f64>| -> Result<f64, FourSensorError> {
-        Ok(straightness(positions, profile.as_slice(), ReferenceLine::MinimumZone)?.error())
+    let strip = |profile: &DVector<f64>| {
+        straightness(positions, profile.as_slice(), ReferenceLine::MinimumZone)
     };
-    let value = zone(profile)?;
-    let error_of = |seed: u64| draw(&mut ChaCha8Rng::seed_from_u64(seed));
+    let zone =
+        |profile: &DVector<f64>| -> Result<f64, FourSensorError> { Ok(strip(profile)?.error()) };
+    let found = strip(profile)?;
+    let value = found.error();
+    let deviations = DVector::from_fn(profile.len(), |n, _| {
+        found.deviation(positions[n], profile[n])
+    });
     // Some of them tell about how large the zone of an error is.
-    let of_some = (0..20)
-        .map(|seed| zone(&error_of(seed)?))
+    let some = (0..20)
+        .map(|seed| zone(&draw(&mut ChaCha8Rng::seed_from_u64(seed))?))
         .sum::<Result<f64, _>>()?;
-    let (of_error, smallest) = (of_some / 20.0, 1e-12 * value);
     let sizes = if value > 0.0 {
-        sizes(value, of_error.max(smallest))
+        sizes(value, (some / 20.0).max(1e-12 * value))
     } else {
         vec![0.0, 1.0]
     };
+    let slides: Vec<DVector<f64>> = sizes
+        .iter()
+        .map(|s| of_width(&deviations, *s, value))
+        .collect();
     let drawn: Vec<[(f64, Vec<f64>); 2]> = (0..DRAWS)
         .into_par_iter()
         .map(|seed| {
-            let error = error_of(seed)?;
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let error = draw(&mut random)?;
+            let swelling = swelling(degrees, &mut random);
             let with = |sign: f64| -> Result<(f64, Vec<f64>), FourSensorError> {
-                let at = |size: f64| zone(&(profile * size + &error * sign));
+                let swollen = &error * (sign * swelling);
+                let zones = slides.iter().map(|slide| zone(&(slide + &swollen)));
                 Ok((
-                    at(1.0)?,
-                    sizes.iter().map(|s| at(*s)).collect::<Result<_, _>>()?,
+                    zone(&(profile + &error * sign))?,
+                    zones.collect::<Result<_, _>>()?,
                 ))
             };
             Ok([with(1.0)?, with(-1.0)?])
@@ -208,4 +196,27 @@ pub(super) fn minimum_zone(
             value,
         },
     })
+}
+
+/// The slide of a size nearest to the one found, whose deviations from the middle of its strip of width
+/// `value` these are.
+fn of_width(deviations: &DVector<f64>, size: f64, value: f64) -> DVector<f64> {
+    if size < 1.0 {
+        let half = 0.5 * size.max(0.0) * value;
+        deviations.map(|d| d.clamp(-half, half))
+    } else {
+        deviations * size
+    }
+}
+
+/// By how much the error may be larger than the noise that was estimated says, √(ν/χ²).
+fn swelling(degrees: DegreesOfFreedom, random: &mut ChaCha8Rng) -> f64 {
+    let freedom = degrees.as_f64();
+    match ChiSquared::new(freedom) {
+        Ok(law) if freedom.is_finite() => {
+            let drawn: f64 = law.sample(random);
+            (freedom / drawn.max(f64::MIN_POSITIVE)).sqrt()
+        }
+        _ => 1.0,
+    }
 }

@@ -18,9 +18,7 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
     let curve = &s.chosen.curve;
     let rows = 2 * outputs.readings().len();
     let zone = &found.straightness_error;
-    let (low, high) = zone
-        .interval(COVERAGE, found.coverage_degrees())
-        .map_err(unexpandable)?;
+    let (low, high) = zone.interval(COVERAGE).map_err(unexpandable)?;
     Ok(json!({
         "schema": "errsep.four-sensor/1",
         "method": "direct",

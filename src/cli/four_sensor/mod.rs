@@ -90,14 +90,22 @@ impl Found {
 
     /// How well the noise is known.
     fn degrees_of_freedom(&self) -> Option<DegreesOfFreedom> {
-        if self.noise_from_repeats() {
-            let further = self.measured.repeats.saturating_sub(1);
-            let readings = 4 * self.measured.outputs.readings().len();
-            DegreesOfFreedom::new((readings * further) as f64).ok()
-        } else {
-            self.separation.degrees_of_freedom
-        }
+        how_well_known(&self.separation, self.noise_stated, &self.measured)
     }
+}
+
+/// Degrees of freedom of the noise: of the scatter of the repeats where it was taken from there.
+fn how_well_known(
+    found: &Separation,
+    noise_stated: bool,
+    measured: &Measured,
+) -> Option<DegreesOfFreedom> {
+    if noise_stated || found.noise_estimated {
+        return found.degrees_of_freedom;
+    }
+    let further = measured.repeats.saturating_sub(1);
+    let readings = 4 * measured.outputs.readings().len();
+    DegreesOfFreedom::new((readings * further) as f64).ok()
 }
 
 /// Separates the outputs.
@@ -120,6 +128,9 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let mut published = None;
     let mut condition_number = None;
     let mut ends = None;
+    let degrees = |found: &Separation| {
+        how_well_known(found, noise_stated, &measured).unwrap_or(DegreesOfFreedom::Infinite)
+    };
     let (separation, straightness_error) = if geometry.point_count() <= LONGEST_DENSE {
         let separator = Separator::new(geometry, setup.penalised, setup.line).map_err(unsolved)?;
         let way = PublishedSeparator::new(geometry).map_err(unsolved)?;
@@ -133,14 +144,16 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         separator
             .separate(outputs, &setup.settings)
             .and_then(|found| {
-                let error = separator.straightness_error(outputs, &setup.settings, &found)?;
+                let degrees = degrees(&found);
+                let error =
+                    separator.straightness_error(outputs, &setup.settings, &found, degrees)?;
                 Ok((found, error))
             })
     } else {
         LongSeparator::new(outputs, setup.penalised, setup.line, &setup.settings).and_then(
             |separator| {
                 let found = separator.separate()?;
-                let error = separator.straightness_error(&found)?;
+                let error = separator.straightness_error(&found, degrees(&found))?;
                 Ok((found, error))
             },
         )

@@ -103,9 +103,7 @@ pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
 /// "40.3 µm (minimum zone), 95 % interval 39.7 to 40.9 µm, if the surface has no parabola".
 pub(super) fn straightness(found: &Found) -> Result<String, Message> {
     let zone = &found.straightness_error;
-    let (low, high) = zone
-        .interval(COVERAGE, found.coverage_degrees())
-        .map_err(unexpandable)?;
+    let (low, high) = zone.interval(COVERAGE).map_err(unexpandable)?;
     // Two digits of the uncertainty.
     let decimals = (1.0 - zone.std.log10().floor()).clamp(0.0, 6.0) as usize;
     let shown = |value: f64| number::fixed(value, decimals);

@@ -41,8 +41,6 @@ struct Influence {
 pub struct Sampler {
     means: Vec<Vector3<f64>>,
     influences: Vec<Influence>,
-    /// Standard deviation of each coordinate, for [`Independence::Coordinates`].
-    coordinates: Vec<Vector3<f64>>,
     independence: Independence,
 }
 
@@ -62,7 +60,6 @@ impl Sampler {
             .map(|p| machine.deviation(p))
             .collect::<Result<Vec<_>, _>>()?;
         let mut influences = Vec::new();
-        let mut variances = vec![Vector3::zeros(); points.len()];
         for error in machine.errors() {
             let spread = &error.spread;
             let scatter = match prediction {
@@ -78,9 +75,6 @@ impl Sampler {
                 .iter()
                 .map(|p| (spread.of_function(at(p)) + scatter).sqrt())
                 .collect();
-            for ((sum, motion), u) in variances.iter_mut().zip(&motions).zip(&own) {
-                *sum += motion.component_mul(motion) * (u * u);
-            }
             if own.iter().all(|u| *u == 0.0) {
                 continue;
             }
@@ -107,11 +101,9 @@ impl Sampler {
                 },
             });
         }
-        let coordinates = variances.iter().map(|v| v.map(f64::sqrt)).collect();
         Ok(Self {
             means,
             influences,
-            coordinates,
             independence,
         })
     }
@@ -134,24 +126,23 @@ impl Sampler {
 
     /// Draws the deviation of every point, um. Points beyond the slice are left out.
     ///
-    /// [`Independence::Coordinates`] draws each coordinate from a normal distribution, as the report
-    /// does: what it adds up to has no one number of degrees of freedom.
+    /// Whatever the points have in common, the spreads of one component at all of them rest on the same
+    /// readings: one χ² serves them all.
     pub fn draw(&self, rng: &mut impl Rng, deviations: &mut [Vector3<f64>]) {
         for (deviation, mean) in deviations.iter_mut().zip(&self.means) {
             *deviation = *mean;
         }
         match self.independence {
-            Independence::Coordinates => {
-                for (deviation, std) in deviations.iter_mut().zip(&self.coordinates) {
-                    *deviation += std.map(|u| if u > 0.0 { u * normal(rng) } else { 0.0 });
-                }
-            }
             Independence::Points => {
                 for influence in &self.influences {
-                    let parts = influence.motions.iter().zip(&influence.own);
-                    for (deviation, (motion, u)) in deviations.iter_mut().zip(parts) {
-                        *deviation += motion * (u * influence.widening(rng) * normal(rng));
-                    }
+                    influence.draw_apart(rng, deviations, |rng, motion| motion * normal(rng));
+                }
+            }
+            Independence::Coordinates => {
+                for influence in &self.influences {
+                    influence.draw_apart(rng, deviations, |rng, motion| {
+                        motion.map(|m| if m == 0.0 { 0.0 } else { m * normal(rng) })
+                    });
                 }
             }
             Independence::Scatter => {
@@ -169,6 +160,20 @@ impl Influence {
         self.degrees.as_ref().map_or(1.0, |(number, squares)| {
             (number / squares.sample(rng)).sqrt()
         })
+    }
+
+    /// Errors of their own at every point, `moved` by a normal deviate.
+    fn draw_apart<R: Rng>(
+        &self,
+        rng: &mut R,
+        deviations: &mut [Vector3<f64>],
+        moved: impl Fn(&mut R, &Vector3<f64>) -> Vector3<f64>,
+    ) {
+        let widening = self.widening(rng);
+        let parts = self.motions.iter().zip(&self.own);
+        for (deviation, (motion, u)) in deviations.iter_mut().zip(parts) {
+            *deviation += moved(rng, motion) * (u * widening);
+        }
     }
 
     fn draw_common(&self, rng: &mut impl Rng, deviations: &mut [Vector3<f64>]) {

@@ -5,7 +5,8 @@ use serde_json::{Value, json};
 
 use super::Found;
 use super::words::{
-    ENDS_OFF, averaged, counted_from_ends, discrepancy_key, ends, not_determined, status_key,
+    ENDS_OFF, ZONE_NOTE, averaged, counted_from_ends, discrepancy_key, ends, not_determined,
+    status_key,
 };
 use crate::cli::quantity::{COVERAGE, coverage_json, unexpandable};
 use crate::io::Message;
@@ -38,6 +39,7 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
             "widening": zone.widening,
             "interval": [low, high],
             "coverage_probability": COVERAGE,
+            "note": ZONE_NOTE,
             "unit": "um",
             "parabola_open": found.parabola_is_open(),
         },

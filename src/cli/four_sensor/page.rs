@@ -10,8 +10,8 @@ use nalgebra::DVector;
 use super::Found;
 use super::json::residual_rms;
 use super::words::{
-    ENDS_OFF, counted_from_ends, ends, noise_source, not_determined, span, status, straightness,
-    uneven,
+    ENDS_OFF, ZONE_NOTE, counted_from_ends, ends, noise_source, not_determined, span, status,
+    straightness, uneven,
 };
 use crate::cli::quantity::COVERAGE;
 use crate::io::Message;
@@ -87,6 +87,7 @@ fn result(found: &Found) -> Section {
                 .meaning("peak to valley"),
             KeyFigure::new("Noise", s.noise, "µm").meaning(noise_source(found)),
         ])
+        .paragraph(format!("Of the straightness: {ZONE_NOTE}."))
         .figure(Figure::new(
             "Straightness of the slide",
             "With the expanded uncertainty (95 %) as a band: of the readings' noise and of the penalty's \

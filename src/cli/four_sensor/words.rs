@@ -23,6 +23,7 @@ pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
         s.surface.values.len()
     );
     let _ = writeln!(text, "  straightness     {}", straightness(found)?);
+    let _ = writeln!(text, "                   {ZONE_NOTE}");
     let _ = writeln!(
         text,
         "  profile S        {:.3} µm peak to valley from the line of the surface, u up to {:.3} µm",
@@ -130,6 +131,9 @@ pub(super) fn averaged(found: &Found) -> Option<String> {
         )
     })
 }
+
+/// What the interval of the minimum zone is worth.
+pub(super) const ZONE_NOTE: &str = "the interval allows for any shape of the slide: near the noise it holds 96 to 99 % instead of 95";
 
 /// Beyond so many standard uncertainties the ends of the surface are said to lie off its mean line.
 pub(super) const ENDS_OFF: f64 = 2.0;

@@ -41,6 +41,8 @@ struct Influence {
 pub struct Sampler {
     means: Vec<Vector3<f64>>,
     influences: Vec<Influence>,
+    /// Standard deviation of each coordinate, for [`Independence::Coordinates`].
+    coordinates: Vec<Vector3<f64>>,
     independence: Independence,
 }
 
@@ -60,6 +62,7 @@ impl Sampler {
             .map(|p| machine.deviation(p))
             .collect::<Result<Vec<_>, _>>()?;
         let mut influences = Vec::new();
+        let mut variances = vec![Vector3::zeros(); points.len()];
         for error in machine.errors() {
             let spread = &error.spread;
             let scatter = match prediction {
@@ -75,6 +78,9 @@ impl Sampler {
                 .iter()
                 .map(|p| (spread.of_function(at(p)) + scatter).sqrt())
                 .collect();
+            for ((sum, motion), u) in variances.iter_mut().zip(&motions).zip(&own) {
+                *sum += motion.component_mul(motion) * (u * u);
+            }
             if own.iter().all(|u| *u == 0.0) {
                 continue;
             }
@@ -101,9 +107,11 @@ impl Sampler {
                 },
             });
         }
+        let coordinates = variances.iter().map(|v| v.map(f64::sqrt)).collect();
         Ok(Self {
             means,
             influences,
+            coordinates,
             independence,
         })
     }
@@ -126,23 +134,26 @@ impl Sampler {
 
     /// Draws the deviation of every point, um. Points beyond the slice are left out.
     ///
-    /// Whatever the points have in common, the spreads of one component at all of them rest on the same
-    /// readings: one χ² serves them all.
+    /// [`Independence::Coordinates`] draws each coordinate from a normal distribution, as the report
+    /// does: what it adds up to has no one number of degrees of freedom.
     pub fn draw(&self, rng: &mut impl Rng, deviations: &mut [Vector3<f64>]) {
         for (deviation, mean) in deviations.iter_mut().zip(&self.means) {
             *deviation = *mean;
         }
         match self.independence {
-            Independence::Points => {
-                for influence in &self.influences {
-                    influence.draw_apart(rng, deviations, |rng, motion| motion * normal(rng));
+            Independence::Coordinates => {
+                for (deviation, std) in deviations.iter_mut().zip(&self.coordinates) {
+                    *deviation += std.map(|u| if u > 0.0 { u * normal(rng) } else { 0.0 });
                 }
             }
-            Independence::Coordinates => {
+            Independence::Points => {
                 for influence in &self.influences {
-                    influence.draw_apart(rng, deviations, |rng, motion| {
-                        motion.map(|m| if m == 0.0 { 0.0 } else { m * normal(rng) })
-                    });
+                    // All its points rest on the same readings.
+                    let widening = influence.widening(rng);
+                    let parts = influence.motions.iter().zip(&influence.own);
+                    for (deviation, (motion, u)) in deviations.iter_mut().zip(parts) {
+                        *deviation += motion * (u * widening * normal(rng));
+                    }
                 }
             }
             Independence::Scatter => {
@@ -160,20 +171,6 @@ impl Influence {
         self.degrees.as_ref().map_or(1.0, |(number, squares)| {
             (number / squares.sample(rng)).sqrt()
         })
-    }
-
-    /// Errors of their own at every point, `moved` by a normal deviate.
-    fn draw_apart<R: Rng>(
-        &self,
-        rng: &mut R,
-        deviations: &mut [Vector3<f64>],
-        moved: impl Fn(&mut R, &Vector3<f64>) -> Vector3<f64>,
-    ) {
-        let widening = self.widening(rng);
-        let parts = self.motions.iter().zip(&self.own);
-        for (deviation, (motion, u)) in deviations.iter_mut().zip(parts) {
-            *deviation += moved(rng, motion) * (u * widening);
-        }
     }
 
     fn draw_common(&self, rng: &mut impl Rng, deviations: &mut [Vector3<f64>]) {

@@ -103,7 +103,8 @@ impl PropagationArgs {
             ),
             IndependenceName::Coordinates => Some(
                 "every coordinate of every point has errors of its own (--independence coordinates, NISTIR \
-                 6868). Points of one machine have the fitted functions in common: lengths and angles are then \
+                 6868), and simulations take standard deviations as known, so that their intervals are \
+                 too short after few readings. Points of one machine have the fitted functions in common: lengths and angles are then \
                  known better than said, and the form of the mean of many parts is less than said. \
                  Without the option this is counted",
             ),

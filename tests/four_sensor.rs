@@ -83,6 +83,7 @@ fn the_fixture_is_separated_and_answered_as_documented() {
                 "lambda",
                 "rule",
                 "instead",
+                "note",
                 "effective_parameters",
                 "condition_number",
                 "l_curve",
@@ -380,4 +381,111 @@ fn waves_that_the_spacings_do_not_show_are_listed() {
             .is_some_and(|t| t.contains("every 25.00, 12.50 mm"))
     };
     assert!(listed.iter().any(named), "{listed:?}");
+}
+
+/// The paper's surface lies with its ends near its mean line, a bowl of waves that end on a crest does not:
+/// the answer says so with numbers, in text, JSON and page, and what speaks for which penalty; the penalty
+/// that counts from the ends tells what its uncertainties are worth.
+#[test]
+fn the_ends_of_the_surface_are_told_with_the_penalty_they_speak_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let table = |penalty: &str| {
+        format!("[sensors]\nspacing = [5.0, 5.0, 25.0]\n[separation]\npenalty = \"{penalty}\"\n")
+    };
+    let (data, setup) = simulated(
+        folder.path(),
+        &["--seed", "3", "--noise", "0.02"],
+        &table("profile"),
+    );
+    let raised = folder.path().join("raised.csv");
+    std::fs::write(&raised, with_raised_ends(&data)).expect("written");
+    let from_ends = folder.path().join("from_ends.toml");
+    std::fs::write(&from_ends, table("profile-from-ends")).expect("written");
+    for (data, may_lie_on_line) in [(&data, true), (&raised, false)] {
+        let answer = answered(data, &setup);
+        let ends = &answer["surface_ends"];
+        assert_eq!(ends["may_lie_on_mean_line"], may_lie_on_line, "{ends}");
+        assert_eq!(answer["regularization"]["note"], Value::Null);
+        let counted = answered(data, &from_ends);
+        assert_eq!(&counted["surface_ends"]["offset"], &ends["offset"]);
+        assert_eq!(counted["surface_ends"]["std"], ends["std"]);
+        let note = counted["regularization"]["note"].as_str().expect("a note");
+        assert!(note.contains("takes it for granted"), "{note}");
+        let report = folder.path().join(format!("report-{may_lie_on_line}"));
+        let out = errsep(&[
+            "four-sensor",
+            text(data),
+            "--setup",
+            text(&from_ends),
+            "--out",
+            text(&report),
+        ]);
+        let said = String::from_utf8_lossy(&out.stdout).into_owned();
+        let page = std::fs::read_to_string(report.join("report.html")).expect("a report");
+        let verdict = if may_lie_on_line {
+            "which does not contradict the penalty"
+        } else {
+            "which contradicts the penalty"
+        };
+        for shown in [&said, &page] {
+            assert!(shown.contains(verdict), "{shown}");
+            assert!(shown.contains("takes it for granted"), "{shown}");
+        }
+    }
+}
+
+/// The outputs over a surface that rises by 20 µm over its first two and its last two points.
+fn with_raised_ends(data: &Path) -> String {
+    let whole = std::fs::read_to_string(data).expect("the data");
+    let rows: Vec<&str> = whole.lines().filter(|l| !l.starts_with('#')).collect();
+    let last = rows.len() - 2 + 7;
+    let mut raised = format!("{}\n", rows[0]);
+    for (n, row) in rows[1..].iter().enumerate() {
+        let mut cells: Vec<f64> = row
+            .split(',')
+            .map(|c| c.parse().expect("a number"))
+            .collect();
+        for (sensor, steps) in [0, 1, 2, 7].into_iter().enumerate() {
+            let at = n + steps;
+            cells[sensor + 1] += f64::from(u8::from(at < 2 || at + 1 >= last)) * 20.0;
+        }
+        let cells: Vec<String> = cells.iter().map(f64::to_string).collect();
+        raised.push_str(&cells.join(","));
+        raised.push('\n');
+    }
+    raised
+}
+
+/// What a simulation writes can be worked with as it stands, by the command that it names; the set-up
+/// holds the spacings and the noise that were asked for.
+#[test]
+fn a_simulation_writes_its_set_up() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let made = folder.path().join("made");
+    let out = errsep(&[
+        "simulate",
+        "four-sensor",
+        "--spacing",
+        "2,3,5",
+        "--noise",
+        "0.25",
+        "--out",
+        text(&made),
+    ]);
+    assert_eq!(out.status.code(), Some(0));
+    let said = String::from_utf8_lossy(&out.stdout).into_owned();
+    let (data, setup) = (made.join("data.csv"), made.join("setup.toml"));
+    let named = format!(
+        "errsep four-sensor {} --setup {}",
+        text(&data),
+        text(&setup)
+    );
+    assert!(said.contains(&named), "{said}");
+    let answer = answered(&data, &setup);
+    assert_eq!(
+        answer["geometry"]["spacing"],
+        serde_json::json!([10.0, 15.0, 25.0])
+    );
+    assert_eq!(answer["residual"]["noise"], 0.25);
+    assert_eq!(answer["residual"]["noise_estimated"], false);
 }

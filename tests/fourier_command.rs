@@ -347,3 +347,44 @@ fn form_beyond_the_orders_is_told_with_what_it_does_to_the_joint() {
     assert_eq!(answer["compensation"], "fitted");
     command::documented(&answer, "docs/json/fourier.md");
 }
+
+/// What a simulation writes can be worked with as it stands, by the command that it names; without noise
+/// none is told.
+#[test]
+fn a_simulation_writes_its_set_up() {
+    for (noise, stated) in [("0.7", true), ("0", false)] {
+        let folder = Folder::with(&[]);
+        let out = run(
+            &folder,
+            &[
+                "simulate",
+                "fourier",
+                "--samples",
+                "200",
+                "--length",
+                "120",
+                "--noise",
+                noise,
+                "--out",
+                "made",
+            ],
+        );
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        let next = "errsep fourier made/scans.csv --setup made/setup.toml";
+        assert!(out.stdout.contains(next), "{}", out.stdout);
+        assert_eq!(folder.read("made/setup.toml").contains("noise"), stated);
+        let arguments: Vec<&str> = next
+            .split(' ')
+            .skip(1)
+            .chain(["--format", "json"])
+            .collect();
+        let answer = json(&folder, &arguments);
+        let positions = numbers(&answer, "/profiles/x");
+        assert_eq!(positions.len(), 200);
+        assert!((positions[199] - 120.0 * 199.0 / 200.0).abs() < 1e-9);
+        if stated {
+            assert_eq!(answer["noise"]["source"], "given");
+            assert_eq!(answer["noise"]["value"], 0.7);
+        }
+    }
+}

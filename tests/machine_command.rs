@@ -62,6 +62,12 @@ fn lengths_of_table_4() {
         "coordinates",
     ]);
     assert_eq!(found["independence"], "coordinates");
+    let assumed = found["assumption"].as_str().unwrap();
+    assert!(assumed.contains("every coordinate"), "{assumed}");
+    let holes = fixture("holes.csv");
+    let usual = answer(&["length", &holes, "--between", "3:9"]);
+    assert_eq!(usual["independence"], "scatter");
+    assert!(usual["assumption"].is_null());
     // Certified digits of print, and 0.002 of the recovered variances.
     for (result, (error, u)) in found["results"].as_array().unwrap().iter().zip([
         (-2.380, 6.72),

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use super::tally::{ONE_SIGMA, Row, Tally};
 
-const QUANTITIES: [&str; 5] = ["S", "gamma", "f", "e2, e3", "straightness (zone)"];
+const QUANTITIES: [&str; 4] = ["S", "gamma", "f", "e2, e3"];
 
 /// What is measured in one group of rows.
 struct Case {
@@ -29,6 +29,18 @@ struct Case {
     noise: f64,
     stated: bool,
     repeats: u64,
+    slide: Slide,
+}
+
+/// The slide that is measured.
+#[derive(Debug, Clone, Copy)]
+enum Slide {
+    /// That of the paper, straight to about 40 µm.
+    Paper,
+    /// The same shape, straight to so many µm as it is stated, with the surface's parabola taken away.
+    Scaled(f64),
+    /// Five waves, straight to so many µm as they are stated.
+    Waves(f64),
 }
 
 const USUAL: Case = Case {
@@ -39,6 +51,7 @@ const USUAL: Case = Case {
     noise: 0.1,
     stated: false,
     repeats: 1,
+    slide: Slide::Paper,
 };
 
 /// The cases; all with 69 points of surface.
@@ -113,9 +126,9 @@ pub fn rows(seeds: u64) -> Vec<Row> {
             ("L-curve", Choice::LCurve),
             ("likelihood", Choice::Likelihood),
         ] {
-            let tallies: Vec<[Tally; 5]> = (0..seeds)
+            let tallies: Vec<[Tally; 4]> = (0..seeds)
                 .into_par_iter()
-                .filter_map(|seed| one(case, choice, seed))
+                .filter_map(|seed| profiles(&Measured::new(case, choice, seed)?))
                 .collect();
             for (k, quantity) in QUANTITIES.into_iter().enumerate() {
                 rows.push(Row {
@@ -129,62 +142,141 @@ pub fn rows(seeds: u64) -> Vec<Row> {
             }
         }
     }
+    rows.extend(zone_rows(seeds));
     rows
 }
 
-/// One data set: made, averaged, separated, compared.
-fn one(case: &Case, choice: Choice, seed: u64) -> Option<[Tally; 5]> {
-    let reach: usize = case.spacing.iter().sum();
-    let geometry = Geometry::new(5.0, case.spacing, 69 - reach).ok()?;
-    let truth = Waves::new(&geometry, case.power, seed);
-    let mut mean = vec![[0.0; 4]; geometry.output_count()];
-    for repeat in 0..case.repeats {
-        let of_repeat = seed * case.repeats + repeat;
-        let outputs = simulate(
-            &geometry,
-            &truth,
-            &Disturbances::noise(case.noise),
-            of_repeat,
-        )
-        .ok()?;
-        for (sum, reading) in mean
-            .as_flattened_mut()
-            .iter_mut()
-            .zip(outputs.readings().as_flattened())
-        {
-            *sum += reading / case.repeats as f64;
+/// Surfaces and noises at which slides of every size are measured.
+const ZONE_CASES: &[Case] = &[
+    USUAL,
+    Case {
+        name: "paper's surface, 0.3 µm",
+        noise: 0.3,
+        ..USUAL
+    },
+    Case {
+        name: "waves ∝ order^−½, 0.1 µm",
+        power: Some(0.5),
+        ..USUAL
+    },
+    Case {
+        name: "waves ∝ order^−½, 0.3 µm",
+        power: Some(0.5),
+        noise: 0.3,
+        ..USUAL
+    },
+    Case {
+        name: "spacings 5, 5, 5 steps, even waves",
+        power: Some(0.0),
+        spacing: [5, 5, 5],
+        ..USUAL
+    },
+];
+
+/// The minimum zone of slides from straight to tens of µm.
+fn zone_rows(seeds: u64) -> Vec<Row> {
+    let slides = [
+        ("slide straight", Slide::Scaled(0.0)),
+        ("slide of 0.3 µm", Slide::Scaled(0.3)),
+        ("slide of 1 µm", Slide::Scaled(1.0)),
+        ("slide of 3 µm", Slide::Scaled(3.0)),
+        ("slide of 10 µm", Slide::Scaled(10.0)),
+        ("paper's slide", Slide::Paper),
+        ("slide of five waves, 1 µm", Slide::Waves(1.0)),
+        ("slide of five waves, 3 µm", Slide::Waves(3.0)),
+    ];
+    let mut rows = Vec::new();
+    for (case, choice, rule) in ZONE_CASES
+        .iter()
+        .map(|case| (case, Choice::LCurve, "L-curve"))
+        .chain([(&USUAL, Choice::Likelihood, "likelihood")])
+    {
+        for (name, slide) in slides {
+            let case = Case { slide, ..*case };
+            let tallies: Vec<Tally> = (0..seeds)
+                .into_par_iter()
+                .filter_map(|seed| zone(&Measured::new(&case, choice, seed)?))
+                .collect();
+            rows.push(Row {
+                case: format!("{name}, {}, {rule}", case.name),
+                quantity: "straightness (zone)".to_owned(),
+                seeds: tallies.len() as u64,
+                tally: tallies.into_iter().fold(Tally::default(), Tally::and),
+            });
         }
     }
-    let outputs = Outputs::new(geometry, 0.0, mean).ok()?;
-    let settings = Settings {
-        choice,
-        noise: case
-            .stated
-            .then(|| case.noise / (case.repeats as f64).sqrt()),
-        ..Settings::default()
-    };
-    let separator = Separator::new(&geometry, case.penalised, Line::EndPoints).ok()?;
-    let found = separator.separate(&outputs, &settings).ok()?;
-    let zone = separator
-        .straightness_error(&outputs, &settings, &found)
-        .ok()?;
-    let degrees = found
-        .degrees_of_freedom
-        .unwrap_or(DegreesOfFreedom::Infinite);
-    let (s, tilt, surface, zero) = truth.stated(&geometry);
-    let mut tallies = [Tally::default(); 5];
-    let mut add = |k: usize, value: f64, truth: f64, std: f64| {
-        // The ends of the surface are zero by definition.
-        if std > 0.0 {
-            tallies[k].add(value - truth, std, degrees.as_f64());
+    rows
+}
+
+/// One data set: made, averaged, separated.
+struct Measured {
+    truth: Waves,
+    outputs: Outputs,
+    settings: Settings,
+    separator: Separator,
+    found: Separation,
+    degrees: DegreesOfFreedom,
+}
+
+impl Measured {
+    fn new(case: &Case, choice: Choice, seed: u64) -> Option<Self> {
+        let reach: usize = case.spacing.iter().sum();
+        let geometry = Geometry::new(5.0, case.spacing, 69 - reach).ok()?;
+        let truth = Waves::new(&geometry, case, seed)?;
+        let mut mean = vec![[0.0; 4]; geometry.output_count()];
+        for repeat in 0..case.repeats {
+            let of_repeat = seed * case.repeats + repeat;
+            let noise = Disturbances::noise(case.noise);
+            let outputs = simulate(&geometry, &truth, &noise, of_repeat).ok()?;
+            for (sum, reading) in mean
+                .as_flattened_mut()
+                .iter_mut()
+                .zip(outputs.readings().as_flattened())
+            {
+                *sum += reading / case.repeats as f64;
+            }
         }
-    };
+        let outputs = Outputs::new(geometry, 0.0, mean).ok()?;
+        let of_mean = case.noise / (case.repeats as f64).sqrt();
+        let settings = Settings {
+            choice,
+            noise: case.stated.then_some(of_mean),
+            ..Settings::default()
+        };
+        let separator = Separator::new(&geometry, case.penalised, Line::EndPoints).ok()?;
+        let found = separator.separate(&outputs, &settings).ok()?;
+        let degrees = found
+            .degrees_of_freedom
+            .unwrap_or(DegreesOfFreedom::Infinite);
+        Some(Self {
+            truth,
+            outputs,
+            settings,
+            separator,
+            found,
+            degrees,
+        })
+    }
+}
+
+/// The values along the slide and the surface against what is true.
+fn profiles(measured: &Measured) -> Option<[Tally; 4]> {
     let Separation {
         straightness: of_s,
         tilt: of_tilt,
         surface: of_f,
+        zero_adjustment,
+        zero_adjustment_std,
         ..
-    } = &found;
+    } = &measured.found;
+    let (s, tilt, surface, zero) = measured.truth.stated(measured.outputs.geometry());
+    let mut tallies = [Tally::default(); 4];
+    let mut add = |k: usize, value: f64, truth: f64, std: f64| {
+        // The ends of the surface are zero by definition.
+        if std > 0.0 {
+            tallies[k].add(value - truth, std, measured.degrees.as_f64());
+        }
+    };
     for n in 0..s.len() {
         add(0, of_s.values[n], s[n], of_s.std[n]);
         add(1, of_tilt.values[n], tilt[n], of_tilt.std[n]);
@@ -193,31 +285,36 @@ fn one(case: &Case, choice: Choice, seed: u64) -> Option<[Tally; 5]> {
         add(2, of_f.values[n], surface[n], of_f.std[n]);
     }
     for i in [1, 2] {
-        add(
-            3,
-            found.zero_adjustment[i],
-            zero[i],
-            found.zero_adjustment_std[i],
-        );
+        add(3, zero_adjustment[i], zero[i], zero_adjustment_std[i]);
     }
-    let truth = straightness(&outputs.slide_positions(), &s, ReferenceLine::MinimumZone)
+    Some(tallies)
+}
+
+/// The zone of the true slide against its interval.
+fn zone(measured: &Measured) -> Option<Tally> {
+    let zone = measured
+        .separator
+        .straightness_error(
+            &measured.outputs,
+            &measured.settings,
+            &measured.found,
+            measured.degrees,
+        )
+        .ok()?;
+    let positions = measured.outputs.slide_positions();
+    let (s, ..) = measured.truth.stated(measured.outputs.geometry());
+    let truth = straightness(&positions, &s, ReferenceLine::MinimumZone)
         .ok()?
         .error();
-    // The distance from the interval's middle against its half width.
-    let half = |probability: f64| -> Option<(f64, f64)> {
-        let (low, high) = zone.interval(probability, degrees).ok()?;
-        Some((truth - f64::midpoint(low, high), 0.5 * (high - low)))
+    // A straight slide is one whose zone is rounding.
+    let truth = if truth < 1e-9 { 0.0 } else { truth };
+    let inside = |probability: f64| -> Option<bool> {
+        let (low, high) = zone.interval(probability).ok()?;
+        Some(low <= truth && truth <= high)
     };
-    let (off_68, half_68) = half(ONE_SIGMA)?;
-    let (off_95, half_95) = half(0.95)?;
-    // Counted about the middle of the 95 % interval; the other is moved by as much.
-    tallies[4].add_intervals(
-        off_95,
-        zone.std,
-        half_68 - (off_68.abs() - off_95.abs()),
-        half_95,
-    );
-    Some(tallies)
+    let mut tally = Tally::default();
+    tally.add_inside(inside(ONE_SIGMA)?, inside(0.95)?);
+    Some(tally)
 }
 
 /// The slide and zero-adjustments of the paper's example over a surface of random waves.
@@ -225,13 +322,18 @@ struct Waves {
     base: Example,
     /// Order, amplitude, phase; the example's own surface where there are none.
     waves: Vec<(f64, f64, f64)>,
+    slide: Slide,
+    /// The zone of the slide's shape before it is scaled, µm.
+    zone: f64,
+    /// The surface's second-degree part, µm/mm², which a scaled slide gives back.
+    parabola: f64,
 }
 
 impl Waves {
-    fn new(geometry: &Geometry, power: Option<f64>, seed: u64) -> Self {
+    fn new(geometry: &Geometry, case: &Case, seed: u64) -> Option<Self> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let waves = power.map_or(Vec::new(), |power| {
+        let waves = case.power.map_or(Vec::new(), |power| {
             (1..geometry.point_count() / 2)
                 .map(|k| {
                     (
@@ -242,10 +344,42 @@ impl Waves {
                 })
                 .collect()
         });
-        Self {
+        let mut truth = Self {
             base: Example::of(geometry),
             waves,
+            slide: case.slide,
+            zone: 1.0,
+            parabola: 0.0,
+        };
+        let at = |n: usize| n as f64 * geometry.step();
+        let x: Vec<f64> = (0..geometry.output_count()).map(at).collect();
+        let shape: Vec<f64> = x.iter().map(|x| truth.shape(*x)).collect();
+        truth.zone = straightness(&x, &shape, ReferenceLine::MinimumZone)
+            .ok()?
+            .error();
+        truth.parabola = truth.surface_parabola(geometry);
+        Some(truth)
+    }
+
+    /// The slide before it is scaled, µm.
+    fn shape(&self, x: f64) -> f64 {
+        match self.slide {
+            Slide::Paper | Slide::Scaled(_) => self.base.straightness(x),
+            Slide::Waves(_) => (5.0 * TAU * x / self.base.travel + 0.3).sin(),
         }
+    }
+
+    /// The coefficient of x² in the surface, µm/mm², by the second orthogonal polynomial over equal steps.
+    fn surface_parabola(&self, geometry: &Geometry) -> f64 {
+        let points = geometry.point_count();
+        let centre = 0.5 * (points - 1) as f64;
+        let spread = ((points * points - 1) as f64) / 12.0;
+        let bow = |n: usize| (n as f64 - centre).powi(2) - spread;
+        let norm: f64 = (0..points).map(|n| bow(n).powi(2)).sum();
+        let share: f64 = (0..points)
+            .map(|n| bow(n) * self.surface(n as f64 * geometry.step()))
+            .sum();
+        share / norm / geometry.step().powi(2)
     }
 
     /// S, γ, f and e as they are stated: no parabola in the surface, which is counted from its end
@@ -254,13 +388,7 @@ impl Waves {
         let at = |n: usize| n as f64 * geometry.step();
         let points = geometry.point_count();
         let raw: Vec<f64> = (0..points).map(|n| self.surface(at(n))).collect();
-        // The second orthogonal polynomial over equal steps.
-        let centre = 0.5 * (points - 1) as f64;
-        let spread = ((points * points - 1) as f64) / 12.0;
-        let bow = |n: usize| (n as f64 - centre).powi(2) - spread;
-        let norm: f64 = (0..points).map(|n| bow(n).powi(2)).sum();
-        let share: f64 = (0..points).map(|n| bow(n) * raw[n]).sum();
-        let c = share / norm / geometry.step().powi(2);
+        let c = self.surface_parabola(geometry);
         let bare = |n: usize| raw[n] - c * at(n).powi(2);
         let (a, b) = (bare(0), (bare(points - 1) - bare(0)) / at(points - 1));
         let places = geometry.positions();
@@ -297,7 +425,12 @@ impl Truth for Waves {
     }
 
     fn straightness(&self, x: f64) -> f64 {
-        self.base.straightness(x)
+        match self.slide {
+            Slide::Paper => self.base.straightness(x),
+            Slide::Scaled(size) | Slide::Waves(size) => {
+                size / self.zone * self.shape(x) - self.parabola * x * x
+            }
+        }
     }
 
     fn tilt(&self, x: f64) -> f64 {

@@ -2,7 +2,8 @@
 //! points, lengths, squareness and circularity of the next part and of the mean of many.
 //!
 //! The part is made by setting every component anew at every point; only the kinematics are shared with
-//! what is checked.
+//! what is checked. Under `--independence points` and `coordinates` it is made as they assume, and as a
+//! machine makes it whose functions all points have in common.
 
 use errsep_models::machine::features::{self, Circle, Squareness};
 use errsep_models::machine::{
@@ -117,19 +118,49 @@ const QUANTITIES: [&str; 6] = [
     "circularity, by simulation",
 ];
 
+/// What `--independence` is told, what the parts are made by, and the name of both.
+const WAYS: [(Independence, Independence, &str); 5] = [
+    (Independence::Scatter, Independence::Scatter, ""),
+    (
+        Independence::Points,
+        Independence::Points,
+        ", `points`, errors of their own at every point",
+    ),
+    (
+        Independence::Coordinates,
+        Independence::Coordinates,
+        ", `coordinates`, errors of their own in every coordinate",
+    ),
+    (
+        Independence::Points,
+        Independence::Scatter,
+        ", `points` though functions are in common",
+    ),
+    (
+        Independence::Coordinates,
+        Independence::Scatter,
+        ", `coordinates` though functions are in common",
+    ),
+];
+
 pub fn rows(seeds: u64) -> Vec<Row> {
     let mut rows = Vec::new();
-    for prediction in [Prediction::Future, Prediction::Mean] {
+    let predictions = [Prediction::Future, Prediction::Mean];
+    for ((told, made, name), prediction) in WAYS
+        .into_iter()
+        .flat_map(|way| predictions.map(|prediction| (way, prediction)))
+    {
         let tallies: Vec<[Tally; 6]> = (0..seeds)
             .into_par_iter()
-            .filter_map(|seed| one(prediction, seed))
+            .filter_map(|seed| one(told, made, prediction, seed))
             .collect();
+        let part = match prediction {
+            Prediction::Future => "the next part",
+            Prediction::Mean => "the mean of many parts",
+        };
         for (k, quantity) in QUANTITIES.into_iter().enumerate() {
             rows.push(Row {
-                case: match prediction {
-                    Prediction::Future => "the next part".to_owned(),
-                    Prediction::Mean => "the mean of many parts".to_owned(),
-                },
+                case: format!("{part}{name}"),
                 quantity: quantity.to_owned(),
                 seeds: tallies.len() as u64,
                 tally: tallies
@@ -141,7 +172,54 @@ pub fn rows(seeds: u64) -> Vec<Row> {
     rows
 }
 
-fn one(prediction: Prediction, seed: u64) -> Option<[Tally; 6]> {
+/// What a part shows of which every point or coordinate has errors of its own: those of functions known
+/// from readings of their own, and scatter.
+fn apart(
+    truth: &[True],
+    machine: &Machine,
+    point: &Position,
+    future: bool,
+    normal: Normal,
+) -> Option<Vector3<f64>> {
+    let known = measured(truth, normal)?.deviation(point).ok()?;
+    let shown = part(truth, std::slice::from_ref(point), future, normal)?[0];
+    Some(machine.deviation(point).ok()? + shown - known)
+}
+
+/// The part as the errors at its points have things in common.
+fn made(
+    what: Independence,
+    truth: &[True],
+    machine: &Machine,
+    points: &[Position],
+    future: bool,
+    normal: Normal,
+) -> Option<Vec<Vector3<f64>>> {
+    match what {
+        Independence::Scatter => part(truth, points, future, normal),
+        Independence::Points => points
+            .iter()
+            .map(|point| apart(truth, machine, point, future, normal))
+            .collect(),
+        Independence::Coordinates => points
+            .iter()
+            .map(|point| {
+                let mut shown = Vector3::zeros();
+                for k in 0..3 {
+                    shown[k] = apart(truth, machine, point, future, normal)?[k];
+                }
+                Some(shown)
+            })
+            .collect(),
+    }
+}
+
+fn one(
+    told: Independence,
+    in_common: Independence,
+    prediction: Prediction,
+    seed: u64,
+) -> Option<[Tally; 6]> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let normal: Normal = &mut || StandardNormal.sample(&mut random);
     let truth = truth(normal);
@@ -149,7 +227,7 @@ fn one(prediction: Prediction, seed: u64) -> Option<[Tally; 6]> {
     let future = prediction == Prediction::Future;
     let mut tallies = [Tally::default(); 6];
     let mut count = |k: usize, functional: &Functional, value: f64| {
-        let budget = propagate(&machine, functional, Independence::Scatter, prediction).ok()?;
+        let budget = propagate(&machine, functional, told, prediction).ok()?;
         tallies[k].add(
             functional.value - value,
             budget.result.standard_uncertainty,
@@ -161,7 +239,7 @@ fn one(prediction: Prediction, seed: u64) -> Option<[Tally; 6]> {
         Position::new(40.0, 60.0, 30.0),
         Position::new(220.0, 180.0, 90.0),
     ];
-    let shown = part(&truth, &ends, future, normal)?;
+    let shown = made(in_common, &truth, &machine, &ends, future, normal)?;
     for (k, axis) in [Axis::X, Axis::Y, Axis::Z].into_iter().enumerate() {
         let functional = features::point(&machine, &ends[1], axis).ok()?;
         count(k, &functional, shown[1][axis.index()])?;
@@ -179,13 +257,20 @@ fn one(prediction: Prediction, seed: u64) -> Option<[Tally; 6]> {
     };
     let squareness = Squareness::new([Axis::X, Axis::Y], row(0), row(1)).ok()?;
     let functional = squareness.functional(&machine).ok()?;
-    let shown = part(&truth, &squareness.points(), future, normal)?;
+    let shown = made(
+        in_common,
+        &truth,
+        &machine,
+        &squareness.points(),
+        future,
+        normal,
+    )?;
     count(4, &functional, squareness.angle(&shown))?;
     let centre = Position::new(125.0, 125.0, 0.0);
     let circle = Circle::new([Axis::X, Axis::Y], centre, 60.0, 24).ok()?;
-    let shown = features::circularity_of(&circle, &part(&truth, circle.points(), future, normal)?);
-    let sampler =
-        Sampler::new(&machine, circle.points(), Independence::Scatter, prediction).ok()?;
+    let shown = made(in_common, &truth, &machine, circle.points(), future, normal)?;
+    let shown = features::circularity_of(&circle, &shown);
+    let sampler = Sampler::new(&machine, circle.points(), told, prediction).ok()?;
     let sample = sample_features(&sampler, TRIALS, 1, seed, |d, out| {
         out[0] = features::circularity_of(&circle, d);
     })

@@ -78,7 +78,19 @@ pub struct Row {
     pub tally: Tally,
 }
 
-/// Prints the rows as a table; a row whose 95 % interval holds less than 93 % or more than 97 % is marked.
+/// The mark of a row: a 95 % interval that holds less than 93 % or more than 97 %, one of 68.27 % that
+/// holds less than 65 % or more than 71 %.
+fn mark(of_68: f64, of_95: f64) -> &'static str {
+    let (narrow, wide) = (65.0..=71.0, 93.0..=97.0);
+    match (narrow.contains(&of_68), wide.contains(&of_95)) {
+        (true, true) => "",
+        (true, false) => "outside",
+        (false, true) => "68 % outside",
+        (false, false) => "both outside",
+    }
+}
+
+/// Prints the rows as a table with their marks.
 pub fn print(rows: &[Row]) {
     println!("| case | quantity | data sets | values | rms of error/u | in 68.27 % | in 95 % | |");
     println!("|---|---|---|---|---|---|---|---|");
@@ -86,7 +98,6 @@ pub fn print(rows: &[Row]) {
         let t = row.tally;
         let count = t.values.max(1) as f64;
         let share = |inside: u64| 100.0 * inside as f64 / count;
-        let outside = !(93.0..=97.0).contains(&share(t.inside_95));
         let rms = (t.squares / count).sqrt();
         let rms = if rms.is_finite() {
             format!("{rms:.3}")
@@ -101,7 +112,7 @@ pub fn print(rows: &[Row]) {
             t.values,
             share(t.inside_68),
             share(t.inside_95),
-            if outside { "outside" } else { "" }
+            mark(share(t.inside_68), share(t.inside_95))
         );
     }
 }

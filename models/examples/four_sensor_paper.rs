@@ -78,12 +78,19 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The outputs of the runs averaged first, then separated: what repeats are for.
 fn averaged_first(geometry: &Geometry, truth: &Example) -> Result<(), Box<dyn Error>> {
     println!("\n{RUNS} runs averaged, then separated: largest |error|, twice");
-    let separator = Separator::new(geometry, Penalised::ProfileFromEnds, Line::EndPoints)?;
-    let settings = Settings {
-        choice: Choice::Likelihood,
-        ..Settings::default()
-    };
-    for noise in [0.1, 0.2, 0.3] {
+    let ways = [
+        (Penalised::Profile, Choice::LCurve, "L-curve"),
+        (Penalised::ProfileFromEnds, Choice::Likelihood, "likelihood"),
+    ];
+    for (noise, (penalised, choice, rule)) in [0.1, 0.2, 0.3]
+        .into_iter()
+        .flat_map(|noise| ways.map(|way| (noise, way)))
+    {
+        let separator = Separator::new(geometry, penalised, Line::EndPoints)?;
+        let settings = Settings {
+            choice,
+            ..Settings::default()
+        };
         let mut mean = vec![[0.0; 4]; geometry.output_count()];
         for seed in 0..RUNS {
             let outputs = simulate(geometry, truth, &Disturbances::noise(noise), seed)?;
@@ -99,7 +106,7 @@ fn averaged_first(geometry: &Geometry, truth: &Example) -> Result<(), Box<dyn Er
         let slide = (found.straightness.values, found.tilt.values);
         let errors = errors(geometry, truth, slide);
         print_row(
-            &format!("{noise} um, direct, profile-from-ends, likelihood"),
+            &format!("{noise} um, direct, {}, {rule}", penalised.name()),
             &[errors],
         );
     }
@@ -117,16 +124,21 @@ fn add_share(mean: &mut [[f64; 4]], outputs: &Outputs) {
 fn spread_of_the_largest(geometry: &Geometry, truth: &Example) -> Result<(), Box<dyn Error>> {
     const SETS: u64 = 100;
     println!(
-        "\nlargest |error| of {RUNS} runs, 5, 50 and 95 % of {SETS} sets: S to a parabola, gamma inside"
+        "\nlargest |error| of {RUNS} runs, 5, 50 and 95 % of {SETS} sets: S to a parabola, gamma inside, \
+         S of their average"
     );
-    let separator = Separator::new(geometry, Penalised::ProfileFromEnds, Line::EndPoints)?;
+    let rules = [
+        ("L-curve", Choice::LCurve),
+        ("GCV", Choice::Gcv),
+        ("likelihood", Choice::Likelihood),
+    ];
     let scale = 1e3_f64.to_degrees();
-    for noise in [0.1, 0.2, 0.3] {
-        for (rule, choice) in [
-            ("L-curve", Choice::LCurve),
-            ("GCV", Choice::Gcv),
-            ("likelihood", Choice::Likelihood),
-        ] {
+    for penalised in [Penalised::Profile, Penalised::ProfileFromEnds] {
+        let separator = Separator::new(geometry, penalised, Line::EndPoints)?;
+        for (noise, (rule, choice)) in [0.1, 0.2, 0.3]
+            .into_iter()
+            .flat_map(|noise| rules.map(|rule| (noise, rule)))
+        {
             let settings = Settings {
                 choice,
                 ..Settings::default()
@@ -160,7 +172,7 @@ fn spread_of_the_largest(geometry: &Geometry, truth: &Example) -> Result<(), Box
             };
             println!(
                 "{:40} {} | {} | {}",
-                format!("{noise} um, direct, profile-from-ends, {rule}"),
+                format!("{noise} um, direct, {}, {rule}", penalised.name()),
                 points(&mut of_s),
                 points(&mut of_tilt),
                 points(&mut of_mean)

@@ -6,6 +6,7 @@ use errsep_models::four_sensor::{
     Choice, FourSensorError, Geometry, Line, LongSeparator, Outputs, Parabola, Penalised,
     PublishedSeparator, Separator, Settings, separate_long, triples,
 };
+use errsep_models::uncertainty::DegreesOfFreedom;
 use nalgebra::{DMatrix, DVector};
 
 fn paper() -> Geometry {
@@ -298,11 +299,12 @@ fn the_long_way_is_the_same_fit() {
             };
             let separator = Separator::new(&paper(), penalised, line).expect("well posed");
             let short = separator.separate(&outputs, &settings).expect("separates");
-            let short_zone = separator.straightness_error(&outputs, &settings, &short);
+            let degrees = DegreesOfFreedom::new(20.0).expect("positive");
+            let short_zone = separator.straightness_error(&outputs, &settings, &short, degrees);
             let long = LongSeparator::new(&outputs, penalised, line, &settings).expect("builds");
             let zone = long
                 .separate()
-                .and_then(|found| long.straightness_error(&found));
+                .and_then(|found| long.straightness_error(&found, degrees));
             let long = long.separate().expect("separates");
             for (a, b) in [
                 (&short.surface, &long.surface),

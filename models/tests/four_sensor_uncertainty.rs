@@ -14,7 +14,10 @@ struct Rough {
     base: Example,
     /// Order, amplitude and phase of each wave.
     waves: Vec<(f64, f64, f64)>,
-    straight: bool,
+    /// The slide as a share of the paper's.
+    slide: f64,
+    /// Coefficient of x² that the slide is made without, µm/mm².
+    without: f64,
 }
 
 impl Rough {
@@ -34,7 +37,8 @@ impl Rough {
         Self {
             base: Example::of(geometry),
             waves,
-            straight: false,
+            slide: 1.0,
+            without: 0.0,
         }
     }
 }
@@ -49,11 +53,7 @@ impl Truth for Rough {
             .sum()
     }
     fn straightness(&self, x: f64) -> f64 {
-        if self.straight {
-            0.0
-        } else {
-            self.base.straightness(x)
-        }
+        self.slide * self.base.straightness(x) - self.without * x * x
     }
     fn tilt(&self, x: f64) -> f64 {
         self.base.tilt(x)
@@ -71,15 +71,23 @@ struct Stated {
     zero: [f64; 4],
 }
 
-fn stated(geometry: &Geometry, truth: &impl Truth) -> Stated {
+/// The coefficient of x² in the surface, µm/mm².
+fn parabola_of_surface(geometry: &Geometry, truth: &impl Truth) -> f64 {
     let at = |n: usize| n as f64 * geometry.step();
     let points = geometry.point_count();
     let powers = DMatrix::from_fn(points, 3, |n, k| at(n).powi(k as i32));
     let surface = DVector::from_fn(points, |n, _| truth.surface(at(n)));
-    let c = powers
+    powers
         .svd(true, true)
         .solve(&surface, 0.0)
-        .expect("both sides")[2];
+        .expect("both sides")[2]
+}
+
+fn stated(geometry: &Geometry, truth: &impl Truth) -> Stated {
+    let at = |n: usize| n as f64 * geometry.step();
+    let points = geometry.point_count();
+    let surface = DVector::from_fn(points, |n, _| truth.surface(at(n)));
+    let c = parabola_of_surface(geometry, truth);
     let bare = |n: usize| surface[n] - c * at(n).powi(2);
     let b = (bare(points - 1) - bare(0)) / at(points - 1);
     let a = bare(0);
@@ -180,7 +188,7 @@ fn waves_that_no_sensor_tells_apart_are_listed_and_counted() {
     for period in geometry.invisible_periods() {
         let mut truth = Rough::new(&geometry, 0.0, 1);
         truth.waves = vec![(truth.base.surface_length / period / 0.93, 3.0, 0.4)];
-        truth.straight = true;
+        truth.slide = 0.0;
         let quiet = Disturbances::noise(0.0);
         let outputs = simulate(&geometry, &truth, &quiet, 0).expect("finite");
         let plain = simulate(&geometry, &Example::of(&geometry), &quiet, 0).expect("finite");
@@ -207,37 +215,48 @@ fn waves_that_no_sensor_tells_apart_are_listed_and_counted() {
     assert!((found[0] - 95.0).abs() < 2.9, "{found:?}");
 }
 
-/// k·u: the interval of the minimum zone holds the zone of the true S, and begins at zero where a
-/// straight slide would show as much. Of 150 runs 95 % are 142.5 with a standard deviation of 2.7; 133
-/// is three and a half of them.
+/// k·u: the interval of the minimum zone holds the zone of the true S, of a straight slide, of one as
+/// straight as its error and of the paper's. Of 100 runs 95 % are 95 with a standard deviation of 2.2; 88
+/// is three of them. A straight slide is held by intervals that begin at zero, 97.5 % of them: 93 is
+/// three of their standard deviations. Far above the error the interval is value ± k·std, to a tenth
+/// (truncation: 800 drawn zones know a 2.5 % point to 7 % of the half width).
 #[test]
 fn the_zone_of_the_slide_lies_in_its_interval() {
+    const RUNS: u64 = 100;
     let geometry = Geometry::new(5.0, [1, 1, 5], 62).expect("valid");
     let separator =
         Separator::new(&geometry, Penalised::Profile, Line::EndPoints).expect("well posed");
     let settings = Settings::default();
-    for straight in [false, true] {
-        let mut inside = 0;
-        for seed in 0..150 {
-            let mut truth = Rough::new(&geometry, 1.0, seed);
-            truth.straight = straight;
+    for (slide, least) in [(0.0, 93), (0.025, 88), (1.0, 88)] {
+        let (mut inside, mut ratio) = (0, 0.0);
+        for seed in 0..RUNS {
+            let mut truth = Rough::new(&geometry, 0.5, seed);
+            truth.slide = slide;
+            truth.without = parabola_of_surface(&geometry, &truth);
             let outputs =
                 simulate(&geometry, &truth, &Disturbances::noise(0.1), seed).expect("finite");
             let found = separator.separate(&outputs, &settings).expect("separates");
-            let zone = separator
-                .straightness_error(&outputs, &settings, &found)
-                .expect("a zone");
             let freedom = found
                 .degrees_of_freedom
                 .unwrap_or(DegreesOfFreedom::Infinite);
-            let (low, high) = zone.interval(0.95, freedom).expect("a probability");
+            let zone = separator
+                .straightness_error(&outputs, &settings, &found, freedom)
+                .expect("a zone");
+            let (low, high) = zone.interval(0.95).expect("a probability");
+            let k = coverage_factor(0.95, freedom).expect("positive");
+            ratio += (high - low) / (2.0 * k * zone.std) / RUNS as f64;
             let expected = stated(&geometry, &truth).straightness;
             let x = outputs.slide_positions();
             let expected = straightness(&x, expected.as_slice(), ReferenceLine::MinimumZone)
                 .expect("a line")
                 .error();
-            inside += u32::from(low <= expected && expected <= high);
+            // The zone of a straight line is rounding.
+            inside += u32::from(low <= expected.max(1e-9) && expected <= high);
         }
-        assert!(inside >= 133, "{straight}: {inside} of 150");
+        println!("{slide}: {inside} of {RUNS}, width {ratio:.3}");
+        assert!(inside >= least, "{slide}: {inside} of {RUNS}");
+        if slide == 1.0 {
+            assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
+        }
     }
 }

@@ -122,6 +122,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         }),
         tables: vec![components_table(&analysed), parts_table(&analysed)],
         inputs: vec![args.replicates.clone()],
+        setup: None,
         seed: None,
         status: if open.is_empty() {
             Status::Done

@@ -10,6 +10,9 @@ use crate::io::provenance::Provenance;
 use crate::io::{CsvTable, Message, OutFolder, Status, printable};
 use crate::report::{self, Page};
 
+/// Name of the set-up in the folder of an answer.
+pub(super) const SETUP: &str = "setup.toml";
+
 /// The answer of a command, in every form in which it may be asked for.
 #[derive(Debug, Clone)]
 pub struct Answer {
@@ -21,6 +24,8 @@ pub struct Answer {
     pub page: Page,
     /// The profiles and other tables.
     pub tables: Vec<CsvTable>,
+    /// The set-up that goes with the tables, as TOML: `setup.toml` of the folder.
+    pub setup: Option<String>,
     /// The files that were read.
     pub inputs: Vec<PathBuf>,
     /// The seed, where anything was random.
@@ -41,6 +46,7 @@ impl Answer {
             mut json,
             page,
             tables,
+            setup,
             inputs,
             seed,
             status,
@@ -67,12 +73,16 @@ impl Answer {
             for table in &tables {
                 folder.write_table(table)?;
             }
+            if let Some(setup) = &setup {
+                folder.write(SETUP, setup.as_bytes())?;
+            }
             provenance.files = folder.written();
-            let names = tables.iter().map(|t| format!(", {}", t.file_name));
+            let names = tables.iter().map(|t| t.file_name.as_str());
+            let names = names.chain(setup.iter().map(|_| SETUP));
             written = format!(
                 "\nWritten to {}: report.html, result.json{}\n",
                 folder.place().display(),
-                names.collect::<String>()
+                names.map(|name| format!(", {name}")).collect::<String>()
             );
         }
         if let Value::Object(object) = &mut json {

@@ -104,6 +104,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
                 .numbers("deviation_um", fit.residuals_um.clone()),
         ],
         inputs: vec![args.points.clone()],
+        setup: None,
         seed: None,
         status: Status::Done,
     })

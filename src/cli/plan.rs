@@ -367,6 +367,7 @@ fn answer(
         ),
         tables: Vec::new(),
         inputs: vec![args.plan.clone()],
+        setup: None,
         seed: Some(args.common.seed),
         status: Status::Done,
     }

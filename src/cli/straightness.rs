@@ -90,6 +90,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         page: Page::new("Straightness", args.profile.display().to_string()).section(section),
         tables: vec![table],
         inputs: vec![args.profile.clone()],
+        setup: None,
         seed: None,
         status: Status::Done,
     })

@@ -185,6 +185,7 @@ fn answer(args: &Args, samples: usize, turning: &Turning, data: &Observations) -
         page: page(args, turning, data),
         tables: vec![table],
         inputs: vec![args.run.clone()],
+        setup: None,
         seed: None,
         status: Status::Done,
     }

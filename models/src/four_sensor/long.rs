@@ -14,6 +14,7 @@ use super::{
     FourSensorError, Geometry, Line, MinimumZone, Outputs, Parabola, Penalised, Profile,
     Separation, Settings, choice, direct, scatter,
 };
+use crate::uncertainty::DegreesOfFreedom;
 use crate::units::UM_PER_MM;
 
 /// The banded system of outputs: two rows a slide position over s2 + s3 + s4 + 1 neighbours and the
@@ -171,16 +172,21 @@ impl<'a> LongSeparator<'a> {
         })
     }
 
-    /// The minimum-zone straightness of S that was found.
+    /// The minimum-zone straightness of S that was found, the noise known to `degrees` of freedom
+    /// ([`Separation::degrees_of_freedom`], unless it came from elsewhere).
     ///
     /// # Errors
     /// As [`separate`](Self::separate).
-    pub fn straightness_error(&self, found: &Separation) -> Result<MinimumZone, FourSensorError> {
+    pub fn straightness_error(
+        &self,
+        found: &Separation,
+        degrees: DegreesOfFreedom,
+    ) -> Result<MinimumZone, FourSensorError> {
         let geometry = self.outputs.geometry();
         let factored = self.system.factor(found.chosen.point.lambda)?;
         let frame = Frame::new(self.outputs, self.line, self.settings.parabola);
         let positions = self.outputs.slide_positions();
-        minimum_zone(&positions, &found.straightness.values, |random| {
+        minimum_zone(&positions, &found.straightness.values, degrees, |random| {
             let noise = random_readings(random, found.noise, positions.len());
             let truth: Vec<f64> = (0..self.system.penalty_rows())
                 .map(|_| found.scatter.held_back * normal(random))

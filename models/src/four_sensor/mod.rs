@@ -16,6 +16,7 @@ mod choice;
 mod diagnosable;
 pub mod direct;
 mod effects;
+mod ends;
 mod error;
 mod frame;
 mod gauge;
@@ -32,6 +33,7 @@ mod zone;
 
 pub use choice::{Choice, Chosen, Penalised};
 pub use diagnosable::FourSensors;
+pub use ends::Ends;
 pub use error::FourSensorError;
 pub use gauge::{Line, Parabola};
 pub use geometry::Geometry;

@@ -179,7 +179,8 @@ impl Separator {
         })
     }
 
-    /// The minimum-zone straightness of S that was found of these outputs.
+    /// The minimum-zone straightness of S that was found of these outputs, the noise known to `degrees`
+    /// of freedom ([`Separation::degrees_of_freedom`], unless it came from elsewhere).
     ///
     /// # Errors
     /// As [`separate`](Self::separate).
@@ -188,6 +189,7 @@ impl Separator {
         outputs: &Outputs,
         settings: &Settings,
         found: &Separation,
+        degrees: DegreesOfFreedom,
     ) -> Result<MinimumZone, FourSensorError> {
         self.check(outputs)?;
         let lambda = found.chosen.point.lambda;
@@ -195,7 +197,7 @@ impl Separator {
         let pull = spectrum.uncertainty(lambda, found.noise)?.pull;
         let frame = Frame::new(outputs, self.line, settings.parabola);
         let positions = outputs.slide_positions();
-        minimum_zone(&positions, &found.straightness.values, |random| {
+        minimum_zone(&positions, &found.straightness.values, degrees, |random| {
             let noise = random_readings(random, found.noise, positions.len());
             let seen = self
                 .decomposition

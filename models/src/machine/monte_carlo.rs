@@ -148,9 +148,11 @@ impl Sampler {
             }
             Independence::Points => {
                 for influence in &self.influences {
+                    // All its points rest on the same readings.
+                    let widening = influence.widening(rng);
                     let parts = influence.motions.iter().zip(&influence.own);
                     for (deviation, (motion, u)) in deviations.iter_mut().zip(parts) {
-                        *deviation += motion * (u * influence.widening(rng) * normal(rng));
+                        *deviation += motion * (u * widening * normal(rng));
                     }
                 }
             }

@@ -103,6 +103,7 @@ impl<M: FittedModel> Case<M> {
             page: sheet::page(&view),
             tables: vec![residuals(&self.model, &diagnosis)],
             inputs,
+            setup: None,
             seed: Some(args.common.seed),
             status: Status::Done,
         })

@@ -4,7 +4,10 @@ use errsep_models::four_sensor::{Parabola, Profile};
 use serde_json::{Value, json};
 
 use super::Found;
-use super::words::{averaged, discrepancy_key, not_determined, status_key};
+use super::words::{
+    ENDS_OFF, ZONE_NOTE, averaged, counted_from_ends, discrepancy_key, ends, not_determined,
+    status_key,
+};
 use crate::cli::quantity::{COVERAGE, coverage_json, unexpandable};
 use crate::io::Message;
 
@@ -16,9 +19,7 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
     let curve = &s.chosen.curve;
     let rows = 2 * outputs.readings().len();
     let zone = &found.straightness_error;
-    let (low, high) = zone
-        .interval(COVERAGE, found.coverage_degrees())
-        .map_err(unexpandable)?;
+    let (low, high) = zone.interval(COVERAGE).map_err(unexpandable)?;
     Ok(json!({
         "schema": "errsep.four-sensor/1",
         "method": "direct",
@@ -38,6 +39,7 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
             "widening": zone.widening,
             "interval": [low, high],
             "coverage_probability": COVERAGE,
+            "note": ZONE_NOTE,
             "unit": "um",
             "parabola_open": found.parabola_is_open(),
         },
@@ -59,11 +61,19 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
             "uneven": s.scatter.is_uneven(),
             "unit": "um",
         },
+        "surface_ends": found.ends.map(|of| json!({
+            "offset": of.offset,
+            "std": of.std,
+            "unit": "um",
+            "may_lie_on_mean_line": !of.contradict(ENDS_OFF),
+            "text": ends(found),
+        })),
         "regularization": {
             "penalty": found.setup.penalised.name(),
             "lambda": s.chosen.point.lambda,
             "rule": s.chosen.rule,
             "instead": s.chosen.instead,
+            "note": counted_from_ends(found),
             "effective_parameters": s.chosen.point.effective_parameters,
             "condition_number": found.condition_number,
             "l_curve": {

@@ -9,8 +9,8 @@ mod words;
 use std::path::PathBuf;
 
 use errsep_models::four_sensor::{
-    Choice, FourSensorError, LongSeparator, MinimumZone, Parabola, PublishedSeparation,
-    PublishedSeparator, Separation, Separator,
+    Choice, Ends, FourSensorError, LongSeparator, MinimumZone, Parabola, Penalised,
+    PublishedSeparation, PublishedSeparator, Separation, Separator,
 };
 use errsep_models::uncertainty::DegreesOfFreedom;
 
@@ -67,6 +67,8 @@ struct Found {
     published: Option<PublishedSeparation>,
     /// Condition number of the system that was solved, where it was decomposed.
     condition_number: Option<f64>,
+    /// Where the penalty is on the profile and the system was decomposed.
+    ends: Option<Ends>,
 }
 
 impl Found {
@@ -88,14 +90,22 @@ impl Found {
 
     /// How well the noise is known.
     fn degrees_of_freedom(&self) -> Option<DegreesOfFreedom> {
-        if self.noise_from_repeats() {
-            let further = self.measured.repeats.saturating_sub(1);
-            let readings = 4 * self.measured.outputs.readings().len();
-            DegreesOfFreedom::new((readings * further) as f64).ok()
-        } else {
-            self.separation.degrees_of_freedom
-        }
+        how_well_known(&self.separation, self.noise_stated, &self.measured)
     }
+}
+
+/// Degrees of freedom of the noise: of the scatter of the repeats where it was taken from there.
+fn how_well_known(
+    found: &Separation,
+    noise_stated: bool,
+    measured: &Measured,
+) -> Option<DegreesOfFreedom> {
+    if noise_stated || found.noise_estimated {
+        return found.degrees_of_freedom;
+    }
+    let further = measured.repeats.saturating_sub(1);
+    let readings = 4 * measured.outputs.readings().len();
+    DegreesOfFreedom::new((readings * further) as f64).ok()
 }
 
 /// Separates the outputs.
@@ -117,22 +127,33 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let outputs = &measured.outputs;
     let mut published = None;
     let mut condition_number = None;
+    let mut ends = None;
+    let degrees = |found: &Separation| {
+        how_well_known(found, noise_stated, &measured).unwrap_or(DegreesOfFreedom::Infinite)
+    };
     let (separation, straightness_error) = if geometry.point_count() <= LONGEST_DENSE {
         let separator = Separator::new(geometry, setup.penalised, setup.line).map_err(unsolved)?;
         let way = PublishedSeparator::new(geometry).map_err(unsolved)?;
         published = Some(way.separate(outputs, Choice::LCurve).map_err(unsolved)?);
         condition_number = Some(separator.decomposition().condition_number());
+        let of_profile = [Penalised::Profile, Penalised::ProfileFromEnds];
+        if of_profile.contains(&setup.penalised) {
+            // Where the general penalty finds no λ there is nothing to tell of the ends.
+            ends = Ends::of(outputs, &setup.settings).ok();
+        }
         separator
             .separate(outputs, &setup.settings)
             .and_then(|found| {
-                let error = separator.straightness_error(outputs, &setup.settings, &found)?;
+                let degrees = degrees(&found);
+                let error =
+                    separator.straightness_error(outputs, &setup.settings, &found, degrees)?;
                 Ok((found, error))
             })
     } else {
         LongSeparator::new(outputs, setup.penalised, setup.line, &setup.settings).and_then(
             |separator| {
                 let found = separator.separate()?;
-                let error = separator.straightness_error(&found)?;
+                let error = separator.straightness_error(&found, degrees(&found))?;
                 Ok((found, error))
             },
         )
@@ -141,6 +162,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let found = Found {
         published,
         condition_number,
+        ends,
         separation,
         straightness_error,
         noise_stated,
@@ -152,6 +174,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         json: json::json(&found)?,
         page: page::page(&found, &args.data)?,
         tables: tables(&found),
+        setup: None,
         inputs: vec![args.data.clone(), args.setup.clone()],
         seed: None,
         status: Status::Done,

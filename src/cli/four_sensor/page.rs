@@ -9,7 +9,10 @@ use nalgebra::DVector;
 
 use super::Found;
 use super::json::residual_rms;
-use super::words::{noise_source, not_determined, span, status, straightness, uneven};
+use super::words::{
+    ENDS_OFF, ZONE_NOTE, counted_from_ends, ends, noise_source, not_determined, span, status,
+    straightness, uneven,
+};
 use crate::cli::quantity::COVERAGE;
 use crate::io::Message;
 use crate::io::units::URAD_PER_RAD;
@@ -23,7 +26,10 @@ pub(super) fn page(found: &Found, data: &Path) -> Result<Page, Message> {
         straightness(found)?,
         URAD_PER_RAD * span(&s.tilt.values)
     );
-    let doubtful = s.chosen.instead.is_some() || s.scatter.is_uneven();
+    let doubtful = s.chosen.instead.is_some()
+        || s.scatter.is_uneven()
+        || (counted_from_ends(found).is_some()
+            && found.ends.is_some_and(|e| e.contradict(ENDS_OFF)));
     let standing = if doubtful || found.parabola_is_open() {
         Standing::Caution
     } else {
@@ -81,6 +87,7 @@ fn result(found: &Found) -> Section {
                 .meaning("peak to valley"),
             KeyFigure::new("Noise", s.noise, "µm").meaning(noise_source(found)),
         ])
+        .paragraph(format!("Of the straightness: {ZONE_NOTE}."))
         .figure(Figure::new(
             "Straightness of the slide",
             "With the expanded uncertainty (95 %) as a band: of the readings' noise and of the penalty's \
@@ -164,6 +171,12 @@ fn regularization(found: &Found) -> Section {
             s.bias_bound.amax(),
             found.separation.scatter.held_back
         ));
+    if let Some(ends) = ends(found) {
+        section = section.paragraph(format!("Ends of the surface: {ends}."));
+    }
+    if let Some(note) = counted_from_ends(found) {
+        section = section.warning(format!("About this penalty: {note}."));
+    }
     if let Some(warning) = uneven(found) {
         section = section.warning(warning);
     }

@@ -23,6 +23,7 @@ pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
         s.surface.values.len()
     );
     let _ = writeln!(text, "  straightness     {}", straightness(found)?);
+    let _ = writeln!(text, "                   {ZONE_NOTE}");
     let _ = writeln!(
         text,
         "  profile S        {:.3} µm peak to valley from the line of the surface, u up to {:.3} µm",
@@ -84,6 +85,12 @@ pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
         s.straightness.bias_bound.amax(),
         s.scatter.held_back
     );
+    if let Some(ends) = ends(found) {
+        let _ = writeln!(text, "  ends of f        {ends}");
+    }
+    if let Some(note) = counted_from_ends(found) {
+        let _ = writeln!(text, "  note             {note}");
+    }
     if let Some(warning) = uneven(found) {
         let _ = writeln!(text, "  warning          {warning}");
     }
@@ -97,9 +104,7 @@ pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
 /// "40.3 µm (minimum zone), 95 % interval 39.7 to 40.9 µm, if the surface has no parabola".
 pub(super) fn straightness(found: &Found) -> Result<String, Message> {
     let zone = &found.straightness_error;
-    let (low, high) = zone
-        .interval(COVERAGE, found.coverage_degrees())
-        .map_err(unexpandable)?;
+    let (low, high) = zone.interval(COVERAGE).map_err(unexpandable)?;
     // Two digits of the uncertainty.
     let decimals = (1.0 - zone.std.log10().floor()).clamp(0.0, 6.0) as usize;
     let shown = |value: f64| number::fixed(value, decimals);
@@ -125,6 +130,40 @@ pub(super) fn averaged(found: &Found) -> Option<String> {
             "the outputs of {repeats} repeats were averaged first and lambda chosen for the average"
         )
     })
+}
+
+/// What the interval of the minimum zone is worth.
+pub(super) const ZONE_NOTE: &str = "the interval allows for any shape of the slide: near the noise it holds 96 to 99 % instead of 95";
+
+/// Beyond so many standard uncertainties the ends of the surface are said to lie off its mean line.
+pub(super) const ENDS_OFF: f64 = 2.0;
+
+/// Where the ends of the surface lie, and which penalty on the profile that speaks for.
+pub(super) fn ends(found: &Found) -> Option<String> {
+    let ends = found.ends?;
+    let [first, last] = [0, 1].map(|k| number::measured(ends.offset[k], Some(ends.std[k])));
+    let counted_from_ends = found.setup.penalised == Penalised::ProfileFromEnds;
+    let advice = match (ends.contradict(ENDS_OFF), counted_from_ends) {
+        (false, false) => {
+            "it may be that they lie on it: if that is known of this surface, penalty = \"profile-from-ends\" \
+             errs less; these outputs alone cannot tell, so that it is not chosen here"
+        }
+        (true, false) => "they do not lie on it: penalty = \"profile\" is right",
+        (false, true) => "which does not contradict the penalty; that they lie on it must be known",
+        (true, true) => "which contradicts the penalty: choose penalty = \"profile\"",
+    };
+    Some(format!(
+        "{first} and {last} µm from its mean line, {advice}"
+    ))
+}
+
+/// What the uncertainties are under the penalty that counts the profile from its ends.
+pub(super) fn counted_from_ends(found: &Found) -> Option<&'static str> {
+    (found.setup.penalised == Penalised::ProfileFromEnds).then_some(
+        "the penalty takes it for granted that both ends of the surface lie on its mean line. Where they do, the \
+         uncertainties are too large (95 % intervals of S held the truth in 99 %); where they do not, S errs by \
+         more than they say",
+    )
 }
 
 /// A surface that the penalty does not fit.

@@ -129,6 +129,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         }),
         tables: vec![profiles_table(&answer), orders_table(&answer)],
         inputs: args.data.iter().chain(&args.setup).cloned().collect(),
+        setup: None,
         seed: None,
         status: if answer.lost.len() == section.orders {
             Status::NotSolved

@@ -92,6 +92,25 @@ impl PropagationArgs {
         }
     }
 
+    /// What is assumed of features of several points where it is not what a machine does.
+    fn assumption(&self) -> Option<&'static str> {
+        match self.independence {
+            IndependenceName::Scatter => None,
+            IndependenceName::Points => Some(
+                "every point has errors of its own (--independence points). Points of one machine have the fitted \
+                 functions in common: lengths and angles are then known better than said, and the form of \
+                 the mean of many parts is less than said. Without the option this is counted",
+            ),
+            IndependenceName::Coordinates => Some(
+                "every coordinate of every point has errors of its own (--independence coordinates, NISTIR \
+                 6868), and simulations take standard deviations as known, so that their intervals are \
+                 too short after few readings. Points of one machine have the fitted functions in common: lengths and angles are then \
+                 known better than said, and the form of the mean of many parts is less than said. \
+                 Without the option this is counted",
+            ),
+        }
+    }
+
     fn prediction(&self) -> Prediction {
         match self.prediction {
             PredictionName::Future => Prediction::Future,

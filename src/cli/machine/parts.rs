@@ -137,6 +137,7 @@ pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
             vec![args.readings.clone()],
         ]
         .concat(),
+        setup: None,
         seed: None,
         status: Status::Done,
     })

@@ -106,6 +106,7 @@ pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
         page,
         tables: vec![csv(&points)],
         inputs: context.inputs(Some(&args.points)),
+        setup: None,
         seed: None,
         status: Status::Done,
     })

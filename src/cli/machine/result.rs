@@ -182,6 +182,11 @@ pub(super) fn answer(
     let wrong = |error: UncertaintyError| context.wrong(&error.into());
     let mut text = format!("{action} on {machine} ({})\n", context.machine.chain());
     let mut page = Page::new(format!("Machine: {action}"), machine);
+    let assumption = context.propagation.assumption();
+    if let Some(assumption) = assumption {
+        let _ = writeln!(text, "  assumed          {assumption}");
+        page = page.section(Section::new("What is assumed").warning(format!("{assumption}.")));
+    }
     let mut results = Vec::new();
     let mut first = String::new();
     for outcome in outcomes {
@@ -206,6 +211,7 @@ pub(super) fn answer(
             "action": action,
             "chain": context.machine.chain().to_string(),
             "independence": context.propagation.independence(),
+            "assumption": assumption,
             "prediction": context.propagation.prediction(),
             "confidence": confidence,
             "results": results,
@@ -213,6 +219,7 @@ pub(super) fn answer(
         page: page.summary(Standing::Good, first),
         tables: Vec::new(),
         inputs: context.inputs(points_file),
+        setup: None,
         seed,
         status: Status::Done,
     })

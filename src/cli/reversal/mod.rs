@@ -107,6 +107,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         page,
         tables,
         inputs,
+        setup: None,
         seed: None,
         status: Status::Done,
     })

@@ -12,7 +12,7 @@ use crate::io::{CsvTable, Message};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Printed is the CSV that `errsep four-sensor` reads, with the set-up it needs as comments; --out
-writes data.csv and truth.csv.
+writes data.csv, setup.toml and truth.csv.
 
 Example: errsep simulate four-sensor --noise 0.1 --seed 7 > data.csv")]
 pub struct Args {
@@ -125,12 +125,11 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         }),
         args.common.seed,
     )?;
-    answer.text.insert_str(
-        0,
-        &format!(
-            "# set-up: [sensors] spacing = {spacings:?} noise = {}\n",
-            args.noise
-        ),
+    super::add_setup(
+        &mut answer,
+        format!("[sensors]\nspacing = {spacings:?}\n"),
+        "sensors",
+        args.noise,
     );
     answer.tables.push(
         CsvTable::new("truth.csv")

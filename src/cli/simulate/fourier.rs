@@ -11,6 +11,8 @@ use crate::io::{CsvTable, Message};
 /// Scans of a workpiece on a slide by two or three probes.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
+Printed are the scans with the set-up they need as a comment; --out writes scans.csv and setup.toml.
+
 Example: errsep simulate fourier --spacing 48.5 --spacing 34.1 --noise 2 > scans.csv")]
 pub struct Args {
     /// Length of the section, mm.
@@ -105,10 +107,17 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     if !args.two_probes {
         table = table.numbers("m3", column(&|_, r| r.m3.unwrap_or(f64::NAN)));
     }
-    super::answer(
+    let mut answer = super::answer(
         "fourier",
         table,
         json!({"simulation": what, "profiles": truth, "effects": args.effects}),
         seed,
-    )
+    )?;
+    super::add_setup(
+        &mut answer,
+        format!("[section]\nlength = {:?}\n", args.length),
+        "probe",
+        args.noise,
+    );
+    Ok(answer)
 }

@@ -10,10 +10,12 @@ pub mod reversal;
 pub mod step_diagonal;
 
 use std::fmt::Write;
+use std::path::Path;
 
 use clap::Subcommand;
 use serde_json::{Value, json};
 
+use super::answer::SETUP;
 use super::{Answer, CommonArgs};
 use crate::io::message::nearest;
 use crate::io::output::Values;
@@ -69,14 +71,14 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         Kind::Reversal(args) => reversal::run(args),
         Kind::StepDiagonal(args) => step_diagonal::run(args),
     }?;
-    if args.common().out.is_some() {
-        answer.text = summary(&answer);
+    if let Some(folder) = &args.common().out {
+        answer.text = summary(&answer, folder);
     }
     Ok(answer)
 }
 
 /// What was made, for people who find the data themselves in the folder.
-fn summary(answer: &Answer) -> String {
+fn summary(answer: &Answer, folder: &Path) -> String {
     let kind = answer.json["kind"].as_str().unwrap_or_default();
     let mut text = format!(
         "Simulated {kind}, seed {}\n",
@@ -88,6 +90,14 @@ fn summary(answer: &Answer) -> String {
             None => 0,
         };
         let _ = writeln!(text, "  {}: {rows} rows", table.file_name);
+    }
+    if let (Some(_), Some(data)) = (&answer.setup, answer.tables.first()) {
+        let _ = writeln!(
+            text,
+            "  {SETUP}: the set-up; next: errsep {kind} {} --setup {}",
+            folder.join(&data.file_name).display(),
+            folder.join(SETUP).display()
+        );
     }
     let truth = known_in_a_line(&answer.json["truth"]);
     let _ = writeln!(text, "  truth: {truth} (whole in result.json)");
@@ -249,7 +259,24 @@ pub(super) fn answer(
         ),
         tables: vec![data],
         inputs: Vec::new(),
+        setup: None,
         seed: Some(seed),
         status: Status::Done,
     })
+}
+
+/// Adds the set-up with which the data are read: a comment above printed data, a file of a folder. The
+/// noise goes into the table `of_noise`; readings without noise are told of none.
+pub(super) fn add_setup(answer: &mut Answer, mut setup: String, of_noise: &str, noise: f64) {
+    if noise > 0.0 {
+        if !setup.contains(&format!("[{of_noise}]")) {
+            let _ = writeln!(setup, "[{of_noise}]");
+        }
+        let _ = writeln!(setup, "noise = {noise:?}");
+    }
+    let in_a_line = setup.trim_end().replace('\n', " ");
+    answer
+        .text
+        .insert_str(0, &format!("# set-up: {in_a_line}\n"));
+    answer.setup = Some(setup);
 }

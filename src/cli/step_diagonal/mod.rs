@@ -133,6 +133,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             .chain(&args.setup)
             .cloned()
             .collect(),
+        setup: None,
         seed: None,
         status: Status::Done,
     })

@@ -64,41 +64,50 @@ pub fn made(order: &Order) -> Case {
     let sigma = chance.log_between(0.02, 0.2);
     let rig = rig(&mut chance, tilted, order.law, sigma);
     let shared = Schedule::shared(&mut chance, rig.length);
-    let rig = rig.levelled(&shared);
+    let rig = rig.levelled(&shared, &[]);
     let bare = rig.readings(&shared, &[]);
     let facts = facts(&rig, &shared, &bare);
     let mut noise = Noise::drawn(order.law, sigma, &mut chance);
-    let mut truths = Vec::new();
-    let mut sources: Vec<Disturbance> = Vec::new();
-    for (source, which) in &order.sources {
-        let recipe = (source.recipe)(*which, &mut chance, &facts);
-        let wanted = chance.log_between(VISIBLE[0], VISIBLE[1]);
-        let shows = |size: f64| {
-            let with = rig.readings(&shared, &(recipe.make)(size));
-            true_gap(&shared, &difference(&with, &bare))
-        };
-        let size = if source.absorbed {
-            1.0
-        } else {
-            sized(&recipe, wanted * noise.sigma, shows)
-        };
-        let visible = shows(size);
-        if !source.absorbed && visible < wanted * noise.sigma * (1.0 - 2.0 * CLOSE) {
-            // As much as is possible does not show so far above this noise: the noise is less.
+    let recipes: Vec<(&Source, Recipe, f64)> = order
+        .sources
+        .iter()
+        .map(|(source, which)| {
+            let recipe = (source.recipe)(*which, &mut chance, &facts);
+            (*source, recipe, chance.log_between(VISIBLE[0], VISIBLE[1]))
+        })
+        .collect();
+    let shows = |recipe: &Recipe, size: f64| {
+        let with = rig.readings(&shared, &(recipe.make)(size));
+        true_gap(&shared, &difference(&with, &bare))
+    };
+    // Where as much as is possible does not show so far above the noise, the noise is less.
+    for (_, recipe, wanted) in recipes.iter().filter(|(source, ..)| !source.absorbed) {
+        let size = sized(recipe, wanted * noise.sigma, |size| shows(recipe, size));
+        let visible = shows(recipe, size);
+        if visible < wanted * noise.sigma * (1.0 - 2.0 * CLOSE) {
             let less = visible / wanted / noise.sigma;
             noise.sigma *= less;
             noise.resolution *= less;
         }
+    }
+    let mut truths = Vec::new();
+    let mut sources: Vec<Disturbance> = Vec::new();
+    for (source, recipe, wanted) in &recipes {
+        let size = if source.absorbed {
+            1.0
+        } else {
+            sized(recipe, wanted * noise.sigma, |size| shows(recipe, size))
+        };
         sources.extend((recipe.make)(size));
         truths.push(Truth {
             name: source.name,
             what: recipe.what,
-            visible,
+            visible: shows(recipe, size),
             size: recipe.size.map(|(factor, unit)| (factor * size, unit)),
         });
     }
     let schedule = order.design.of(&shared, &mut chance);
-    let rig = rig.levelled(&schedule);
+    let rig = rig.levelled(&schedule, &sources);
     let undisturbed = rig.readings(&schedule, &[]);
     let clean = rig.readings(&schedule, &sources);
     let written = noise.upon(&clean, &schedule, &mut chance);

@@ -40,28 +40,34 @@ impl Form {
         form.levelled(length, rms)
     }
 
-    /// The form without its straight line over the measured positions, each weighted by the width of its
-    /// cell: what is left of a line in both surfaces would be a cone.
-    pub fn without_line(mut self, positions: &[f64]) -> Self {
-        let mut sorted = positions.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        sorted.dedup();
-        let n = sorted.len();
+    /// The form without its straight line against the commanded positions, each weighted by the width of
+    /// its cell; of a position the form is taken at the places that are touched there.
+    pub fn without_line(mut self, touched: &[[f64; 2]]) -> Self {
+        let mut sorted = touched.to_vec();
+        sorted.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let mut at: Vec<f64> = sorted.iter().map(|pair| pair[0]).collect();
+        at.dedup();
+        let n = at.len();
         if n < 3 {
             return self;
         }
         // The end cells reach as far beyond the last position as they do before it.
         let width = |k: usize| match k {
-            0 => sorted[1] - sorted[0],
-            k if k == n - 1 => sorted[k] - sorted[k - 1],
-            k => (sorted[k + 1] - sorted[k - 1]) / 2.0,
+            0 => at[1] - at[0],
+            k if k == n - 1 => at[k] - at[k - 1],
+            k => (at[k + 1] - at[k - 1]) / 2.0,
         };
         let whole: f64 = (0..n).map(width).sum();
-        let mean =
-            |f: &dyn Fn(f64) -> f64| (0..n).map(|k| width(k) * f(sorted[k])).sum::<f64>() / whole;
-        let middle = mean(&|x| x);
-        let level = mean(&|x| self.at(x));
-        let slope = mean(&|x| (x - middle) * self.at(x)) / mean(&|x| (x - middle).powi(2));
+        let middle = (0..n).map(|k| width(k) * at[k]).sum::<f64>() / whole;
+        let (mut level, mut moment, mut spread) = (0.0, 0.0, 0.0);
+        for (k, cell) in sorted.chunk_by(|a, b| a[0] == b[0]).enumerate() {
+            let seen = cell.iter().map(|pair| self.at(pair[1])).sum::<f64>() / cell.len() as f64;
+            let t = at[k] - middle;
+            level += width(k) * seen / whole;
+            moment += width(k) * t * seen;
+            spread += width(k) * t * t;
+        }
+        let slope = moment / spread;
         self.line[0] -= level - slope * middle;
         self.line[1] -= slope;
         self

@@ -162,13 +162,28 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// The rig with forms that have no straight line over the positions of a schedule.
-    pub fn levelled(&self, schedule: &Schedule) -> Self {
+    /// The rig with forms that have no straight line as they are touched in the first spindle position:
+    /// where the slide or the artefact is shifted, a line would come in that is a cone of no one's making.
+    pub fn levelled(&self, schedule: &Schedule, sources: &[Disturbance]) -> Self {
+        let mut touched = Vec::new();
         let read = schedule.traces.iter().flat_map(Trace::moments);
-        let positions: Vec<f64> = read.map(|moment| moment.x).collect();
+        let all: Vec<Moment> = read.collect();
+        let first = all.iter().any(|m| m.position == 0);
+        for moment in all.iter().filter(|m| !first || m.position == 0) {
+            let place: f64 = sources
+                .iter()
+                .filter_map(|s| s.place.as_ref())
+                .map(|f| f(moment))
+                .sum();
+            let axial: f64 = sources
+                .iter()
+                .filter_map(|s| s.axial.as_ref())
+                .map(|f| f(moment))
+                .sum();
+            touched.push([moment.x, moment.x + place - axial]);
+        }
         let mut rig = self.clone();
-        rig.slide = rig.slide.without_line(&positions);
-        rig.surfaces = rig.surfaces.map(|form| form.without_line(&positions));
+        rig.surfaces = rig.surfaces.map(|form| form.without_line(&touched));
         rig
     }
 

@@ -1,0 +1,155 @@
+//! What is asked of the product, and what it says: all of the product that this example touches.
+
+use std::time::Instant;
+
+use errsep::diagnosis::{NoiseLaw, NoiseSource, Options, certificate, diagnose};
+use errsep_models::model::FittedModel;
+use errsep_models::reversal::Observations;
+use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use serde_json::Value;
+
+/// What a diagnosis says, from its JSON.
+#[derive(Debug, Clone)]
+pub struct Said {
+    /// `none`, `effect` or `unknown`.
+    pub kind: String,
+    /// The effects named.
+    pub effects: Vec<String>,
+    /// Groups that cannot be told apart.
+    pub groups: Vec<Vec<String>>,
+    /// Probability of as much with nothing there.
+    pub p_value: f64,
+    /// The gap before, µm.
+    pub gap: f64,
+    /// Sizes: effect, value, standard uncertainty, unit.
+    pub sizes: Vec<(String, f64, f64, String)>,
+    /// How long it took, s.
+    pub seconds: f64,
+}
+
+impl Said {
+    /// The group of an effect, or the effect alone.
+    pub fn group_of(&self, effect: &str) -> Vec<String> {
+        let mine = |group: &&Vec<String>| group.iter().any(|name| name == effect);
+        self.groups
+            .iter()
+            .filter(|group| group.len() > 1)
+            .find(mine)
+            .cloned()
+            .unwrap_or_else(|| vec![effect.to_owned()])
+    }
+
+    /// All that stands for a cause: one group an effect named.
+    pub fn causes(&self) -> Vec<Vec<String>> {
+        if self.kind != "effect" {
+            return Vec::new();
+        }
+        self.effects
+            .iter()
+            .map(|effect| self.group_of(effect))
+            .collect()
+    }
+
+    /// In one line.
+    pub fn in_words(&self) -> String {
+        if self.kind != "effect" {
+            return self.kind.clone();
+        }
+        let causes: Vec<String> = self.causes().iter().map(|group| group.join("|")).collect();
+        causes.join(" + ")
+    }
+}
+
+/// The model that is diagnosed.
+fn model(readings: &Observations, thickness: Option<f64>) -> Result<FirstOrder, String> {
+    let assumptions = Assumptions {
+        thickness,
+        ..Assumptions::default()
+    };
+    FirstOrder::new(readings, assumptions).map_err(|e| e.to_string())
+}
+
+/// Diagnoses readings with a catalogue from which some effects are left out.
+pub fn ask(
+    readings: &Observations,
+    thickness: Option<f64>,
+    without: &[&str],
+    seed: u64,
+) -> Result<Said, String> {
+    let start = Instant::now();
+    let model = model(readings, thickness)?;
+    let without = without.iter().map(|name| (*name).to_owned()).collect();
+    let options = Options {
+        seed,
+        without,
+        ..Options::default()
+    };
+    let diagnosis = diagnose(&model, &options);
+    let json = serde_json::to_value(&diagnosis).map_err(|e| e.to_string())?;
+    heard(&json, start.elapsed().as_secs_f64())
+        .ok_or_else(|| "an answer without a verdict".to_owned())
+}
+
+fn heard(json: &Value, seconds: f64) -> Option<Said> {
+    let names = |list: &Value| -> Vec<String> {
+        let all = list.as_array().into_iter().flatten();
+        all.filter_map(|name| name.as_str().map(str::to_owned))
+            .collect()
+    };
+    let verdict = json.get("verdict")?;
+    let mut sizes = Vec::new();
+    for candidate in json.get("candidates")?.as_array()? {
+        let effect = candidate.get("effect")?.as_str()?;
+        for parameter in candidate.get("parameters")?.as_array()? {
+            let number = |key: &str| parameter.get(key).and_then(Value::as_f64);
+            let unit = parameter.get("unit").and_then(Value::as_str).unwrap_or("");
+            if let (Some(value), Some(std)) = (number("value"), number("std")) {
+                sizes.push((effect.to_owned(), value, std, unit.to_owned()));
+            }
+        }
+    }
+    Some(Said {
+        kind: verdict.get("kind")?.as_str()?.to_owned(),
+        effects: names(verdict.get("effects")?),
+        groups: verdict
+            .get("indistinguishable")?
+            .as_array()?
+            .iter()
+            .map(names)
+            .collect(),
+        p_value: verdict.get("p_value")?.as_f64()?,
+        gap: json.get("gap")?.get("before")?.get("rms")?.as_f64()?,
+        sizes,
+        seconds,
+    })
+}
+
+/// Names of the effects that the product has for such readings.
+pub fn catalogue(readings: &Observations) -> Result<Vec<String>, String> {
+    let effects = model(readings, None)?.effects();
+    Ok(effects
+        .iter()
+        .map(|effect| effect.name().to_owned())
+        .collect())
+}
+
+/// Standard deviations between an effect of which `visible` µm shows and the effect most like it, after
+/// the product's own certificate; none where the certificate gives none.
+pub fn apart(
+    undisturbed: &Observations,
+    thickness: Option<f64>,
+    [sigma, visible]: [f64; 2],
+    effect: &str,
+) -> Option<f64> {
+    let model = model(undisturbed, thickness).ok()?;
+    let law = NoiseLaw::white(sigma, f64::INFINITY, NoiseSource::Stated);
+    let options = Options {
+        draws: 200,
+        ..Options::default()
+    };
+    let rows = certificate(&model, &model.effects(), &law, &options);
+    let row = rows.into_iter().find(|row| row.effect == effect)?;
+    // The certificate's visible root mean square belongs to the detectable amplitude.
+    let told_from = row.visible_rms? * row.identifiable? / row.detectable?;
+    Some(4.65 * visible / told_from)
+}

@@ -1,0 +1,153 @@
+//! One effect a case, which the catalogue has not.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::{LAWS, ended, known, namable, prepared};
+use crate::arguments::Arguments;
+use crate::case::Order;
+use crate::physics::Source;
+use crate::product::ask;
+use crate::table::{print, rate};
+
+/// How an answer without the true effect's name stands.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Withheld {
+    /// `unknown`.
+    Unknown,
+    /// What the whole catalogue cannot tell from the truth either.
+    Alias,
+    /// Another.
+    Another,
+    /// `none`.
+    Nothing,
+    /// Readings that are not taken.
+    Refused,
+}
+
+const NAMES: [(Withheld, &str); 5] = [
+    (Withheld::Unknown, "`unknown`"),
+    (
+        Withheld::Alias,
+        "what the whole catalogue cannot tell from it",
+    ),
+    (Withheld::Another, "another is blamed"),
+    (Withheld::Nothing, "`none`"),
+    (Withheld::Refused, "refused"),
+];
+
+/// Runs the set and prints its tables.
+pub fn run(arguments: &Arguments) -> Result<(), String> {
+    let start = Instant::now();
+    let known = known()?;
+    let namable: Vec<&Source> = namable(&known)
+        .into_iter()
+        .filter(|s| {
+            arguments
+                .only
+                .as_ref()
+                .is_none_or(|(name, _)| s.name == name)
+        })
+        .collect();
+    if namable.is_empty() {
+        return Err("the catalogue has no such effect".to_owned());
+    }
+    let numbers: Vec<u64> = (arguments.from..arguments.from + arguments.cases).collect();
+    let outcomes: Result<Vec<_>, String> = numbers
+        .par_iter()
+        .map(|k| one(arguments, &namable, *k))
+        .collect();
+    let outcomes = outcomes?;
+    let count = |which: Withheld, source: Option<&str>| {
+        let mine = |o: &&(&str, Withheld)| o.1 == which && source.is_none_or(|name| o.0 == name);
+        outcomes.iter().filter(mine).count()
+    };
+    println!("\n### The effect withheld from the catalogue");
+    let mut lines: Vec<Vec<String>> = NAMES
+        .iter()
+        .map(|(which, name)| {
+            vec![
+                (*name).to_owned(),
+                rate(count(*which, None), outcomes.len()),
+            ]
+        })
+        .collect();
+    let right = count(Withheld::Unknown, None) + count(Withheld::Alias, None);
+    lines.insert(0, vec!["right".to_owned(), rate(right, outcomes.len())]);
+    print(&["what", "measured (95 % limits)"], &lines);
+    let rows: Vec<Vec<String>> = namable
+        .iter()
+        .map(|source| {
+            let mut line = vec![source.name.to_owned()];
+            line.extend(
+                NAMES
+                    .iter()
+                    .map(|(which, _)| count(*which, Some(source.name)).to_string()),
+            );
+            line
+        })
+        .collect();
+    let mut head = vec!["withheld"];
+    head.extend(NAMES.iter().map(|(_, name)| *name));
+    print(&head, &rows);
+    ended(start, outcomes.len());
+    Ok(())
+}
+
+fn one(
+    arguments: &Arguments,
+    namable: &[&'static Source],
+    number: u64,
+) -> Result<(&'static str, Withheld), String> {
+    let sources = namable.len() as u64;
+    let source = namable[(number % sources) as usize];
+    let round = number / sources;
+    let which = (round % source.realisations as u64) as usize;
+    let law = LAWS[((number + round) % LAWS.len() as u64) as usize];
+    let order = Order {
+        name: format!("withheld {number}"),
+        seed: arguments.seed,
+        sources: vec![(source, which)],
+        law,
+        design: arguments.design.1,
+    };
+    let case = prepared(arguments, &order)?;
+    let said = ask(&case.observations, case.thickness, &[source.name], number);
+    let outcome = match &said {
+        Err(_) => Withheld::Refused,
+        Ok(said) if said.kind == "unknown" => Withheld::Unknown,
+        Ok(said) if said.kind == "none" => Withheld::Nothing,
+        Ok(said) => {
+            let whole = ask(&case.observations, case.thickness, &[], number)?;
+            let alike = whole
+                .causes()
+                .into_iter()
+                .find(|group| group.iter().any(|n| n == source.name));
+            let alike = alike.unwrap_or_default();
+            let all = said.causes().concat();
+            if all.iter().all(|name| alike.contains(name)) {
+                Withheld::Alias
+            } else {
+                Withheld::Another
+            }
+        }
+    };
+    if !matches!(outcome, Withheld::Unknown | Withheld::Alias) {
+        let truth = &case.truths[0];
+        println!(
+            "--withheld --seed {} --from {number} --cases 1{}: {}/{which} ({}), {}, shows {:.2} noise: {}",
+            arguments.seed,
+            arguments
+                .only
+                .as_ref()
+                .map_or(String::new(), |(name, _)| format!(" --only {name}")),
+            source.name,
+            truth.what,
+            law.name(),
+            truth.visible / case.noise.sigma,
+            said.map_or_else(|what| what, |said| said.in_words())
+        );
+    }
+    Ok((source.name, outcome))
+}

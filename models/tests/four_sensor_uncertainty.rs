@@ -218,8 +218,9 @@ fn waves_that_no_sensor_tells_apart_are_listed_and_counted() {
 /// k·u: the interval of the minimum zone holds the zone of the true S, of a straight slide, of one as
 /// straight as its error and of the paper's. Of 100 runs 95 % are 95 with a standard deviation of 2.2; 88
 /// is three of them. A straight slide is held by intervals that begin at zero, 97.5 % of them: 93 is
-/// three of their standard deviations. Far above the error the interval is value ± k·std, to a tenth
-/// (truncation: 800 drawn zones know a 2.5 % point to 7 % of the half width).
+/// three of their standard deviations. Far above the error the interval is that of value ± k·std or
+/// wider, as it allows for the least favourable slide of each width: not by more than a fifth, which
+/// would hold 98 % (and 800 drawn zones know a 2.5 % point to 7 % of the half width).
 #[test]
 fn the_zone_of_the_slide_lies_in_its_interval() {
     const RUNS: u64 = 100;
@@ -256,7 +257,7 @@ fn the_zone_of_the_slide_lies_in_its_interval() {
         println!("{slide}: {inside} of {RUNS}, width {ratio:.3}");
         assert!(inside >= least, "{slide}: {inside} of {RUNS}");
         if slide == 1.0 {
-            assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
+            assert!(ratio > 0.93 && ratio < 1.2, "{ratio}");
         }
     }
 }

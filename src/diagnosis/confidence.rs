@@ -23,6 +23,8 @@ const WEIGHTY: f64 = 0.02;
 /// Causes whose misfits differ by less fit equally well: beside others the one of more usual size is
 /// kept.
 const TIED: f64 = 9.2;
+/// A relative of a cause that explains less than this part of what it does cannot stand for it.
+const NEAR: f64 = 0.7;
 /// A size counts from this many of its standard uncertainties on.
 const STANDS: f64 = 2.0;
 /// Evidence that differs by less is equal: of exact aliases the one of more usual size goes first.
@@ -198,8 +200,11 @@ fn alternatives<M: FittedModel>(
         let trials = if effect == best[k].effect {
             // Relatives that a state bent by the first may hide.
             let relatives = bench.catalogue[effect].relatives(bench.model, &best[k].shape);
+            let columns = best[k].columns.len();
             let other = |shape: Shape| {
-                Some(bench.refine_alone(bench.model, readings, effect, &shape, &others))
+                let here = bench.cause(bench.model, effect, shape.clone());
+                let near = here.columns.len() <= columns && strength(&here) > NEAR * own - HOPELESS;
+                near.then(|| bench.refine_alone(bench.model, readings, effect, &shape, &others))
             };
             let mut own = vec![Some(best[k].clone())];
             own.extend(relatives.into_iter().map(other));

@@ -470,7 +470,12 @@ pub fn measured(
     seed: u64,
     positions: usize,
 ) -> Option<Observations> {
-    let tilt = if effect == "off-crest" { 3e-5 } else { 1.5e-5 };
+    // An indicator with periods goes on where its stylus goes on: its span is wide.
+    let tilt = if effect == "cyclic-error" {
+        1.5e-4
+    } else {
+        1.5e-5
+    };
     let world = World::random(positions, seed, tilt);
     let bare = world.run(|w, n| w.plain(n));
     let mut readings = bare.clone();

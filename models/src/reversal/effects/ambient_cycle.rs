@@ -1,6 +1,6 @@
 //! The air of the room comes and goes in temperature, and machine and mounts follow it.
 //!
-//! A sinusoid in time with the period of the room's control, from that of two traces up to the
+//! A sinusoid in time with the period of the room's control, longer than two traces and up to the
 //! duration of the test. Each indicator follows by its own amount and its own lag. Free: amplitude
 //! and phase for each indicator, the period, told by its cycles over the test.
 
@@ -15,6 +15,9 @@ pub(super) struct AmbientCycle;
 
 /// Cycles between neighbouring starts of the search.
 const STRIDE: f64 = 0.3;
+
+/// Cycles by which two periods must differ to be told apart.
+const APART: f64 = 0.6;
 
 impl Effect<FirstOrder> for AmbientCycle {
     fn name(&self) -> &str {
@@ -71,7 +74,7 @@ impl Effect<FirstOrder> for AmbientCycle {
     }
 
     fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
-        let reach = 0.9..most(model) + STRIDE;
+        let reach = 0.9..=most(model);
         shape
             .values
             .first()
@@ -100,8 +103,9 @@ impl Effect<FirstOrder> for AmbientCycle {
     }
 }
 
-/// Most cycles: one in the time of two traces of an indicator.
+/// Most cycles: short of one in the time of two traces, where a sinusoid is the position that goes
+/// forward and back.
 fn most(model: &FirstOrder) -> f64 {
     let indicators = signs(scopes(model)[0]).len();
-    (0.5 * (model.traces().len() / indicators) as f64).max(1.0)
+    (0.5 * (model.traces().len() / indicators) as f64 - APART).max(1.0)
 }

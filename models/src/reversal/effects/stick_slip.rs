@@ -5,14 +5,14 @@
 //! told by the slips over the travel, and the state at mid travel.
 
 use super::{FirstOrder, part_of_travel};
-use crate::model::{About, Column, Effect, Link, Parameter, Shape};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Place, Shape};
 
 /// See the head of the file.
 pub(super) struct StickSlip;
 
 /// Slips over the travel between neighbouring starts of the search, and starts of the state.
-const STRIDE: f64 = 0.4;
-const STATES: usize = 4;
+const STRIDE: f64 = 0.5;
+const STATES: usize = 3;
 
 impl Effect<FirstOrder> for StickSlip {
     fn name(&self) -> &str {
@@ -47,21 +47,35 @@ impl Effect<FirstOrder> for StickSlip {
             values: vec![
                 2.0 + STRIDE * (k / STATES) as f64,
                 (k % STATES) as f64 / STATES as f64,
+                0.0,
             ],
-            steps: vec![0.25 * STRIDE, 0.5 / STATES as f64],
+            steps: vec![0.25 * STRIDE, 0.5 / STATES as f64, 0.0],
         };
         (0..count * STATES).map(at).collect()
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
-        let &[slips, state] = shape.values.as_slice() else {
+        let &[slips, state, lag] = shape.values.as_slice() else {
             return Vec::new();
         };
-        vec![model.of_cell(|_, place| {
+        let change = |k: usize, place: &Place| {
             let run = 0.5 * place.direction * part_of_travel(model, place.x);
-            let wound = (slips * run + state).rem_euclid(1.0);
-            -place.direction * wound * model.reading_slope(place)
-        })]
+            let behind = -place.direction * (slips * run + state).rem_euclid(1.0);
+            behind * model.reading_chord(k, behind * lag)
+        };
+        vec![if model.lies_beneath() {
+            Column::from_places(model.places(), change)
+        } else {
+            model.of_cell(change)
+        }]
+    }
+
+    fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
+        let mut settled = shape.clone();
+        if let (Some(lag), Some(size)) = (settled.values.get_mut(2), amplitudes.first()) {
+            *lag = *size;
+        }
+        Some(settled)
     }
 
     fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
@@ -73,7 +87,7 @@ impl Effect<FirstOrder> for StickSlip {
     }
 }
 
-/// Most slips over the travel: four readings from slip to slip.
+/// Most slips over the travel: six readings from slip to slip.
 fn highest(model: &FirstOrder) -> f64 {
-    0.25 * model.positions().len() as f64
+    0.16 * model.positions().len() as f64
 }

@@ -43,8 +43,14 @@ impl Effect<FirstOrder> for ZeroJump {
                 continue;
             }
             let times = times_of(model, variant);
-            for (k, pair) in times.windows(2).enumerate().step_by(STRIDE) {
-                let next = times[(k + STRIDE).min(times.len() - 1)];
+            // An indicator reads two channels.
+            let stride = if variant < channels {
+                STRIDE
+            } else {
+                2 * STRIDE
+            };
+            for (k, pair) in times.windows(2).enumerate().step_by(stride) {
+                let next = times[(k + stride).min(times.len() - 1)];
                 shapes.push(Shape {
                     variant,
                     values: vec![0.5 * (pair[0] + pair[1])],

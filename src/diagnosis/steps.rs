@@ -205,7 +205,7 @@ mod tests {
     }
 
     /// A zero that stays where it jumped is taken out of all traces after it: k·u, means of 80
-    /// readings know it to 0.1 √(2/80 · 1/2) = 0.011 µm; five times that, of a step of 1 µm.
+    /// readings know it to 0.1 √(1/80 · 1/2) = 0.008 µm; seven times that, of a step of 1 µm.
     #[test]
     fn a_step_that_stays_is_taken_out_of_the_later_traces() {
         for seed in 0..5 {

@@ -420,7 +420,8 @@ impl World {
         let bare = self.run(|w, n| w.plain(n));
         for channel in Channel::ALL {
             let values: Vec<f64> = bare.of(channel).map(|r| r.value).collect();
-            let middle = values[values.len() / 2];
+            // The first trace, half way.
+            let middle = values[self.positions / 2];
             low = values.iter().fold(low, |a, v| a.min(v - middle));
             high = values.iter().fold(high, |a, v| a.max(v - middle));
         }

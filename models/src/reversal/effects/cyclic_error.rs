@@ -21,6 +21,10 @@ const DRIVE: usize = 3;
 /// Cycles between neighbouring starts of the search: the peak of a period is one cycle wide.
 const STRIDE: f64 = 0.4;
 
+/// Greatest slope of a period of the reading: its amplitude is half the period. Beyond, readings a
+/// whole period apart show the same, and none tells what was seen.
+const STEEPEST: f64 = std::f64::consts::PI;
+
 /// Fewest cycles: less is a bend.
 const FEWEST: f64 = 3.0;
 
@@ -123,8 +127,8 @@ impl Effect<FirstOrder> for CyclicError {
             return true;
         };
         let steepest = std::f64::consts::TAU * cycles / model.reading_span();
-        let rises = |wave: &[f64]| wave[0].hypot(wave[1]) * steepest < 1.0;
-        shape.variant == DRIVE || amplitudes.chunks_exact(2).all(rises)
+        let holds = |wave: &[f64]| wave[0].hypot(wave[1]) * steepest < STEEPEST;
+        shape.variant == DRIVE || amplitudes.chunks_exact(2).all(holds)
     }
 
     /// A period of the reading is told by its cycles over the span of the readings.

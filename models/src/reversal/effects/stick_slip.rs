@@ -11,8 +11,8 @@ use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Place, S
 pub(super) struct StickSlip;
 
 /// Slips over the travel between neighbouring starts of the search, and starts of the state.
-const STRIDE: f64 = 0.5;
-const STATES: usize = 3;
+const STRIDE: f64 = 0.4;
+const STATES: usize = 4;
 
 impl Effect<FirstOrder> for StickSlip {
     fn name(&self) -> &str {

@@ -1,7 +1,8 @@
 //! The slide sticks until its drive has wound up, then slips after it.
 //!
 //! It lags behind its command by a sawtooth of the way run, the same in every trace of a direction,
-//! and what is seen comes with it. Free: the lag just before it slips, the way from slip to slip,
+//! and what is seen comes with it. What both directions have in common passes for form; with a half
+//! or a whole slip at mid travel the rest is a constant lag, `axis-backlash`. Free: the lag just before it slips, the way from slip to slip,
 //! told by the slips over the travel, and the state at mid travel.
 
 use super::{FirstOrder, part_of_travel};
@@ -12,7 +13,10 @@ pub(super) struct StickSlip;
 
 /// Slips over the travel between neighbouring starts of the search, and starts of the state.
 const STRIDE: f64 = 0.4;
-const STATES: usize = 4;
+const STATES: [f64; 2] = [0.25, 0.75];
+
+/// Nearer to a half or a whole slip at mid travel it is a constant lag.
+const ASIDE: f64 = 0.1;
 
 impl Effect<FirstOrder> for StickSlip {
     fn name(&self) -> &str {
@@ -45,13 +49,13 @@ impl Effect<FirstOrder> for StickSlip {
         let at = |k: usize| Shape {
             variant: 0,
             values: vec![
-                2.0 + STRIDE * (k / STATES) as f64,
-                (k % STATES) as f64 / STATES as f64,
+                2.0 + STRIDE * (k / STATES.len()) as f64,
+                STATES[k % STATES.len()],
                 0.0,
             ],
-            steps: vec![0.25 * STRIDE, 0.5 / STATES as f64, 0.0],
+            steps: vec![0.25 * STRIDE, 0.1, 0.0],
         };
-        (0..count * STATES).map(at).collect()
+        (0..count * STATES.len()).map(at).collect()
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
@@ -80,10 +84,9 @@ impl Effect<FirstOrder> for StickSlip {
 
     fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
         let reach = 1.5..highest(model) + STRIDE;
-        shape
-            .values
-            .first()
-            .is_some_and(|slips| reach.contains(slips))
+        let aside = |state: &f64| (ASIDE..=0.5 - ASIDE).contains(&state.rem_euclid(0.5));
+        matches!(shape.values.as_slice(), [slips, state, ..]
+            if reach.contains(slips) && aside(state))
     }
 }
 

@@ -366,10 +366,11 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
         // The slide sticks until its drive has wound up by a step, then slips after it.
         ("stick-slip", _) => {
             let pitch = [uniform(0.03, 0.08), uniform(0.08, 0.2), 0.05, 0.12][way];
-            let begin = if way < 2 { 0.0 } else { uniform(0.0, 1.0) };
+            // Half or whole slips at mid travel would add up to a constant lag in both directions.
+            let begin = [0.25, 0.75, 0.18, 0.33][way] - 0.5 / pitch;
             Box::new(move |w, n| {
                 let run = 0.5 * (1.0 + n.direction * n.part);
-                let wound = (run / pitch + begin).fract();
+                let wound = (run / pitch + begin).rem_euclid(1.0);
                 let at = n.x - n.direction * 100.0 * size * wound;
                 w.seen(n, at, at)
             })

@@ -299,7 +299,10 @@ fn effects_told_relative_to_the_state_are_carried() {
         let ones = vec![1.0; effect.amplitudes().len()];
         let (there, amplitudes) = effect.carried(&model, tilted, &shape, &ones);
         let columns = effect.columns(tilted, &there);
-        let first = columns[0].dense(tilted.observed().len()) * amplitudes[0];
+        // The near indicator's first, then the far one's.
+        let (readings, far) = (tilted.observed().len(), columns.len() / 2);
+        let first = columns[0].dense(readings) * amplitudes[0]
+            + columns[far].dense(readings) * amplitudes[far];
         for k in 0..first.len() {
             let reading = tilted.smooth_reading(k);
             let told = match name {

@@ -7,12 +7,11 @@ use nalgebra::{DMatrix, DVector};
 
 use rayon::prelude::*;
 
-use super::dictionary::{Dictionary, Entry, Meaning, Places, products, statistic, surprise};
+use super::dictionary::{Dictionary, Entry, Meaning, Places, statistic, surprise};
 use super::doubt::Doubt;
 use super::folding::Sums;
 use super::noise::NoiseLaw;
 use super::null::NullLaw;
-use super::search::coordinate_search;
 use super::space::{Space, orthonormal};
 
 /// Beside other causes a signature must keep this part of its visible length to be told apart.
@@ -22,11 +21,11 @@ const SEPARABLE: f64 = 0.02;
 /// three imitate freely what none of them is.
 const ADEQUATE: [f64; 3] = [0.001, 0.001, 0.01];
 
-/// Part of a shape's first step that its search settles to.
-const PRECISION: f64 = 1e-2;
-
 /// Standard deviations of chi-squared beyond which no doubt about the state excuses a remainder.
 const FAR: f64 = 6.0;
+
+/// Part of a plausible range by which an uncertain size may lie outside it.
+const SLACK: f64 = 0.1;
 
 /// Everything that is fixed while causes are sought.
 pub(super) struct Bench<'a, M: FittedModel> {
@@ -230,67 +229,6 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         (&whole - &basis * basis.tr_mul(&whole)).norm_squared()
     }
 
-    /// The best shape of an effect beside other causes, from a start, and the statistic there.
-    pub fn refine(
-        &self,
-        state: &M,
-        readings: &DVector<f64>,
-        effect: usize,
-        start: &Shape,
-        beside: &[Cause],
-    ) -> (Cause, f64) {
-        let whole = self.residual(readings);
-        let basis = span(beside, self.space.readings());
-        let residual = &whole - &basis * basis.tr_mul(&whole);
-        let model = &self.catalogue[effect];
-        let amplitudes = model.amplitudes();
-        let positive = amplitudes.len() == 1 && amplitudes[0].low >= 0.0;
-        let adjoint = column(self.space.adjoint(as_matrix(&residual)));
-        let directions = self.space.adjoint(basis);
-        let directions: Vec<DVector<f64>> =
-            directions.column_iter().map(|c| c.clone_owned()).collect();
-        let value = |shape: &Shape| {
-            let columns = model.columns(state, shape);
-            let mut gram = self.space.gram(&columns).matrix;
-            for direction in &directions {
-                let along = products(&columns, direction);
-                gram -= &along * along.transpose();
-            }
-            let score = products(&columns, &adjoint);
-            (statistic(&gram, &score, positive), gram, score)
-        };
-        let mut shape = start.clone();
-        if shape.steps.iter().any(|s| *s != 0.0) {
-            let (values, _) = coordinate_search(&start.values, &start.steps, PRECISION, |values| {
-                let trial = Shape {
-                    values: values.to_vec(),
-                    ..start.clone()
-                };
-                if model.allowed(state, &trial) {
-                    -value(&trial).0
-                } else {
-                    f64::INFINITY
-                }
-            });
-            shape.values = values;
-        }
-        let (mut t, mut gram, mut score) = value(&shape);
-        for _ in 0..8 {
-            let Some(amplitude) = gram.clone().cholesky().map(|c| c.solve(&score)) else {
-                break;
-            };
-            let Some(next) = model.settled(&shape, amplitude.as_slice()) else {
-                break;
-            };
-            if next.values == shape.values {
-                break;
-            }
-            shape = next;
-            (t, gram, score) = value(&shape);
-        }
-        (self.cause(state, effect, shape), t)
-    }
-
     /// The start of an effect's search beside other causes: the best entry of its family.
     pub fn start(&self, remainder: &Remainder, effect: usize) -> Option<&Shape> {
         let family = self.family_of(effect)?;
@@ -353,11 +291,15 @@ impl<'a, M: FittedModel> Bench<'a, M> {
     ) -> bool {
         let effect = &self.catalogue[effect];
         let inside = effect
-            .amplitudes()
+            .amplitudes_at(shape)
             .iter()
             .zip(amplitudes)
             .zip(stds)
-            .all(|((p, a), u)| *a > p.low - 2.0 * u && *a < p.high + 2.0 * u);
+            .all(|((p, a), u)| {
+                // A size that the readings hardly know excuses none far out of range.
+                let slack = (2.0 * u).min(SLACK * (p.high - p.low));
+                *a > p.low - slack && *a < p.high + slack
+            });
         inside
             && effect.possible(self.model, shape, amplitudes)
             && effect
@@ -421,16 +363,19 @@ pub(super) fn raw_signatures<M: FittedModel>(
     }
 }
 
-fn span(causes: &[Cause], readings: usize) -> DMatrix<f64> {
+/// An orthonormal basis of the causes' signatures.
+pub(super) fn span(causes: &[Cause], readings: usize) -> DMatrix<f64> {
     let stacked = stack(causes, readings);
     let sizes: Vec<f64> = stacked.column_iter().map(|c| c.norm()).collect();
     orthonormal(&stacked, &sizes)
 }
 
-fn as_matrix(vector: &DVector<f64>) -> DMatrix<f64> {
+/// A vector as a matrix of one column.
+pub(super) fn as_matrix(vector: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_column_slice(vector.len(), 1, vector.as_slice())
 }
 
-fn column(matrix: DMatrix<f64>) -> DVector<f64> {
+/// The only column of a matrix.
+pub(super) fn column(matrix: DMatrix<f64>) -> DVector<f64> {
     matrix.column(0).clone_owned()
 }

@@ -123,7 +123,11 @@ fn elsewhere<M: FittedModel>(
         };
         let fits = near.values.len() == near.steps.len() && effect.allowed(bench.model, &near);
         let start = if fits { near } else { start };
-        let (other, _) = bench.refine(bench.model, readings, cause.effect, &start, &others);
+        let other = bench.refine_alone(bench.model, readings, cause.effect, &start, &others);
+        // One that holds this variant fits as well whatever the readings are.
+        if other.unknowns() > cause.unknowns() {
+            return None;
+        }
         let variant = effect.variant_name(bench.model, &other.shape)?;
         if !possible(bench, readings, &others, &other) {
             return None;

@@ -23,6 +23,10 @@ const WEIGHTY: f64 = 0.02;
 /// Causes whose misfits differ by less fit equally well: beside others the one of more usual size is
 /// kept.
 const TIED: f64 = 9.2;
+/// A relative of a cause that explains less than this part of what it does cannot stand for it.
+const NEAR: f64 = 0.7;
+/// A size counts from this many of its standard uncertainties on.
+const STANDS: f64 = 2.0;
 /// Evidence that differs by less is equal: of exact aliases the one of more usual size goes first.
 const EQUAL: f64 = 1e-3;
 
@@ -103,19 +107,27 @@ pub(super) fn confidence_set<M: FittedModel>(
     }
 }
 
-/// Whether the size of every cause is known to better than itself: one that may as well be nothing
-/// stands for something that it only imitates.
+/// Whether of every cause one size at least is beyond twice its standard uncertainty, that of the
+/// state included: what may as well be nothing stands for something that it only imitates.
 fn sized<M: FittedModel>(bench: &Bench<'_, M>, readings: &DVector<f64>, causes: &[Cause]) -> bool {
-    let Some(sizes) = Sizes::fitted(bench, readings, causes) else {
-        return false;
-    };
-    (0..causes.len()).all(|k| {
-        let amplitudes = bench.catalogue[causes[k].effect].amplitudes().len();
-        let own = sizes.of(bench, causes, k);
-        own.iter()
-            .take(amplitudes)
-            .any(|estimate| estimate.value.abs() > estimate.std)
-    })
+    let all = |sizes: Sizes| (0..causes.len()).all(|k| stands(bench, causes, &sizes, k));
+    // Without the state it is seen sooner.
+    Sizes::fitted(bench, readings, causes).is_some_and(all)
+        && Sizes::fitted_with_state(bench, readings, causes).is_some_and(all)
+}
+
+/// Whether one of the sizes that are told of a cause is beyond twice its standard uncertainty.
+fn stands<M: FittedModel>(
+    bench: &Bench<'_, M>,
+    causes: &[Cause],
+    sizes: &Sizes,
+    which: usize,
+) -> bool {
+    let shapes = bench.catalogue[causes[which].effect].shape_parameters();
+    let own = sizes.of(bench, causes, which);
+    own.iter()
+        .filter(|estimate| shapes.iter().all(|p| p.name != estimate.name))
+        .any(|estimate| estimate.value.abs() > STANDS * estimate.std)
 }
 
 /// Whether each of several causes, beside the others, changes the readings by more than may be left
@@ -186,13 +198,17 @@ fn alternatives<M: FittedModel>(
             continue;
         }
         let trials = if effect == best[k].effect {
-            let turned = turned(bench, &best[k]);
-            let other = turned.map(|shape| {
-                bench
-                    .refine(bench.model, readings, effect, &shape, &others)
-                    .0
-            });
-            vec![Some(best[k].clone()), other]
+            // Relatives that a state bent by the first may hide.
+            let relatives = bench.catalogue[effect].relatives(bench.model, &best[k].shape);
+            let columns = best[k].columns.len();
+            let other = |shape: Shape| {
+                let here = bench.cause(bench.model, effect, shape.clone());
+                let near = here.columns.len() <= columns && strength(&here) > NEAR * own - HOPELESS;
+                near.then(|| bench.refine_alone(bench.model, readings, effect, &shape, &others))
+            };
+            let mut own = vec![Some(best[k].clone())];
+            own.extend(relatives.into_iter().map(other));
+            own
         } else {
             if bench.p_value(&remainder, effect) > EARNED {
                 continue;
@@ -220,7 +236,10 @@ fn alternatives<M: FittedModel>(
             };
             let left = bench.judged(readings, &trial);
             let misfit = left.residual.norm_squared();
-            adequate(&trial, &left).then(|| Member {
+            let passes = adequate(&trial, &left)
+                && Sizes::fitted(bench, readings, &trial)
+                    .is_some_and(|sizes| stands(bench, &trial, &sizes, k));
+            passes.then(|| Member {
                 misfit,
                 size: part_of_plausible(bench, readings, &trial, k),
                 evidence: evidence(bench, readings, &trial, k, misfit),
@@ -301,22 +320,6 @@ fn evidence<M: FittedModel>(
     0.5 * (beside - misfit - unknowns * (bench.space.readings() as f64).ln())
 }
 
-/// The shape of a cause in the other of two variants, which a state bent by the first may hide.
-fn turned<M: FittedModel>(bench: &Bench<'_, M>, cause: &Cause) -> Option<Shape> {
-    let effect = &bench.catalogue[cause.effect];
-    let grid = effect.grid(bench.model);
-    if grid.iter().any(|shape| shape.variant > 1) {
-        return None;
-    }
-    let other = 1 - cause.shape.variant;
-    let start = grid.into_iter().find(|shape| shape.variant == other)?;
-    let same = Shape {
-        values: cause.shape.values.clone(),
-        ..start
-    };
-    (same.values.len() == same.steps.len() && effect.allowed(bench.model, &same)).then_some(same)
-}
-
 /// The greatest amplitude of a cause as a part of the plausible one.
 fn part_of_plausible<M: FittedModel>(
     bench: &Bench<'_, M>,
@@ -329,7 +332,7 @@ fn part_of_plausible<M: FittedModel>(
     };
     let from: usize = causes[..k].iter().map(|c| c.projected.ncols()).sum();
     bench.catalogue[causes[k].effect]
-        .amplitudes()
+        .amplitudes_at(&causes[k].shape)
         .iter()
         .zip(amplitudes.iter().skip(from))
         .map(|(p, a)| a.abs() / p.low.abs().max(p.high.abs()))

@@ -142,14 +142,13 @@ impl Dictionary {
         };
         let folding = &places.folding;
         for effect in catalogue {
-            let amplitudes = effect.amplitudes();
-            let positive = amplitudes.len() == 1 && amplitudes[0].low >= 0.0;
             let built = effect
                 .grid(model)
                 .into_par_iter()
                 .map(|shape| {
                     let columns = effect.columns(model, &shape);
                     let folded = columns.iter().map(|c| folding.fold(c)).collect();
+                    let positive = is_positive(effect.as_ref(), &shape);
                     entry(Meaning::Effect(shape), &columns, folded, positive, space)
                 })
                 .collect();
@@ -191,6 +190,11 @@ impl Dictionary {
             visible,
         });
     }
+}
+
+/// Whether only positive amplitudes of an effect are possible.
+pub(super) fn is_positive<M>(effect: &dyn Effect<M>, shape: &Shape) -> bool {
+    matches!(effect.amplitudes_at(shape).as_slice(), [only] if only.low >= 0.0)
 }
 
 /// Eᵀ a.

@@ -11,6 +11,9 @@ use super::verdict::{Harm, Hidden, INVISIBLE};
 /// Normal quantile of 80 % power.
 const POWER: f64 = 0.8416;
 
+/// Harms whose ratio is below this are equal.
+const EQUAL: f64 = 1.0 + 1e-6;
+
 /// What these readings would not have shown, for every effect that is not named.
 pub(super) fn hidden<M: FittedModel>(
     bench: &Bench<'_, M>,
@@ -50,8 +53,12 @@ pub(super) fn hidden<M: FittedModel>(
         let harm = column.and_then(|column| {
             quantities
                 .iter()
-                .map(|(q, std)| (q, q.weights.dot(&column), *std))
-                .max_by(|a, b| (a.1.abs() / a.2).total_cmp(&(b.1.abs() / b.2)))
+                .map(|(q, std)| {
+                    let bias = q.weights.dot(&column);
+                    (q, bias, bias.abs() / *std)
+                })
+                // Of equal harms that to the quantity named first.
+                .reduce(|most, next| if next.2 > EQUAL * most.2 { next } else { most })
                 .map(|(q, per_unit, _)| Harm {
                     quantity: q.name.clone(),
                     per_unit,

@@ -25,6 +25,7 @@ mod places;
 mod posterior;
 mod prove;
 mod quantify;
+mod refine;
 mod refit;
 mod report;
 mod scatter;

@@ -6,6 +6,8 @@
 //! noise is itself an estimate: each draw is made by a law that the repeats allow (`posterior.rs`)
 //! and seen through the whitening of the estimated one.
 
+use std::collections::BTreeMap;
+
 use errsep_models::model::FittedModel;
 use nalgebra::DMatrix;
 use rand::SeedableRng;
@@ -189,10 +191,13 @@ fn greatest<M: FittedModel>(
     let adjoint = dictionary.places.batch_sums::<BATCH>(&space.adjoint(left));
     let mut rows: Vec<Vec<f64>> = vec![vec![0.0; dictionary.families.len()]; BATCH];
     for (place, family) in dictionary.families.iter().enumerate() {
+        // Signatures of one, two … columns are weighed each by its own law.
+        let mut greatest: BTreeMap<usize, [f64; BATCH]> = BTreeMap::new();
         for entry in &dictionary.entries[family.entries.clone()] {
+            let most = greatest.entry(entry.order()).or_insert([0.0; BATCH]);
             let products = entry.batch_products(&adjoint);
             let inverse = inverse(&entry.gram);
-            for (draw, row) in rows.iter_mut().enumerate() {
+            for (draw, most) in most.iter_mut().enumerate() {
                 let score = |k: usize| f64::from(products[k][draw]);
                 let t = if entry.positive && score(0) <= 0.0 {
                     0.0
@@ -202,15 +207,13 @@ fn greatest<M: FittedModel>(
                         .map(|(i, j)| score(i) * inverse[(i, j)] * score(j))
                         .sum()
                 };
-                row[place] = row[place].max(t);
+                *most = most.max(t);
             }
         }
-        // All entries of a family have the same number of columns.
-        let freedom = dictionary.entries[family.entries.clone()]
-            .first()
-            .map_or(1, |e| e.order());
-        for row in &mut rows {
-            row[place] = surprise(row[place], freedom);
+        for (order, most) in greatest {
+            for (row, t) in rows.iter_mut().zip(most) {
+                row[place] = row[place].max(surprise(t, order));
+            }
         }
     }
     for (row, misfit) in rows.iter_mut().zip(misfits) {

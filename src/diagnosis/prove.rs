@@ -139,10 +139,6 @@ fn sealed_change<M: FittedModel>(
     random: &mut ChaCha8Rng,
 ) -> Option<DVector<f64>> {
     let description = &bench.catalogue[effect];
-    let positive = description
-        .amplitudes()
-        .first()
-        .is_some_and(|p| p.low >= 0.0);
     let grid = description.grid(bench.model);
     let n = bench.space.readings();
     for _ in 0..30 {
@@ -159,10 +155,10 @@ fn sealed_change<M: FittedModel>(
         }
         let size = bench.law.sigma() * (0.7 + 2.3 * random.random::<f64>());
         let mut amplitudes: Vec<f64> = description
-            .amplitudes()
+            .amplitudes_at(&shape)
             .iter()
-            .map(|_| {
-                let sign = if positive || random.random_bool(0.5) {
+            .map(|parameter| {
+                let sign = if parameter.low >= 0.0 || random.random_bool(0.5) {
                     1.0
                 } else {
                     -1.0

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::Column;
 
 /// A parameter of an effect with its unit and the range in which it is physically plausible.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
     /// Name in tables and JSON.
     pub name: &'static str,
@@ -131,8 +131,14 @@ pub trait Effect<M>: Send + Sync {
     /// Physics, confirmation and source.
     fn about(&self) -> About;
 
-    /// The parameters that enter linearly, one signature each.
+    /// The parameters that enter linearly, one signature each; where variants differ in them, those
+    /// of the fullest.
     fn amplitudes(&self) -> Vec<Parameter>;
+
+    /// The parameters that enter linearly at a shape: a variant may have fewer than another.
+    fn amplitudes_at(&self, _shape: &Shape) -> Vec<Parameter> {
+        self.amplitudes()
+    }
 
     /// The parameters that enter nonlinearly.
     fn shape_parameters(&self) -> Vec<Parameter> {
@@ -142,6 +148,13 @@ pub trait Effect<M>: Send + Sync {
     /// The shapes at which the search begins, dense enough that the best is near one of them.
     fn grid(&self, _model: &M) -> Vec<Shape> {
         vec![Shape::only()]
+    }
+
+    /// Members of the family that one found by searching is compared with: another section of a
+    /// bump, one indicator in place of both. Each is searched from where it stands, and the one of
+    /// greatest evidence is kept.
+    fn relatives(&self, _model: &M, _shape: &Shape) -> Vec<Shape> {
+        Vec::new()
     }
 
     /// The change of the readings per unit of each amplitude, at the fitted state of the model.
@@ -220,7 +233,10 @@ pub trait Effect<M>: Send + Sync {
         covariance: &DMatrix<f64>,
     ) -> Vec<Estimate> {
         let values = amplitudes.iter().chain(&shape.values);
-        let names = self.amplitudes().into_iter().chain(self.shape_parameters());
+        let names = self
+            .amplitudes_at(shape)
+            .into_iter()
+            .chain(self.shape_parameters());
         values
             .zip(names)
             .enumerate()

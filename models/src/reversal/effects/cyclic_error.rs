@@ -1,14 +1,32 @@
-//! An error that comes back periodically.
+//! An error that comes back with a fixed period.
+//!
+//! Of the reading: the interpolation error of an incremental indicator, of one or of both, each with
+//! its own amplitude and phase, up to two readings a period; the reading climbs unevenly, so that
+//! periods stay apart up to there. Of the position: the part of a screw's or rack's period that the
+//! slide's form cannot take up, different in the two spindle positions. Free: amplitude and phase of
+//! each indicator, the period, told by its cycles over the span of the readings or the travel.
 
 use nalgebra::DMatrix;
 
-use super::FirstOrder;
+use super::indicators::{BOTH, FAR, NEAR, apart, scopes, signs};
+use super::{FirstOrder, rotating, rotations};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Link, Parameter, Shape};
 
-/// See the head of the file. Variants: 0, periodic in the reading (interpolation error of an
-/// incremental indicator); 1, periodic in position and different in the two spindle positions
-/// (the part of a screw's or rack's period that the slide's form cannot take up).
+/// See the head of the file. Variants: the indicators, then [`DRIVE`].
 pub(super) struct CyclicError;
+
+/// Variant of a period of the position.
+const DRIVE: usize = 3;
+
+/// Cycles between neighbouring starts of the search: the peak of a period is one cycle wide.
+const STRIDE: f64 = 0.4;
+
+/// Greatest slope of a period of the reading: its amplitude is half the period. Beyond, readings a
+/// whole period apart show the same, and none tells what was seen.
+const STEEPEST: f64 = std::f64::consts::PI;
+
+/// Fewest cycles: less is a bend.
+const FEWEST: f64 = 3.0;
 
 impl Effect<FirstOrder> for CyclicError {
     fn name(&self) -> &str {
@@ -28,39 +46,45 @@ impl Effect<FirstOrder> for CyclicError {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        let part = |name| Parameter {
-            name,
-            unit: "um",
-            low: -100.0,
-            high: 100.0,
-        };
-        vec![part("cosine"), part("sine")]
+        self.amplitudes_at(&Shape::variant(BOTH))
+    }
+
+    fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
+        rotations(if shape.variant == BOTH { 2 } else { 1 }, 100.0)
     }
 
     fn shape_parameters(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "cycles",
-            unit: "1",
-            low: 1.0,
-            high: 1e6,
-        }]
+        vec![Parameter::between("cycles", "1", 1.0, 1e6)]
     }
 
+    /// Both indicators are found from either.
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
-        let highest = 0.25 * model.positions().len() as f64;
+        let alone = scopes(model).iter().copied().filter(|s| *s != BOTH);
         let mut shapes = Vec::new();
-        for variant in 0..2 {
-            let mut cycles = 3.0;
-            while cycles <= highest {
+        for variant in alone.chain([DRIVE]) {
+            let mut cycles = FEWEST;
+            while cycles <= highest(model) {
                 shapes.push(Shape {
                     variant,
                     values: vec![cycles],
-                    steps: vec![0.2],
+                    steps: vec![0.5 * STRIDE],
                 });
-                cycles += 0.4;
+                cycles += STRIDE;
             }
         }
         shapes
+    }
+
+    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+        let other = |variant: &usize| Shape {
+            variant: *variant,
+            ..shape.clone()
+        };
+        if shape.variant == DRIVE {
+            return Vec::new();
+        }
+        let others = scopes(model).iter().filter(|s| **s != shape.variant);
+        others.map(other).collect()
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
@@ -68,43 +92,43 @@ impl Effect<FirstOrder> for CyclicError {
             return Vec::new();
         };
         let turn = std::f64::consts::TAU * cycles;
-        let first = model.positions().first().copied().unwrap_or(0.0);
-        let of_travel = |function: fn(f64) -> f64| {
-            let values: Vec<f64> = model
-                .positions()
-                .iter()
-                .map(|x| function(turn * (x - first) / model.travel()))
-                .collect();
+        if shape.variant == DRIVE {
+            let first = model.positions().first().copied().unwrap_or(0.0);
+            let per_mm = turn / model.travel();
             // In one spindle position only; the fit spreads it over both.
-            Column::from_places(model.places(), |_, place| {
-                let seen = model.channel(place).spindle_sign() > 0.0;
-                f64::from(seen) * values[place.cell % values.len()]
-            })
-        };
+            let wave = |function: fn(f64) -> f64| {
+                Column::from_places(model.places(), |_, place| {
+                    let seen = model.channel(place).spindle_sign() > 0.0;
+                    f64::from(seen) * function(per_mm * (place.x - first))
+                })
+            };
+            return vec![wave(f64::cos), wave(f64::sin)];
+        }
+        let per_um = turn / model.reading_span();
         let wave = |function: fn(f64) -> f64| {
-            if shape.variant == 0 {
-                model.of_reading(|reading| function(turn * reading / model.reading_span()))
-            } else {
-                of_travel(function)
-            }
+            let whole = model.of_reading(|reading| function(per_um * reading));
+            apart(model, shape.variant, &whole)
         };
-        vec![wave(f64::cos), wave(f64::sin)]
+        // The cosine and the sine of each indicator stand together.
+        let pairs = wave(f64::cos).into_iter().zip(wave(f64::sin));
+        pairs.flat_map(|(cosine, sine)| [cosine, sine]).collect()
     }
 
     fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
-        let highest = 0.3 * model.positions().len() as f64;
+        let reach = FEWEST - 0.5..highest(model) + 0.5;
         shape
             .values
             .first()
-            .is_some_and(|cycles| *cycles > 2.5 && *cycles < highest)
+            .is_some_and(|cycles| reach.contains(cycles))
     }
 
     fn possible(&self, model: &FirstOrder, shape: &Shape, amplitudes: &[f64]) -> bool {
-        let (&[cosine, sine], Some(&cycles)) = (amplitudes, shape.values.first()) else {
+        let Some(&cycles) = shape.values.first() else {
             return true;
         };
         let steepest = std::f64::consts::TAU * cycles / model.reading_span();
-        shape.variant != 0 || cosine.hypot(sine) * steepest < 1.0
+        let holds = |wave: &[f64]| wave[0].hypot(wave[1]) * steepest < STEEPEST;
+        shape.variant == DRIVE || amplitudes.chunks_exact(2).all(holds)
     }
 
     /// A period of the reading is told by its cycles over the span of the readings.
@@ -116,7 +140,7 @@ impl Effect<FirstOrder> for CyclicError {
         amplitudes: &[f64],
     ) -> (Shape, Vec<f64>) {
         let mut shape = shape.clone();
-        if shape.variant == 0 {
+        if shape.variant != DRIVE {
             let grown = to.reading_span() / from.reading_span();
             shape.values.iter_mut().for_each(|cycles| *cycles *= grown);
         }
@@ -125,14 +149,21 @@ impl Effect<FirstOrder> for CyclicError {
 
     fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
         let cycles = shape.values.first()?;
-        Some(if shape.variant == 0 {
-            format!(
-                "period {:.4} µm of the reading",
-                model.reading_span() / cycles
-            )
-        } else {
-            format!("period {:.4} mm of the travel", model.travel() / cycles)
-        })
+        let of = match shape.variant {
+            DRIVE => {
+                return Some(format!(
+                    "period {:.4} mm of the travel",
+                    model.travel() / cycles
+                ));
+            }
+            NEAR => "near indicator's reading",
+            FAR => "far indicator's reading",
+            _ => "reading",
+        };
+        Some(format!(
+            "period {:.4} µm of the {of}",
+            model.reading_span() / cycles
+        ))
     }
 
     fn estimates(
@@ -141,26 +172,22 @@ impl Effect<FirstOrder> for CyclicError {
         amplitudes: &[f64],
         covariance: &DMatrix<f64>,
     ) -> Vec<Estimate> {
-        let (&[cosine, sine], Some(&cycles)) = (amplitudes, shape.values.first()) else {
-            return Vec::new();
+        let waves = if shape.variant == DRIVE {
+            1
+        } else {
+            signs(shape.variant).len()
         };
-        let size = cosine.hypot(sine).max(f64::MIN_POSITIVE);
-        let (c, s) = (cosine / size, sine / size);
-        let at = |i: usize, j: usize| covariance.get((i, j)).map_or(f64::NAN, |v| *v);
-        let variance = c * c * at(0, 0) + 2.0 * c * s * at(0, 1) + s * s * at(1, 1);
-        vec![
-            Estimate {
-                name: "amplitude".to_owned(),
-                value: size,
-                std: variance.max(0.0).sqrt(),
-                unit: "um".to_owned(),
-            },
-            Estimate {
-                name: "cycles".to_owned(),
-                value: cycles,
-                std: at(2, 2).max(0.0).sqrt(),
-                unit: "1".to_owned(),
-            },
-        ]
+        rotating(
+            waves,
+            shape,
+            amplitudes,
+            covariance,
+            &self.shape_parameters(),
+        )
     }
+}
+
+/// Most cycles: two readings a period.
+fn highest(model: &FirstOrder) -> f64 {
+    0.5 * model.positions().len() as f64
 }

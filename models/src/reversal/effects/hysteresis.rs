@@ -1,16 +1,19 @@
 //! The indicator lags behind its stylus: a play between stylus and pointer.
+//!
+//! The lag saturates at half the width once the stylus has moved by the width, so the signature
+//! depends on the size where the reading turns round within a trace. Where the pointer stands when a
+//! trace begins depends on what came before: a place within the play, −1 to 1, for the forward and
+//! the backward traces of every channel. Free: a width for each indicator, the beginnings.
 
 use std::ops::Range;
 
 use nalgebra::DVector;
 
 use super::FirstOrder;
+use super::indicators::{BOTH, others, scopes, signs, sizes, words};
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
-/// See the head of the file. The lag saturates at half the width once the stylus has moved by the
-/// width, so the signature depends on the size where the reading turns round within a trace. Where
-/// the pointer stands when a trace begins depends on what came before: a place within the play,
-/// −1 to 1, for the forward and the backward traces of every channel.
+/// See the head of the file. Variants: the indicators.
 pub(super) struct Hysteresis;
 
 /// A pointer moves where its slope is at least this part of the other direction's.
@@ -34,77 +37,63 @@ impl Effect<FirstOrder> for Hysteresis {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "width",
-            unit: "um",
-            low: 0.0,
-            high: 50.0,
-        }]
+        self.amplitudes_at(&Shape::variant(BOTH))
+    }
+
+    fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
+        let width = Parameter::between("width", "um", 0.0, 50.0);
+        sizes(shape.variant, ["width", "near-width", "far-width"], &width)
     }
 
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
-        // The play is taken up in the direction in which a trace begins, as the slide comes from
-        // before its first position; where the form is level there, the search finds the side.
-        let mut beginnings = vec![0.0; 2 * model.present().len()];
-        for trace in model.traces() {
-            let first = first_of(model, trace);
-            let place = &model.places()[first];
-            beginnings[beginning_of(model, trace)] =
-                -(place.direction * model.reading_slope(place)).signum();
-        }
-        [1e-3, 1e-2, 3e-2, 1e-1]
-            .iter()
-            .enumerate()
-            .map(|(variant, part)| {
-                let mut values = vec![part * model.reading_span()];
-                values.extend(&beginnings);
-                let mut steps = vec![1.0; values.len()];
-                steps[0] = 0.0;
-                Shape {
-                    variant,
-                    values,
-                    steps,
+        let span = model.reading_span();
+        let of = |scope: &usize| {
+            let scope = *scope;
+            let parts = [1e-3, 1e-2, 3e-2, 1e-1].into_iter();
+            parts.map(move |part| started(model, scope, &[part * span, part * span]))
+        };
+        scopes(model).iter().flat_map(of).collect()
+    }
+
+    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+        let count = signs(shape.variant).len();
+        let (widths, beginnings) = shape.values.split_at(count.min(shape.values.len()));
+        let other = |variant: usize| {
+            let near_far = match widths {
+                [near, far] => [*near, *far],
+                [one] => [*one, *one],
+                _ => [0.0, 0.0],
+            };
+            let mut other = started(model, variant, &near_far);
+            let from = signs(variant).len();
+            // Where its own pointers stand is known already.
+            let own = |k: usize| shape.steps.get(count + k).is_some_and(|s| *s != 0.0);
+            for (k, begins) in beginnings.iter().enumerate().filter(|(k, _)| own(*k)) {
+                if let Some(value) = other.values.get_mut(from + k) {
+                    *value = *begins;
                 }
-            })
-            .collect()
+            }
+            other
+        };
+        others(model, shape.variant).map(other).collect()
     }
 
     fn allowed(&self, _model: &FirstOrder, shape: &Shape) -> bool {
-        shape
-            .values
-            .iter()
-            .skip(1)
-            .all(|v| (-1.0..=1.0).contains(v))
+        let beginnings = shape.values.iter().skip(signs(shape.variant).len());
+        beginnings.into_iter().all(|v| (-1.0..=1.0).contains(v))
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
-        let Some(&width) = shape.values.first() else {
+        let signs = signs(shape.variant);
+        if shape.values.len() < signs.len() {
             return Vec::new();
-        };
-        let half = 0.5 * width.max(1e-6 * model.reading_span());
-        let places = model.places();
-        let mut column = Column::default();
-        for trace in model.traces() {
-            let begins = shape
-                .values
-                .get(1 + beginning_of(model, trace))
-                .copied()
-                .unwrap_or(0.0);
-            let forward = places[trace.start].direction > 0.0;
-            let mut pointer = model.smooth_reading(first_of(model, trace)) + begins * half;
-            for step in 0..trace.len() {
-                let k = if forward {
-                    trace.start + step
-                } else {
-                    trace.end - 1 - step
-                };
-                let stylus = model.smooth_reading(k);
-                pointer = pointer.clamp(stylus - half, stylus + half);
-                column.rows.push(k);
-                column.values.push((pointer - stylus) / (2.0 * half));
-            }
         }
-        vec![column]
+        let of = |(sign, width): (&f64, &f64)| lag(model, shape, *sign, *width);
+        signs.iter().zip(&shape.values).map(of).collect()
+    }
+
+    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+        Some(words(shape.variant).to_owned())
     }
 
     /// Where the stylus turns round within the play the pointer stands still and tells nothing of
@@ -154,14 +143,71 @@ impl Effect<FirstOrder> for Hysteresis {
     }
 
     fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
-        amplitudes.first().map(|&width| {
-            let mut settled = shape.clone();
-            if let Some(value) = settled.values.first_mut() {
-                *value = width.max(0.0);
-            }
-            settled
-        })
+        let mut settled = shape.clone();
+        for (value, width) in settled.values.iter_mut().zip(amplitudes) {
+            *value = width.max(0.0);
+        }
+        Some(settled)
     }
+}
+
+/// The start of a search: widths of the near and the far indicator, as far as the variant has them,
+/// then the beginnings. The play is taken up in the direction in which a trace begins, as the slide
+/// comes from before its first position; where the form is level there, the search finds the side.
+fn started(model: &FirstOrder, variant: usize, near_far: &[f64; 2]) -> Shape {
+    let signs = signs(variant);
+    let mut values: Vec<f64> = signs
+        .iter()
+        .map(|sign| near_far[usize::from(*sign < 0.0)])
+        .collect();
+    let mut steps = vec![0.0; values.len()];
+    let mut beginnings = vec![(0.0, 0.0); 2 * model.present().len()];
+    for trace in model.traces() {
+        let place = &model.places()[first_of(model, trace)];
+        if signs.contains(&model.channel(place).indicator_sign()) {
+            let begins = -(place.direction * model.reading_slope(place)).signum();
+            beginnings[beginning_of(model, trace)] = (begins, 1.0);
+        }
+    }
+    values.extend(beginnings.iter().map(|b| b.0));
+    steps.extend(beginnings.iter().map(|b| b.1));
+    Shape {
+        variant,
+        values,
+        steps,
+    }
+}
+
+/// How far the pointers of one indicator are behind, per unit of its play.
+fn lag(model: &FirstOrder, shape: &Shape, sign: f64, width: f64) -> Column {
+    let half = 0.5 * width.max(1e-6 * model.reading_span());
+    let places = model.places();
+    let first = signs(shape.variant).len();
+    let mut column = Column::default();
+    for trace in model.traces() {
+        if model.channel(&places[trace.start]).indicator_sign() != sign {
+            continue;
+        }
+        let begins = shape
+            .values
+            .get(first + beginning_of(model, trace))
+            .copied()
+            .unwrap_or(0.0);
+        let forward = places[trace.start].direction > 0.0;
+        let mut pointer = model.smooth_reading(first_of(model, trace)) + begins * half;
+        for step in 0..trace.len() {
+            let k = if forward {
+                trace.start + step
+            } else {
+                trace.end - 1 - step
+            };
+            let stylus = model.smooth_reading(k);
+            pointer = pointer.clamp(stylus - half, stylus + half);
+            column.rows.push(k);
+            column.values.push((pointer - stylus) / (2.0 * half));
+        }
+    }
+    column
 }
 
 /// The reading with which a trace begins.

@@ -1,11 +1,15 @@
-//! The indicator's reading is not proportional to its displacement.
+//! An indicator's reading is not proportional to its displacement.
+//!
+//! The calibration curve bends about the indicator's zero: quadratic (a lever at an angle) or cubic
+//! (a transducer near the end of its range), as the deviation at the greatest reading of all. One of
+//! the indicators is curved, or both, each by its own amount. A gain alone is `gain-mismatch`.
+//! Free: a deviation for each indicator.
 
 use super::FirstOrder;
+use super::indicators::{SCOPES, apart, scopes, sizes, words};
 use crate::model::{About, Column, Effect, Link, Parameter, Shape};
 
-/// See the head of the file. Variants: quadratic (lever at an angle) and cubic (transducer near the
-/// end of its range), both as the deviation at the
-/// greatest reading off the indicator's zero.
+/// See the head of the file. Variants: the indicators, quadratic and from [`SCOPES`] on cubic.
 pub(super) struct IndicatorNonlinearity;
 
 impl Effect<FirstOrder> for IndicatorNonlinearity {
@@ -15,7 +19,7 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
 
     fn about(&self) -> About {
         About {
-            physics: "both indicators read a curved function of the displacement, so large and small readings are scaled differently",
+            physics: "an indicator reads a curved function of the displacement, so large and small readings are scaled differently",
             confirm: "calibrate the indicator over the span of the readings, or align so that the readings stay small",
             source: "second and third term of the calibration curve; cosine error of a lever-type indicator",
         }
@@ -26,27 +30,42 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "deviation",
-            unit: "um",
-            low: -200.0,
-            high: 200.0,
-        }]
+        self.amplitudes_at(&Shape::only())
     }
 
-    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
-        vec![Shape::variant(0), Shape::variant(1)]
+    fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
+        let deviation = Parameter::symmetric("deviation", "um", 200.0);
+        let names = ["deviation", "near-deviation", "far-deviation"];
+        sizes(shape.variant, names, &deviation)
+    }
+
+    fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
+        let kinds = [0, SCOPES].into_iter();
+        kinds
+            .flat_map(|kind| {
+                scopes(model)
+                    .iter()
+                    .map(move |scope| Shape::variant(kind + scope))
+            })
+            .collect()
+    }
+
+    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+        let mut all = self.grid(model);
+        all.retain(|other| other.variant != shape.variant);
+        all
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let reach = model.reading_reach();
-        vec![model.of_reading(|reading| (reading / reach).powi(power(shape)))]
+        let bend = model.of_reading(|reading| (reading / reach).powi(power(shape)));
+        apart(model, shape.variant, &bend)
     }
 
     fn possible(&self, model: &FirstOrder, shape: &Shape, amplitudes: &[f64]) -> bool {
         let steepest = f64::from(power(shape)) / model.reading_reach();
         // A cube of the reading makes the slope smaller with one sign only, a square with either.
-        let falls = |a: f64| if shape.variant == 0 { a.abs() } else { -a };
+        let falls = |a: f64| if power(shape) == 2 { a.abs() } else { -a };
         amplitudes.iter().all(|a| falls(*a) * steepest < 1.0)
     }
 
@@ -66,17 +85,15 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
     }
 
     fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
-        Some(
-            if shape.variant == 0 {
-                "quadratic"
-            } else {
-                "cubic"
-            }
-            .to_owned(),
-        )
+        let kind = if power(shape) == 2 {
+            "quadratic"
+        } else {
+            "cubic"
+        };
+        Some(format!("{kind}, {}", words(shape.variant)))
     }
 }
 
 fn power(shape: &Shape) -> i32 {
-    if shape.variant == 0 { 2 } else { 3 }
+    if shape.variant < SCOPES { 2 } else { 3 }
 }

@@ -1,13 +1,22 @@
-//! A chip or a film of dirt under the stylus at one place.
+//! Dirt or a scratch under the stylus at one place.
+//!
+//! A bump of either sign: Gaussian (a chip), flat-topped (a film) or triangular (a scratch, a burr).
+//! It only shows where it was not always there: in one channel (it came or went when the spindle was
+//! turned) or in one repeat of one channel. Free: height, place, width, section, channel or trace.
 
 use super::FirstOrder;
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
-/// See the head of the file. It only shows where it was not always there: in one channel (it came
-/// or went when the spindle was turned) or in one repeat of one channel.
-///
-/// Variants: channel · (repeats + 1) + 0 for all repeats, or + the place of the repeat.
+/// See the head of the file. Variants: section · channels · (repeats + 1) + channel · (repeats + 1)
+/// + 0 for all repeats, or + the place of the repeat.
 pub(super) struct LocalContamination;
+
+/// Sections of unit height, by the distance from the middle in widths, and their names.
+const SECTIONS: [(fn(f64) -> f64, &str); 3] = [
+    (|away| (-0.5 * away * away).exp(), "Gaussian"),
+    (|away| (-0.5 * away.powi(8)).exp(), "flat-topped"),
+    (|away| (1.0 - 0.45 * away.abs()).max(0.0), "triangular"),
+];
 
 impl Effect<FirstOrder> for LocalContamination {
     fn name(&self) -> &str {
@@ -16,9 +25,9 @@ impl Effect<FirstOrder> for LocalContamination {
 
     fn about(&self) -> About {
         About {
-            physics: "dirt lifts the stylus at one place in one channel or one repeat",
+            physics: "dirt lifts the stylus, or a scratch lets it fall, at one place in one channel or one repeat",
             confirm: "wipe the artefact there and measure that trace again",
-            source: "bump of Gaussian section, always towards the indicator",
+            source: "bump of Gaussian, flat-topped or triangular section",
         }
     }
 
@@ -27,36 +36,22 @@ impl Effect<FirstOrder> for LocalContamination {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "height",
-            unit: "um",
-            low: 0.0,
-            high: 500.0,
-        }]
+        vec![Parameter::symmetric("height", "um", 500.0)]
     }
 
     fn shape_parameters(&self) -> Vec<Parameter> {
         vec![
-            Parameter {
-                name: "position",
-                unit: "mm",
-                low: -1e6,
-                high: 1e6,
-            },
-            Parameter {
-                name: "log-width",
-                unit: "ln mm",
-                low: -20.0,
-                high: 20.0,
-            },
+            Parameter::symmetric("position", "mm", 1e6),
+            Parameter::symmetric("log-width", "ln mm", 20.0),
         ]
     }
 
+    /// The Gaussian bumps; the other sections are found from them.
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
         let repeats = model.repeats();
         let x = model.positions();
         let first = x.first().copied().unwrap_or(0.0);
-        let spacing = model.travel() / (x.len() - 1) as f64;
+        let spacing = spacing(model);
         let mut shapes = Vec::new();
         for channel in 0..model.present().len() {
             // With one repeat that repeat is the channel.
@@ -84,16 +79,30 @@ impl Effect<FirstOrder> for LocalContamination {
         shapes
     }
 
+    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+        let places = places(model);
+        (0..SECTIONS.len())
+            .map(|section| section * places + shape.variant % places)
+            .filter(|variant| *variant != shape.variant)
+            .map(|variant| Shape {
+                variant,
+                ..shape.clone()
+            })
+            .collect()
+    }
+
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let &[position, log_width] = shape.values.as_slice() else {
             return Vec::new();
         };
         let repeats = model.repeats();
-        let channel = shape.variant / (repeats.len() + 1);
-        let repeat = match shape.variant % (repeats.len() + 1) {
+        let place = shape.variant % places(model);
+        let channel = place / (repeats.len() + 1);
+        let repeat = match place % (repeats.len() + 1) {
             0 => None,
             k => repeats.get(k - 1),
         };
+        let (section, _) = SECTIONS[(shape.variant / places(model)).min(SECTIONS.len() - 1)];
         let width = log_width.exp();
         let mut column = Column::default();
         for trace in model.traces() {
@@ -105,7 +114,7 @@ impl Effect<FirstOrder> for LocalContamination {
                 let away = (model.places()[k].x - position) / width;
                 if away.abs() < 5.0 {
                     column.rows.push(k);
-                    column.values.push((-0.5 * away * away).exp());
+                    column.values.push(section(away));
                 }
             }
         }
@@ -117,20 +126,33 @@ impl Effect<FirstOrder> for LocalContamination {
         else {
             return false;
         };
-        let spacing = model.travel() / (model.positions().len() - 1) as f64;
         matches!(shape.values.as_slice(), &[position, log_width]
             if (*first..=*last).contains(&position)
-                && log_width.exp() > 0.4 * spacing
+                && log_width.exp() > 0.4 * spacing(model)
                 // Anything wider is no chip but a form.
                 && log_width.exp() < 0.08 * model.travel())
     }
 
     fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
         let repeats = model.repeats();
-        let channel = model.present().get(shape.variant / (repeats.len() + 1))?;
-        Some(match shape.variant % (repeats.len() + 1) {
-            0 => format!("channel {}", channel.name()),
-            k => format!("channel {}, repeat {}", channel.name(), repeats.get(k - 1)?),
+        let place = shape.variant % places(model);
+        let channel = model.present().get(place / (repeats.len() + 1))?.name();
+        let (_, section) = SECTIONS.get(shape.variant / places(model))?;
+        Some(match place % (repeats.len() + 1) {
+            0 => format!("{section}, channel {channel}"),
+            k => format!(
+                "{section}, channel {channel}, repeat {}",
+                repeats.get(k - 1)?
+            ),
         })
     }
+}
+
+/// Number of channels and traces in which a bump may lie.
+fn places(model: &FirstOrder) -> usize {
+    model.present().len() * (model.repeats().len() + 1)
+}
+
+fn spacing(model: &FirstOrder) -> f64 {
+    model.travel() / (model.positions().len() - 1) as f64
 }

@@ -3,36 +3,49 @@
 //! To add an effect, write its file and add it to [`all`]; the tests that inject every effect
 //! blind find it there.
 
+mod ambient_cycle;
 mod axis_backlash;
 mod common_gain;
 mod cyclic_error;
 mod gain_mismatch;
 mod gravity_sag;
 mod hysteresis;
+mod indexing_error;
 mod indicator_nonlinearity;
+mod indicators;
+mod lateral_backlash;
 mod local_contamination;
+mod off_crest;
 mod reversal_shift;
+mod stick_slip;
 mod taper;
 mod thermal_drift;
 mod thickness_shift;
 mod tip_radius;
 mod zero_jump;
 
+use nalgebra::DMatrix;
+
 use super::diagnosable::FirstOrder;
-use crate::model::{Effect, Shape};
+use crate::model::{Effect, Estimate, Parameter, Shape};
 
 /// The catalogue.
 pub fn all() -> Vec<Box<dyn Effect<FirstOrder>>> {
     vec![
+        Box::new(ambient_cycle::AmbientCycle),
         Box::new(axis_backlash::AxisBacklash),
         Box::new(common_gain::CommonGain),
         Box::new(cyclic_error::CyclicError),
         Box::new(gain_mismatch::GainMismatch),
         Box::new(gravity_sag::GravitySag),
         Box::new(hysteresis::Hysteresis),
+        Box::new(indexing_error::IndexingError),
         Box::new(indicator_nonlinearity::IndicatorNonlinearity),
+        Box::new(lateral_backlash::LateralBacklash),
         Box::new(local_contamination::LocalContamination),
+        Box::new(off_crest::OffCrest),
         Box::new(reversal_shift::ReversalShift),
+        Box::new(stick_slip::StickSlip),
         Box::new(taper::Taper),
         Box::new(thermal_drift::ThermalDrift),
         Box::new(thickness_shift::ThicknessShift),
@@ -55,4 +68,67 @@ fn settled_at(shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
         steps: vec![0.0],
         ..shape.clone()
     })
+}
+
+/// A position as a part of the travel, −1 to 1.
+fn part_of_travel(model: &FirstOrder, x: f64) -> f64 {
+    let first = model.positions().first().copied().unwrap_or(0.0);
+    2.0 * (x - first) / model.travel() - 1.0
+}
+
+/// Standard uncertainty of a weighted sum of parameters.
+fn spread(covariance: &DMatrix<f64>, weights: &[(usize, f64)]) -> f64 {
+    let at = |i: usize, j: usize| covariance.get((i, j)).map_or(f64::NAN, |v| *v);
+    let terms = weights
+        .iter()
+        .flat_map(|(i, w)| weights.iter().map(move |(j, v)| w * v * at(*i, *j)));
+    terms.sum::<f64>().clamp(0.0, f64::INFINITY).sqrt()
+}
+
+/// The amplitudes of waves: a cosine and a sine for one indicator, or for each.
+fn rotations(waves: usize, reach: f64) -> Vec<Parameter> {
+    let names: &[&'static str] = if waves == 1 {
+        &["cosine", "sine"]
+    } else {
+        &["near-cosine", "near-sine", "far-cosine", "far-sine"]
+    };
+    let part = |name: &&'static str| Parameter::symmetric(name, "um", reach);
+    names.iter().map(part).collect()
+}
+
+/// What is told of waves: the amplitude of each, then the parameters of their shape.
+fn rotating(
+    waves: usize,
+    shape: &Shape,
+    amplitudes: &[f64],
+    covariance: &DMatrix<f64>,
+    parameters: &[Parameter],
+) -> Vec<Estimate> {
+    let names: &[&str] = if waves == 1 {
+        &["amplitude"]
+    } else {
+        &["near-amplitude", "far-amplitude"]
+    };
+    let pairs = amplitudes.chunks_exact(2).enumerate();
+    let mut told: Vec<Estimate> = pairs
+        .zip(names)
+        .map(|((k, pair), name)| {
+            let size = pair[0].hypot(pair[1]).max(f64::MIN_POSITIVE);
+            let along = [(2 * k, pair[0] / size), (2 * k + 1, pair[1] / size)];
+            Estimate {
+                name: (*name).to_owned(),
+                value: size,
+                std: spread(covariance, &along),
+                unit: "um".to_owned(),
+            }
+        })
+        .collect();
+    let shapes = shape.values.iter().zip(parameters).enumerate();
+    told.extend(shapes.map(|(k, (value, parameter))| Estimate {
+        name: parameter.name.to_owned(),
+        value: *value,
+        std: spread(covariance, &[(amplitudes.len() + k, 1.0)]),
+        unit: parameter.unit.to_owned(),
+    }));
+    told
 }

@@ -1,11 +1,21 @@
-//! Machine or indicators drift while the traces are taken.
+//! What holds the indicators warms up while the traces are taken.
+//!
+//! Each mount moves by its own amount. One time constant: d (1 − exp(−t/τ)) for each indicator, up
+//! to twenty times the duration of the test, where it is a straight line. Two time constants, each
+//! with its own part in each indicator: mounts of different mass, or a body that warms its mount.
+//! Free: an amplitude for each indicator and time constant, the time constants.
 
-use super::FirstOrder;
-use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use nalgebra::DMatrix;
 
-/// See the head of the file. Variants: the spindle axis moves against the slide (near and far see
-/// opposite signs), or both indicators drift alike.
+use super::indicators::{SCOPES, apart, scopes, signs, sizes};
+use super::{FirstOrder, spread};
+use crate::model::{About, Column, Effect, Estimate, FittedModel, Parameter, Shape};
+
+/// See the head of the file. Variants: the indicators, and from [`SCOPES`] on two time constants.
 pub(super) struct ThermalDrift;
+
+/// Two time constants are told apart from here on.
+const APART: f64 = 1.3;
 
 impl Effect<FirstOrder> for ThermalDrift {
     fn name(&self) -> &str {
@@ -14,77 +24,125 @@ impl Effect<FirstOrder> for ThermalDrift {
 
     fn about(&self) -> About {
         About {
-            physics: "spindle, slide or indicators drift towards thermal equilibrium while the traces are taken",
+            physics: "spindle, slide or the mounts of the indicators drift towards thermal equilibrium while the traces are taken, each by its own amount",
             confirm: "leave the indicators on the artefact at one position for as long as the test took and record them",
             source: "first-order thermal response d (1 - exp(-t / tau)); ISO 230-3",
         }
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "drift",
-            unit: "um",
-            low: -500.0,
-            high: 500.0,
-        }]
+        let drift = Parameter::symmetric("drift", "um", 500.0);
+        sizes(0, ["drift", "near-drift", "far-drift"], &drift)
+    }
+
+    fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
+        let drift = Parameter::symmetric("drift", "um", 500.0);
+        sizes(shape.variant, ["drift", "near-drift", "far-drift"], &drift).repeat(stages(shape))
     }
 
     fn shape_parameters(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "log-time-constant",
-            unit: "ln s",
-            low: -5.0,
-            high: 20.0,
-        }]
+        ["log-time-constant", "log-second-time-constant"]
+            .map(|name| Parameter::between(name, "ln s", -5.0, 20.0))
+            .to_vec()
     }
 
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
-        let total = model.duration();
-        (0..2)
-            .flat_map(|variant| {
-                [0.03f64, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 20.0].map(|part| Shape {
-                    variant,
-                    values: vec![(part * total).ln()],
-                    // Beyond twenty times the duration a drift is a straight line.
-                    steps: vec![if part > 5.0 { 0.0 } else { 0.2 }],
-                })
-            })
-            .collect()
+        let at = |part: f64| Shape {
+            variant: scopes(model)[0],
+            values: vec![(part * model.duration()).ln()],
+            // Beyond twenty times the duration a drift is a straight line.
+            steps: vec![if part > 5.0 { 0.0 } else { 0.2 }],
+        };
+        [0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 20.0]
+            .map(at)
+            .to_vec()
+    }
+
+    fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+        let with = |variant: usize, values: Vec<f64>| Shape {
+            variant,
+            steps: vec![0.2; values.len()],
+            values,
+        };
+        match *shape.values.as_slice() {
+            [one] => {
+                let one = if shape.free() == 0 { one - 3.0 } else { one };
+                vec![with(shape.variant + SCOPES, vec![one - 0.7, one + 0.7])]
+            }
+            [one, two] => vec![with(shape.variant % SCOPES, vec![0.5 * (one + two)])],
+            _ => Vec::new(),
+        }
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
-        let Some(log_constant) = shape.values.first() else {
-            return Vec::new();
-        };
         let total = model.duration();
-        let constant = log_constant.exp().max(1e-3 * total);
-        // Per unit of the drift over the whole test, so that the straight line is the limit.
-        let whole = -(-total / constant).exp_m1();
-        vec![Column::from_places(model.places(), |_, place| {
-            let sign = if shape.variant == 0 {
-                model.channel(place).indicator_sign()
-            } else {
-                1.0
-            };
-            -sign * (-place.time / constant).exp_m1() / whole
-        })]
+        let stage = |log_constant: &f64| {
+            let constant = log_constant.exp().max(1e-3 * total);
+            // Per unit of the drift over the whole test, so that the straight line is the limit.
+            let whole = (-total / constant).exp_m1();
+            let warming = Column::from_places(model.places(), |_, place| {
+                (-place.time / constant).exp_m1() / whole
+            });
+            apart(model, shape.variant, &warming)
+        };
+        shape.values.iter().flat_map(stage).collect()
     }
 
     fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
-        shape.values.first().is_some_and(|log_constant| {
-            let part = log_constant.exp() / model.duration();
-            part > 0.005 && part < 50.0
-        })
+        let part = |log_constant: &f64| log_constant.exp() / model.duration();
+        let inside = |part: f64| part > 0.005 && part < 50.0;
+        shape.values.iter().all(|v| inside(part(v)))
+            && shape.values.windows(2).all(|v| v[1] > v[0] + APART.ln())
     }
 
     fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+        let linear = shape.free() == 0;
         Some(
-            if shape.variant == 0 {
-                "spindle axis against slide"
-            } else {
-                "both indicators alike"
+            match (stages(shape), linear) {
+                (2, _) => "two time constants",
+                (_, true) => "straight in time",
+                _ => "one time constant",
             }
             .to_owned(),
         )
     }
+
+    /// The drift of each indicator over the whole test, then the time constants.
+    fn estimates(
+        &self,
+        shape: &Shape,
+        amplitudes: &[f64],
+        covariance: &DMatrix<f64>,
+    ) -> Vec<Estimate> {
+        let count = signs(shape.variant).len();
+        let estimate = |name: &str, value: f64, std: f64, unit: &str| Estimate {
+            name: name.to_owned(),
+            value,
+            std,
+            unit: unit.to_owned(),
+        };
+        let mut told: Vec<Estimate> = self.amplitudes_at(shape)[..count]
+            .iter()
+            .enumerate()
+            .map(|(own, parameter)| {
+                let parts: Vec<(usize, f64)> = (own..amplitudes.len())
+                    .step_by(count)
+                    .map(|k| (k, 1.0))
+                    .collect();
+                let whole = parts.iter().map(|(k, _)| amplitudes[*k]).sum();
+                estimate(parameter.name, whole, spread(covariance, &parts), "um")
+            })
+            .collect();
+        let constants = shape.values.iter().zip(self.shape_parameters()).enumerate();
+        told.extend(constants.map(|(k, (value, parameter))| {
+            let std = spread(covariance, &[(amplitudes.len() + k, 1.0)]);
+            estimate(parameter.name, *value, std, parameter.unit)
+        }));
+        told
+    }
+}
+
+/// Number of time constants.
+fn stages(shape: &Shape) -> usize {
+    1 + shape.variant / SCOPES
 }

@@ -1,13 +1,17 @@
-//! The zero of one indicator jumps once.
+//! The zero of one indicator jumps once and stays there.
+//!
+//! It stays in every trace that the indicator reads from then on, in both spindle positions; or,
+//! where the indicator is set to zero anew when the spindle is turned, in the channel being read. If
+//! all traces of the first spindle position are taken before those of the second, the two are the
+//! same: the zero of a whole channel is free. Free: the jump, its time, the indicator or channel.
 
 use super::FirstOrder;
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
-use crate::reversal::Channel;
 
-/// See the head of the file. Variant: the channel in which the jump falls.
+/// See the head of the file. Variants: the channel, then the near and the far indicator.
 pub(super) struct ZeroJump;
 
-/// Readings of one channel between neighbouring starts of the search.
+/// Readings between neighbouring starts of the search.
 const STRIDE: usize = 8;
 
 impl Effect<FirstOrder> for ZeroJump {
@@ -19,37 +23,38 @@ impl Effect<FirstOrder> for ZeroJump {
         About {
             physics: "the zero of one indicator jumps at one moment and stays there: a knock, a slip in its clamp",
             confirm: "check the clamp, and read a fixed point before and after every trace",
-            source: "step function of time in one channel",
+            source: "step function of time in one indicator",
         }
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "jump",
-            unit: "um",
-            low: -1000.0,
-            high: 1000.0,
-        }]
+        vec![Parameter::symmetric("jump", "um", 1000.0)]
     }
 
     fn shape_parameters(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "time",
-            unit: "s",
-            low: 0.0,
-            high: 1e9,
-        }]
+        vec![Parameter::between("time", "s", 0.0, 1e9)]
     }
 
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
         let mut shapes = Vec::new();
-        for (variant, _) in model.present().iter().enumerate() {
+        let channels = model.present().len();
+        for variant in 0..channels + 2 {
+            if variant >= channels && !alternating(model, variant) {
+                continue;
+            }
             let times = times_of(model, variant);
-            for pair in times.windows(2).step_by(STRIDE) {
+            // An indicator reads two channels.
+            let stride = if variant < channels {
+                STRIDE
+            } else {
+                2 * STRIDE
+            };
+            for (k, pair) in times.windows(2).enumerate().step_by(stride) {
+                let next = times[(k + stride).min(times.len() - 1)];
                 shapes.push(Shape {
                     variant,
                     values: vec![0.5 * (pair[0] + pair[1])],
-                    steps: vec![0.5 * STRIDE as f64 * (pair[1] - pair[0])],
+                    steps: vec![0.5 * (next - pair[0])],
                 });
             }
         }
@@ -60,7 +65,7 @@ impl Effect<FirstOrder> for ZeroJump {
         let time = shape.values.first().copied().unwrap_or(f64::INFINITY);
         let mut column = Column::default();
         for trace in model.traces() {
-            if model.places()[trace.start].channel == shape.variant {
+            if read_by(model, shape.variant, model.places()[trace.start].channel) {
                 column
                     .rows
                     .extend(trace.clone().filter(|k| model.places()[*k].time > time));
@@ -88,19 +93,43 @@ impl Effect<FirstOrder> for ZeroJump {
     }
 
     fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
-        model
-            .present()
-            .get(shape.variant)
-            .map(|c: &Channel| format!("channel {}", c.name()))
+        let channels = model.present();
+        Some(match channels.get(shape.variant) {
+            Some(channel) => format!("channel {}", channel.name()),
+            None if shape.variant == channels.len() => "near indicator".to_owned(),
+            None => "far indicator".to_owned(),
+        })
     }
 }
 
-/// The times of one channel's readings, in order.
-fn times_of(model: &FirstOrder, channel: usize) -> Vec<f64> {
+/// Whether a channel is one in which a variant's jump lasts.
+fn read_by(model: &FirstOrder, variant: usize, channel: usize) -> bool {
+    let channels = model.present();
+    if variant < channels.len() {
+        return channel == variant;
+    }
+    let sign = if variant == channels.len() { 1.0 } else { -1.0 };
+    channels[channel].indicator_sign() == sign
+}
+
+/// Whether an indicator goes back to a spindle position after it has read in the other.
+fn alternating(model: &FirstOrder, variant: usize) -> bool {
+    let ranges: Vec<(f64, f64)> = (0..model.present().len())
+        .filter(|channel| read_by(model, variant, *channel))
+        .filter_map(|channel| {
+            let times = times_of(model, channel);
+            Some((*times.first()?, *times.last()?))
+        })
+        .collect();
+    matches!(ranges.as_slice(), [one, two] if one.0 < two.1 && two.0 < one.1)
+}
+
+/// The times of a variant's readings, in order.
+fn times_of(model: &FirstOrder, variant: usize) -> Vec<f64> {
     let mut times: Vec<f64> = model
         .places()
         .iter()
-        .filter(|p| p.channel == channel)
+        .filter(|p| read_by(model, variant, p.channel))
         .map(|p| p.time)
         .collect();
     times.sort_by(f64::total_cmp);

@@ -1,0 +1,111 @@
+//! The air of the room comes and goes in temperature, and machine and mounts follow it.
+//!
+//! A sinusoid in time with the period of the room's control, longer than two traces and up to the
+//! duration of the test. Each indicator follows by its own amount and its own lag. Free: amplitude
+//! and phase for each indicator, the period, told by its cycles over the test.
+
+use nalgebra::DMatrix;
+
+use super::indicators::{apart, others, scopes, signs};
+use super::{FirstOrder, rotating, rotations};
+use crate::model::{About, Column, Effect, Estimate, FittedModel, Parameter, Shape};
+
+/// See the head of the file. Variants: the indicators.
+pub(super) struct AmbientCycle;
+
+/// Cycles between neighbouring starts of the search.
+const STRIDE: f64 = 0.3;
+
+/// Cycles by which two periods must differ to be told apart.
+const APART: f64 = 0.6;
+
+impl Effect<FirstOrder> for AmbientCycle {
+    fn name(&self) -> &str {
+        "ambient-cycle"
+    }
+
+    fn about(&self) -> About {
+        About {
+            physics: "the temperature of the room swings periodically, and machine and mounts of the indicators follow it",
+            confirm: "record the air temperature during a test and compare its period",
+            source: "first harmonic of a periodic response; environmental temperature variation error, ISO 230-3",
+        }
+    }
+
+    fn amplitudes(&self) -> Vec<Parameter> {
+        rotations(2, 500.0)
+    }
+
+    fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
+        rotations(signs(shape.variant).len(), 500.0)
+    }
+
+    fn shape_parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::between("cycles", "1", 0.5, 1e6)]
+    }
+
+    fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
+        let count = ((most(model) - 1.0) / STRIDE).floor() as usize;
+        let at = |k: usize| Shape {
+            variant: scopes(model)[0],
+            values: vec![1.0 + STRIDE * k as f64],
+            steps: vec![0.5 * STRIDE],
+        };
+        (0..=count).map(at).collect()
+    }
+
+    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+        let other = |variant| Shape {
+            variant,
+            ..shape.clone()
+        };
+        others(model, shape.variant).map(other).collect()
+    }
+
+    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+        let cycles = shape.values.first().copied().unwrap_or(1.0);
+        let turn = std::f64::consts::TAU * cycles / model.duration();
+        let wave = |function: fn(f64) -> f64| {
+            let whole = Column::from_places(model.places(), |_, p| function(turn * p.time));
+            apart(model, shape.variant, &whole)
+        };
+        let pairs = wave(f64::cos).into_iter().zip(wave(f64::sin));
+        pairs.flat_map(|(cosine, sine)| [cosine, sine]).collect()
+    }
+
+    fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
+        let reach = 0.9..=most(model);
+        shape
+            .values
+            .first()
+            .is_some_and(|cycles| reach.contains(cycles))
+    }
+
+    fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
+        let cycles = shape.values.first()?;
+        Some(format!("period {:.4} s", model.duration() / cycles))
+    }
+
+    fn estimates(
+        &self,
+        shape: &Shape,
+        amplitudes: &[f64],
+        covariance: &DMatrix<f64>,
+    ) -> Vec<Estimate> {
+        let waves = signs(shape.variant).len();
+        rotating(
+            waves,
+            shape,
+            amplitudes,
+            covariance,
+            &self.shape_parameters(),
+        )
+    }
+}
+
+/// Most cycles: short of one in the time of two traces, where a sinusoid is the position that goes
+/// forward and back.
+fn most(model: &FirstOrder) -> f64 {
+    let indicators = signs(scopes(model)[0]).len();
+    (0.5 * (model.traces().len() / indicators) as f64 - APART).max(1.0)
+}

@@ -122,13 +122,20 @@ pub(super) fn gather(
                 x: *centre,
                 value: there.value + mean(&|k| fit.residuals[k]),
             });
-            let range = times
-                .unwrap_or_default()
+            let (first, last) = times
                 .iter()
+                .flatten()
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| {
                     (low.min(*t), high.max(*t))
                 });
-            spans.push((range.1 - range.0).max(0.0));
+            // Readings that follow each other evenly take one interval more than lies between the
+            // first and the last; without times each cell takes a second.
+            let span = match times {
+                Some(_) if count > 1.0 => (last - first) * count / (count - 1.0),
+                None if count > 1.0 => 1.0,
+                _ => 0.0,
+            };
+            spans.push(span.max(0.0));
         }
     }
     let held: f64 = sums.iter().map(|(_, count)| count).sum();

@@ -341,6 +341,23 @@ impl FirstOrder {
         self.smooth[self.record.places[reading].cell] + added
     }
 
+    /// The share of a reading that was taken after a moment, s: none or all of it, or of the readings
+    /// that were gathered into it.
+    pub(super) fn share_after(&self, reading: usize, time: f64) -> f64 {
+        let at = self.record.places[reading].time;
+        let span = self
+            .gathered
+            .as_ref()
+            .and_then(|gathered| gathered.spans.get(reading))
+            .copied()
+            .unwrap_or(0.0);
+        if span > 0.0 {
+            (0.5 + (at - time) / span).clamp(0.0, 1.0)
+        } else {
+            f64::from(u8::from(at > time))
+        }
+    }
+
     /// Whether effects add to the smooth reading before it is seen.
     pub fn lies_beneath(&self) -> bool {
         self.beneath.is_some()

@@ -202,7 +202,8 @@ fn lag(model: &FirstOrder, shape: &Shape, sign: f64, width: f64) -> Column {
                 trace.end - 1 - step
             };
             let stylus = model.smooth_reading(k);
-            pointer = pointer.clamp(stylus - half, stylus + half);
+            // Not `clamp`, which ends the program where a state has no number.
+            pointer = pointer.max(stylus - half).min(stylus + half);
             column.rows.push(k);
             column.values.push((pointer - stylus) / (2.0 * half));
         }

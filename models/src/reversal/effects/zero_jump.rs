@@ -66,12 +66,15 @@ impl Effect<FirstOrder> for ZeroJump {
         let mut column = Column::default();
         for trace in model.traces() {
             if read_by(model, shape.variant, model.places()[trace.start].channel) {
-                column
-                    .rows
-                    .extend(trace.clone().filter(|k| model.places()[*k].time > time));
+                for k in trace.clone() {
+                    let share = model.share_after(k, time);
+                    if share > 0.0 {
+                        column.rows.push(k);
+                        column.values.push(share);
+                    }
+                }
             }
         }
-        column.values = vec![1.0; column.rows.len()];
         vec![column]
     }
 

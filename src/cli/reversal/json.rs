@@ -4,13 +4,14 @@ use errsep_models::reversal::staged::Value as Measured;
 use errsep_models::reversal::{Convention, NOT_SHOWN};
 use serde_json::{Map, Value, json};
 
+use super::effects;
 use super::outcome::Outcome;
 use crate::cli::quantity::{quantity_json, unexpandable};
 use crate::io::Message;
 use crate::io::reversal::ReversalData;
 
 pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
-    Ok(json!({
+    let mut answer = json!({
         "schema": "errsep.reversal/1",
         "method": o.method,
         "convention": match o.convention {
@@ -25,7 +26,10 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
         "contrasts": contrasts(o)?,
         "closure": match &o.closure {
             Some(c) => json!({
-                "slope": angle(o, "closure slope", c.slope)?,
+                "slope": match c.slope {
+                    Some(slope) => angle(o, "closure slope", slope)?,
+                    None => Value::Null,
+                },
                 "rms": {"value": c.rms, "unit": "um"},
                 "expected_rms": {"value": c.expected_rms, "unit": "um"},
                 "x": c.x,
@@ -64,7 +68,11 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
         })).collect::<Vec<_>>(),
         "warnings": o.warnings,
         "not_shown": NOT_SHOWN.iter().map(|(name, _)| *name).collect::<Vec<_>>(),
-    }))
+    });
+    if !o.effects.is_empty() {
+        answer["effects"] = json!(effects::json(&o.effects));
+    }
+    Ok(answer)
 }
 
 /// An angle with its degrees of freedom and expanded uncertainty.

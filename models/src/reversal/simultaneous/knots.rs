@@ -9,6 +9,7 @@ use errsep_solvers::linear::bordered::Bordered;
 use errsep_solvers::structured::{StructuredProblem, evaluate};
 
 use super::error::FEWEST_FREE;
+use super::ground::{Begun, begin};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
 use super::seed;
@@ -87,6 +88,8 @@ pub struct Choice<'a> {
     pub thickness_mm: f64,
     /// 1/σ by channel.
     pub weights: &'a [f64],
+    /// Effects in the fit.
+    pub effects: Option<&'a Begun<'a>>,
 }
 
 impl Choice<'_> {
@@ -175,7 +178,13 @@ impl Choice<'_> {
             }
             let bases = self.bases(&unknowns, &breaks)?;
             let tilts = seed::tilts(&unknowns, self.lines);
-            let start = seed::start(&unknowns, &tilts, self.lines, self.thickness_mm);
+            let start = begin(
+                &unknowns,
+                &tilts,
+                self.lines,
+                self.thickness_mm,
+                self.effects,
+            );
             let problem = Reversal::new(
                 self.channels,
                 unknowns,
@@ -183,7 +192,8 @@ impl Choice<'_> {
                 self.axis,
                 self.thickness_mm,
                 self.weights.to_vec(),
-            );
+            )
+            .joining(self.effects.map(|e| &e.joined));
             let evaluation = evaluate(&problem, &start)?;
             let Some(squares) = linear_squares(&problem, &evaluation.system) else {
                 break;

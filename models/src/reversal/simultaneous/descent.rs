@@ -52,6 +52,27 @@ pub fn minimise(
     }
 }
 
+/// The minimum with the effects held where they begin: what they change hangs on forms and tilts, which a
+/// start has not yet.
+///
+/// # Errors
+/// [`NoValue`] where the model is not defined at the start.
+pub fn approach(
+    problem: &Reversal,
+    start: Parameters,
+    options: Options,
+) -> Result<Parameters, NoValue> {
+    if problem.joined.is_none() {
+        return Ok(start);
+    }
+    let mut held = problem.clone();
+    for k in 0..problem.unknowns.effects.len() {
+        held.hold(problem.unknowns.effect(k), true);
+    }
+    hold_turning(&mut held, &start)?;
+    Ok(structured::minimise(&held, start, options)?.parameters)
+}
+
 /// Holds the turning points of a play where they are at this point.
 fn hold_turning(problem: &mut Reversal, at: &Parameters) -> Result<(), NoValue> {
     let Some(joined) = problem.joined.as_ref().filter(|j| j.plays()) else {

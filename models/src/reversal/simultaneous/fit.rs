@@ -9,7 +9,7 @@ use errsep_solvers::structured::{self, Options as Minimisation, Parameters};
 
 use super::along::AlongTraces;
 use super::closure;
-use super::descent::minimise;
+use super::descent::{approach, minimise};
 use super::effects::{CATALOGUE, Setting, times};
 use super::error::ReversalError;
 use super::fitted_knots::FittedKnots;
@@ -87,6 +87,7 @@ fn solve(
         Some(index) => start_of_thickness(&mut problem, index, start, options.minimisation)?,
         None => head_start(&problem, &start, options.minimisation).unwrap_or(start),
     };
+    let start = approach(&problem, start, options.minimisation)?;
     let settled = noise::settle(&mut problem, start, options, survey, &mut sigmas)?;
     let knots = FittedKnots::new(breaks, table, &settled.residuals);
     let mut solution = assemble(ground, &problem, &settled, &sigmas, knots)?;

@@ -517,3 +517,6 @@ impl PlacedChannel {
         self.order = order;
     }
 }
+
+#[cfg(test)]
+mod tests;

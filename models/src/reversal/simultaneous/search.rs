@@ -13,7 +13,7 @@ use errsep_solvers::structured::{Parameters, StructuredProblem};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::descent::minimise;
+use super::descent::{approach, minimise};
 use super::effects::{CATALOGUE, Entry, JoinedEffect, Kind, Setting};
 use super::error::ReversalError;
 use super::ground::{Begun, Found, Ground};
@@ -183,7 +183,10 @@ impl<'g, 'a> Search<'g, 'a> {
             all.push((name, Arc::clone(effect), values.clone()));
             let begun = Begun::new(self.ground.observations, self.times, &all);
             let (mut problem, start) = self.ground_problem(Some(&begun))?;
-            let Ok(fit) = minimise(&mut problem, start, self.ground.options.minimisation) else {
+            let options = self.ground.options.minimisation;
+            let fit = approach(&problem, start, options)
+                .and_then(|start| minimise(&mut problem, start, options));
+            let Ok(fit) = fit else {
                 continue;
             };
             if best.as_ref().is_none_or(|b| fit.cost < b.0) {
@@ -221,7 +224,9 @@ impl<'g, 'a> Search<'g, 'a> {
         } else {
             problem
         };
-        let Ok(fit) = minimise(&mut problem, start, self.ground.options.minimisation) else {
+        let options = self.ground.options.minimisation;
+        let start = approach(&problem, start, options)?;
+        let Ok(fit) = minimise(&mut problem, start, options) else {
             return Ok(None);
         };
         let Some(covariance) = fit.covariance() else {

@@ -38,6 +38,8 @@ const FEWEST: f64 = 2.5;
 /// Most cycles a position: beyond, evenly spaced readings no longer tell them apart.
 const MOST: f64 = 0.45;
 
+/// A channel whose readings hardly move tells of no fast cycles: so many times the positions at most.
+const CLOSEST: f64 = 4.0;
 /// Most starts of the search.
 const MOST_STARTS: f64 = 2000.0;
 
@@ -45,9 +47,9 @@ fn variants(setting: &Setting) -> Vec<Arc<dyn JoinedEffect>> {
     let along = (MOST * setting.positions as f64).max(FEWEST + STEP);
     let (low, high) = setting.range;
     let span = (high - low).max(f64::MIN_POSITIVE);
-    // Each channel sees its own part of the span only.
-    let own = (setting.span.1 - setting.span.0).max(f64::MIN_POSITIVE);
-    let reading = (0.5 * (low + high), span, along * (span / own).max(1.0));
+    // The channel with the narrowest span has its readings closest to each other.
+    let closer = (span / setting.spans.0.max(f64::MIN_POSITIVE)).clamp(1.0, CLOSEST);
+    let reading = (0.5 * (low + high), span, along * closer);
     let mut variants: Vec<Arc<dyn JoinedEffect>> = Vec::new();
     let mut add = |of, (middle, span, most): (f64, f64, f64)| {
         variants.push(Arc::new(Cyclic {

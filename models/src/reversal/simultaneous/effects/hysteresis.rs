@@ -35,7 +35,7 @@ impl Hysteresis {
             beginnings: channels
                 .flat_map(|c| directions.iter().map(|d| (*c, *d)))
                 .collect(),
-            span: setting.span.1 - setting.span.0,
+            span: setting.spans.1,
         }
     }
 }

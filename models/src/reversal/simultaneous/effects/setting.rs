@@ -85,8 +85,8 @@ pub struct Setting {
     pub positions: usize,
     /// Mean reading of every channel, µm, in the order of [`Channel::ALL`].
     pub middle: [f64; 4],
-    /// Least and greatest reading off the channel's mean, µm.
-    pub span: (f64, f64),
+    /// Greatest less least reading of the channel with the narrowest, and of that with the widest span, µm.
+    pub spans: (f64, f64),
     /// Least and greatest reading, µm.
     pub range: (f64, f64),
     /// Greatest reading off the indicators' zero, µm.
@@ -114,13 +114,16 @@ impl Setting {
             travel = (travel.0.min(r.x), travel.1.max(r.x));
         }
         let middle = [0, 1, 2, 3].map(|c| sums[c] / f64::max(counts[c], 1.0));
-        let mut span = (0.0_f64, 0.0_f64);
-        let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+        let none = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut own = [none; 4];
         for r in readings {
-            let off = r.value - middle[r.channel.index()];
-            span = (span.0.min(off), span.1.max(off));
-            range = (range.0.min(r.value), range.1.max(r.value));
+            let own = &mut own[r.channel.index()];
+            *own = (own.0.min(r.value), own.1.max(r.value));
         }
+        let read = || own.iter().filter(|o| o.0 <= o.1);
+        let range = read().fold(none, |r, o| (r.0.min(o.0), r.1.max(o.1)));
+        let spans = read().map(|o| o.1 - o.0);
+        let spans = spans.fold(none, |s, own| (s.0.min(own), s.1.max(own)));
         let reach = range.0.abs().max(range.1.abs()).max(f64::MIN_POSITIVE);
         let mut repeats: Vec<u32> = readings.iter().map(|r| r.repeat).collect();
         repeats.sort_unstable();
@@ -139,7 +142,7 @@ impl Setting {
             travel,
             positions: positions.unwrap_or(0),
             middle,
-            span,
+            spans,
             range,
             reach,
             duration: times.iter().copied().fold(0.0, f64::max),

@@ -87,23 +87,32 @@ impl JoinedEffect for ZeroJump {
         (values[0] * by[0], 0.0)
     }
 
-    /// Where the sum of squares is least if the jump, its size kept, lies between two readings.
+    /// Where the sum of squares is least if the jump, its size kept, lies between two readings; the
+    /// standard uncertainty is that of all moments, each with the likelihood that normal noise gives it.
     fn searched(&self, left: &[Left], values: &[f64]) -> Option<(f64, f64)> {
         let (jump, before) = (values[0], values[1]);
+        let weighted = left.iter().map(|l| (l.weight * l.residual).powi(2));
+        let unit = (weighted.sum::<f64>() / left.len().max(1) as f64).max(f64::MIN_POSITIVE);
         let mut rows: Vec<&Left> = left.iter().filter(|l| self.sees(l.at.channel)).collect();
         rows.sort_by(|a, b| a.at.time.total_cmp(&b.at.time));
-        // The reading's residual with the jump before it, less that without, squared.
-        let with: f64 = rows.iter().map(|l| change(l, jump, before)).sum();
-        let (mut cost, mut best) = (with, (f64::INFINITY, before, f64::NAN));
+        let mut cost: f64 = rows.iter().map(|l| change(l, jump, before)).sum();
+        // Cost, middle and width of every gap between readings.
+        let mut gaps = Vec::with_capacity(rows.len());
         for pair in rows.windows(2) {
             cost -= change(pair[0], jump, before);
             let gap = pair[1].at.time - pair[0].at.time;
-            if gap > 0.0 && cost < best.0 {
-                // A rectangle between the two readings.
-                best = (cost, pair[0].at.time + 0.5 * gap, gap / 12f64.sqrt());
+            if gap > 0.0 {
+                gaps.push((cost / unit, pair[0].at.time + 0.5 * gap, gap));
             }
         }
-        best.0.is_finite().then_some((best.1, best.2))
+        let best = gaps.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (mut sum, mut spread) = (0.0, 0.0);
+        for (cost, middle, gap) in gaps {
+            let likely = gap * (-0.5 * (cost - best.0)).exp();
+            sum += likely;
+            spread += likely * ((middle - best.1).powi(2) + gap * gap / 12.0);
+        }
+        Some((best.1, (spread / sum).sqrt()))
     }
 
     fn told(&self, values: &[f64]) -> Vec<Told> {

@@ -335,6 +335,11 @@ fn check(observations: &Observations, options: &Options) -> Result<(), ReversalE
         if !reading.value.is_finite() {
             return refuse(&format!("reading {}", i + 1), reading.value, "finite");
         }
+        if let Some(time) = reading.time
+            && !(time.is_finite() || options.effects.is_empty())
+        {
+            return refuse(&format!("the time of reading {}", i + 1), time, "finite");
+        }
     }
     if let Thickness::Known(mm) | Thickness::Fitted(mm) = options.thickness
         && !(mm >= 0.0 && mm.is_finite())

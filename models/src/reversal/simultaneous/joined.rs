@@ -324,29 +324,3 @@ pub struct PerMove {
     /// Per µm.
     pub lateral: f64,
 }
-
-/// The pointer's last pushes along a trace whose readings, in the order in which they were taken, show
-/// what they show without play: the stylus.
-pub fn turns(
-    order: impl Iterator<Item = usize>,
-    shows: &[f64],
-    width: f64,
-    begins: f64,
-) -> Vec<(usize, Turn)> {
-    let half = 0.5 * width.max(0.0);
-    let mut turns = Vec::new();
-    let mut state: Option<(f64, Turn)> = None;
-    for row in order {
-        let stylus = shows[row];
-        let at = u32::try_from(row).unwrap_or(u32::MAX);
-        let next = match state {
-            None => (stylus + begins * half, Turn { at, side: 0 }),
-            Some((pointer, _)) if stylus - half > pointer => (stylus - half, Turn { at, side: -1 }),
-            Some((pointer, _)) if stylus + half < pointer => (stylus + half, Turn { at, side: 1 }),
-            Some(held) => held,
-        };
-        turns.push((row, next.1));
-        state = Some(next);
-    }
-    turns
-}

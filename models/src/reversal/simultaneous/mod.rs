@@ -7,6 +7,7 @@
 
 mod along;
 mod closure;
+mod columns;
 mod dense;
 mod descent;
 pub mod effects;
@@ -23,6 +24,7 @@ mod noise;
 mod options;
 mod placed;
 mod placed_rows;
+mod pointer;
 mod predict;
 mod problem;
 mod profiles;

@@ -5,13 +5,13 @@
 //! into other cells and scales their rows; so each reading is placed once a point, and readings are sorted
 //! into cells from there. The cost stays linear in readings.
 
-use errsep_solvers::linear::banded::Tall;
 use errsep_solvers::problem::NoValue;
 use errsep_solvers::structured::Parameters;
 use rayon::prelude::*;
 
-use super::joined::{Joined, PerMove, Turn, turns};
-use super::predict::Prediction;
+use super::effects::Circumstances;
+use super::joined::{Joined, PerMove};
+use super::pointer::pushed;
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
 use super::unknowns::Form;
@@ -24,10 +24,10 @@ use crate::units::{UM_PER_MM, mm_from_um};
 pub struct Spot {
     /// Cell of the artefact's form, and place in it, 0 to 1.
     pub side: u32,
-    t_side: f64,
+    pub(super) t_side: f64,
     /// The same of the slide's.
     pub slide: u32,
-    t_slide: f64,
+    pub(super) t_slide: f64,
     /// Where on the artefact's own axis, mm.
     u: f64,
     /// What the indicator sees, µm, before anything acts on its reading.
@@ -35,11 +35,11 @@ pub struct Spot {
     /// What it shows, µm.
     pub shows: f64,
     /// ∂shows/∂seen.
-    scale: f64,
+    pub(super) scale: f64,
     /// ∂seen/∂S(u).
-    q: f64,
+    pub(super) q: f64,
     /// ∂seen/∂ψ, µm/rad.
-    turn: f64,
+    pub(super) turn: f64,
     per: Per,
 }
 
@@ -55,7 +55,7 @@ struct Per {
 pub struct PlacedChannel {
     pub spots: Vec<Spot>,
     /// Derivatives by the effects' unknowns, reading by reading.
-    by: Vec<f64>,
+    pub(super) by: Vec<f64>,
     /// The readings sorted into cells.
     pub order: Vec<u32>,
     /// Where each cell begins among them.
@@ -66,9 +66,9 @@ pub struct PlacedChannel {
 #[derive(Debug, Clone)]
 pub struct Placed {
     pub channels: Vec<PlacedChannel>,
-    effects: usize,
+    pub(super) effects: usize,
     /// Values kept a reading: at least one, so that rows without effects are rows too.
-    stride: usize,
+    pub(super) stride: usize,
 }
 
 /// Readings that one core places at a time.
@@ -138,7 +138,7 @@ impl Placed {
                 };
                 let mut placed = shared.place(readings, joined.count())?;
                 if joined.plays() {
-                    let turned: Vec<(usize, Turn)> = match joined.turning() {
+                    let turned = match joined.turning() {
                         Some(held) => held[c].iter().copied().enumerate().collect(),
                         None => pushed(joined, readings, &traces[c], &placed, values),
                     };
@@ -155,35 +155,6 @@ impl Placed {
         })
     }
 
-    /// The turning points of the play at this point, by channel.
-    ///
-    /// # Errors
-    /// [`NoValue`] where the model is not defined.
-    pub fn turning(
-        problem: &Reversal,
-        joined: &Joined,
-        at: &Parameters,
-    ) -> Result<Vec<Vec<Turn>>, NoValue> {
-        let values = problem.unknowns.effect_values(&at.border);
-        let traces = joined.traces(problem.channels);
-        let cubics = problem.cubics(at);
-        let unplayed = joined.without_play();
-        let placed = Self::new(problem, &unplayed, at, &cubics)?;
-        Ok(problem
-            .channels
-            .iter()
-            .zip(&placed.channels)
-            .enumerate()
-            .map(|(c, (readings, own))| {
-                let mut turned = vec![Turn { at: 0, side: 0 }; readings.len()];
-                for (row, turn) in pushed(joined, readings, &traces[c], own, values) {
-                    turned[row] = turn;
-                }
-                turned
-            })
-            .collect())
-    }
-
     /// The most that the two cells of a reading lie apart.
     pub fn apart(&self) -> usize {
         let spots = self.channels.iter().flat_map(|c| &c.spots);
@@ -196,112 +167,6 @@ impl Placed {
     /// The derivatives of a reading by the effects' unknowns.
     pub fn by(&self, channel: usize, row: usize) -> &[f64] {
         &self.channels[channel].by[row * self.stride..row * self.stride + self.effects]
-    }
-
-    /// What a reading would show, with its derivatives by all unknowns.
-    pub fn prediction(&self, problem: &Reversal, channel: usize, row: usize) -> Prediction {
-        let unknowns = &problem.unknowns;
-        let spot = &self.channels[channel].spots[row];
-        let name = problem.channels[channel].channel;
-        let mut border = vec![0.0; unknowns.border_count()];
-        for (j, sign) in unknowns.slope_signs(channel).into_iter().enumerate() {
-            border[j] = sign * spot.scale * spot.turn;
-        }
-        border[unknowns.offset(channel)] = spot.scale;
-        let mut band = Vec::with_capacity(8);
-        let mut form = |form: usize, cell: u32, t: f64, factor: f64| {
-            let basis = &problem.bases[form];
-            let (left, width) = basis.cell(cell as usize);
-            let [height, slope] = unknowns.line(form);
-            border[height] = -factor;
-            border[slope] = -factor * problem.axis.xi(left + t * width);
-            for (l, function) in basis.polynomials(cell as usize).iter().enumerate() {
-                if let Some(j) = unknowns.coefficient(form, cell as usize + l) {
-                    band.push((j, factor * horner(function, t)));
-                }
-            }
-        };
-        if let Some(slide) = unknowns.place(Form::Slide) {
-            form(
-                slide,
-                spot.slide,
-                spot.t_slide,
-                spot.scale * name.indicator_sign(),
-            );
-        }
-        form(
-            unknowns.side_of(name),
-            spot.side,
-            spot.t_side,
-            spot.scale * spot.q,
-        );
-        if let Some(thickness) = unknowns.thickness_index() {
-            border[thickness] = spot.scale * 0.5 * UM_PER_MM * (spot.q - 1.0);
-        }
-        for (k, v) in self.by(channel, row).iter().enumerate() {
-            border[unknowns.effect(k)] = *v;
-        }
-        Prediction {
-            value: spot.shows,
-            band,
-            border,
-        }
-    }
-
-    /// Fills a batch with the rows of some readings of one channel that lie in the same two cells;
-    /// weighted residuals last.
-    pub fn fill(&self, problem: &Reversal, channel: usize, rows: &[u32], batch: &mut Tall) {
-        let own = &self.channels[channel];
-        let readings = &problem.channels[channel];
-        let weight = problem.weights[channel];
-        let Some(first) = rows.first().map(|row| &own.spots[*row as usize]) else {
-            return;
-        };
-        let spots = || rows.iter().map(|row| &own.spots[*row as usize]);
-        let unknowns = &problem.unknowns;
-        let slide = unknowns.place(Form::Slide);
-        let apart = if slide.is_some() { 2 } else { 1 };
-        if let Some(form) = slide {
-            let signed = weight * readings.channel.indicator_sign();
-            let basis = problem.bases[form].polynomials(first.slide as usize);
-            for (k, function) in basis.iter().enumerate() {
-                for (out, s) in batch.column_mut(2 * k).iter_mut().zip(spots()) {
-                    *out = signed * s.scale * horner(function, s.t_slide);
-                }
-            }
-        }
-        let form = unknowns.side_of(readings.channel);
-        let basis = problem.bases[form].polynomials(first.side as usize);
-        for (k, function) in basis.iter().enumerate() {
-            let column = batch.column_mut(apart * k + apart - 1);
-            for (out, s) in column.iter_mut().zip(spots()) {
-                *out = weight * s.scale * s.q * horner(function, s.t_side);
-            }
-        }
-        let mut next = 4 * apart;
-        let mut put = |batch: &mut Tall, of: &dyn Fn(&Spot) -> f64| {
-            for (out, s) in batch.column_mut(next).iter_mut().zip(spots()) {
-                *out = weight * of(s);
-            }
-            next += 1;
-        };
-        put(batch, &|s| s.scale * s.turn);
-        if slide.is_none() {
-            put(batch, &|s| s.scale);
-        }
-        if unknowns.thickness {
-            put(batch, &|s| s.scale * 0.5 * UM_PER_MM * (s.q - 1.0));
-        }
-        for k in 0..self.effects {
-            for (out, row) in batch.column_mut(next + k).iter_mut().zip(rows) {
-                *out = weight * own.by[*row as usize * self.stride + k];
-            }
-        }
-        let last = next + self.effects;
-        for (out, row) in batch.column_mut(last).iter_mut().zip(rows) {
-            let i = *row as usize;
-            *out = weight * (own.spots[i].shows - readings.value[i]);
-        }
     }
 
     /// Goes through the readings of a channel that belong to a cell, in stretches that share both cells.
@@ -323,25 +188,23 @@ impl Placed {
         }
     }
 
-    /// Derivatives of a reading by an effect that is not in the fit, at values where it changes nothing or
-    /// little: the reading stays where it is.
+    /// Derivatives of a reading (channel, place among its sorted readings) by an effect that is not in the
+    /// fit, at values where it changes little: the reading stays where it is.
     pub fn signature(
         &self,
-        problem: &Reversal,
         single: &Joined,
-        channel: usize,
-        row: usize,
+        (channel, row): (usize, usize),
+        at: &Circumstances,
         values: &[f64],
         by: &mut [f64],
     ) {
         let spot = &self.channels[channel].spots[row];
-        let at = single.circumstances(problem.channels[channel].source[row]);
         by.fill(0.0);
-        single.bump(&at, spot.u, values, by);
+        single.bump(at, spot.u, values, by);
         by.iter_mut().for_each(|b| *b *= spot.q);
-        single.moved(&at, &spot.per_move(at.channel.indicator_sign()), by);
+        single.moved(at, &spot.per_move(at.channel.indicator_sign()), by);
         by.iter_mut().for_each(|b| *b *= spot.scale);
-        single.shown(&at, spot.shows, values, by);
+        single.shown(at, spot.shows, values, by);
     }
 }
 
@@ -444,63 +307,7 @@ impl Channel<'_> {
     }
 }
 
-/// Where the pointer was last pushed, for every reading of a channel: place and turn.
-fn pushed(
-    joined: &Joined,
-    readings: &ChannelReadings,
-    traces: &[super::traces::Trace],
-    placed: &PlacedChannel,
-    values: &[f64],
-) -> Vec<(usize, Turn)> {
-    let shows: Vec<f64> = placed.spots.iter().map(|s| s.shows).collect();
-    let mut turned = Vec::with_capacity(readings.len());
-    for trace in traces {
-        let Some(play) = joined.play(readings.channel, trace.backward) else {
-            continue;
-        };
-        let count = trace.len();
-        let order = (0..count).map(|k| trace.row(if trace.backward { count - 1 - k } else { k }));
-        turned.extend(turns(
-            order,
-            &shows,
-            values[play.width],
-            values[play.begins],
-        ));
-    }
-    turned
-}
-
 impl PlacedChannel {
-    /// Readings whose pointer stands still have the row of the reading that pushed it last.
-    fn play(
-        &mut self,
-        joined: &Joined,
-        readings: &ChannelReadings,
-        turned: &[(usize, Turn)],
-        values: &[f64],
-    ) {
-        let effects = joined.count();
-        let (spots, by) = (self.spots.clone(), self.by.clone());
-        for (row, turn) in turned {
-            let at = joined.circumstances(readings.source[*row]);
-            let Some(play) = joined.play(readings.channel, at.direction < 0.0) else {
-                continue;
-            };
-            let from = turn.at as usize;
-            let half = 0.5 * values[play.width];
-            let place = match turn.side {
-                0 => values[play.begins],
-                side => f64::from(side),
-            };
-            self.spots[*row] = spots[from];
-            self.spots[*row].shows += place * half;
-            let own = &mut self.by[row * effects..(row + 1) * effects];
-            own.copy_from_slice(&by[from * effects..(from + 1) * effects]);
-            own[play.width] = 0.5 * place;
-            own[play.begins] = if turn.side == 0 { half } else { 0.0 };
-        }
-    }
-
     /// Sorts the readings into the lower of their two cells, and there by both.
     fn sort(&mut self, cells: usize) {
         let key = |row: &u32| {

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::descent::{approach, minimise};
-use super::effects::{CATALOGUE, Entry, JoinedEffect, Kind, Setting};
+use super::effects::{CATALOGUE, Circumstances, Entry, JoinedEffect, Kind, Setting};
 use super::error::ReversalError;
 use super::ground::{Begun, Found, Ground};
 use super::joined::Joined;
@@ -26,7 +26,7 @@ use super::problem::Reversal;
 use super::readings::ChannelReadings;
 
 /// Readings over which starts are compared, evenly spread.
-const MOST_READINGS: usize = 20_000;
+const MOST_READINGS: usize = 10_000;
 /// Most cells of the forms meanwhile, and positions a cell.
 const MOST_CELLS: usize = 40;
 const POSITIONS_A_CELL: usize = 3;
@@ -235,7 +235,7 @@ impl<'g, 'a> Search<'g, 'a> {
         let Some(placed) = problem.prepare(&fit.parameters)?.placed else {
             return Ok(None);
         };
-        let score = Score::new(&problem, &placed, &covariance);
+        let score = Score::new(&problem, &placed, &covariance, &begun.joined);
         let best = starts
             .par_iter()
             .filter_map(|(effect, values)| {
@@ -257,8 +257,15 @@ struct Score<'s> {
     problem: &'s Reversal<'s>,
     placed: &'s Placed,
     covariance: &'s BorderedCovariance,
-    /// The rows of the fit by channel, and what they leave.
-    rows: Vec<Vec<(Prediction, f64)>>,
+    /// The rows of the fit by channel.
+    rows: Vec<Vec<Row>>,
+}
+
+/// A row of the fit: derivatives, what is left of the reading, where and when it was taken.
+struct Row {
+    prediction: Prediction,
+    left: f64,
+    at: Circumstances,
 }
 
 impl<'s> Score<'s> {
@@ -266,12 +273,16 @@ impl<'s> Score<'s> {
         problem: &'s Reversal<'s>,
         placed: &'s Placed,
         covariance: &'s BorderedCovariance,
+        joined: &Joined,
     ) -> Self {
         let rows = problem.channels.iter().enumerate().map(|(c, readings)| {
             let own = (0..readings.len()).into_par_iter().map(|row| {
                 let prediction = placed.prediction(problem, c, row);
-                let left = readings.value[row] - prediction.value;
-                (prediction, left)
+                Row {
+                    left: readings.value[row] - prediction.value,
+                    at: joined.circumstances(readings.source[row]),
+                    prediction,
+                }
             });
             own.collect()
         });
@@ -302,9 +313,12 @@ impl<'s> Score<'s> {
         let mut by = vec![0.0; values.len()];
         for (c, rows) in self.rows.iter().enumerate() {
             let square = self.problem.weights[c].powi(2);
-            for (row, (prediction, left)) in rows.iter().enumerate() {
+            for (k, row) in rows.iter().enumerate() {
                 self.placed
-                    .signature(self.problem, single, c, row, values, &mut by);
+                    .signature(single, (c, k), &row.at, values, &mut by);
+                let Row {
+                    prediction, left, ..
+                } = row;
                 for (a, k) in sizes.iter().enumerate() {
                     let v = by[*k];
                     if v == 0.0 {

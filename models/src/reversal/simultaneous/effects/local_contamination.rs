@@ -14,6 +14,9 @@ pub const ENTRY: Entry = Entry {
     refused: welcome,
 };
 
+/// Least width from which the search begins, as a share of the travel.
+const LEAST: f64 = 1.0 / 400.0;
+
 #[derive(Debug)]
 struct Bump {
     channel: Channel,
@@ -72,14 +75,14 @@ impl JoinedEffect for Bump {
 
     fn starts(&self) -> Vec<Vec<f64>> {
         let mut starts = Vec::new();
-        let mut width = 0.7 * self.spacing;
+        let mut width = (0.7 * self.spacing).max(LEAST * self.length());
         while width < self.widths().1 {
-            let steps = (self.length() / (1.5 * width)).ceil().max(1.0);
+            let steps = (self.length() / (2.0 * width)).ceil().max(1.0);
             for k in 0..=steps as usize {
                 let position = self.travel.0 + self.length() * k as f64 / steps;
                 starts.push(vec![0.0, position, width.ln()]);
             }
-            width *= 2.2;
+            width *= 2.5;
         }
         starts
     }

@@ -98,8 +98,8 @@ fn the_answer_has_the_effect_in_every_form() {
         text.contains("Effects in the fit") && text.contains("far-drift"),
         "{text}"
     );
-    // Without the option nothing is said of effects.
-    assert!(json(&folder, &[]).get("effects").is_none());
+    // Without the option there are none.
+    assert_eq!(json(&folder, &[])["effects"], Value::Array(Vec::new()));
 }
 
 #[test]

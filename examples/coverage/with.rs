@@ -32,6 +32,14 @@ const CASES: &[Case] = &[
         let constant = m.duration() * (0.1 + 0.6 * r.random::<f64>());
         Fault::Drift(signed(r, 0.3, 1.0), signed(r, 0.3, 1.0), constant)
     }),
+    ("ambient-cycle", |_, r| {
+        let cycles = 1.5 + 10.0 * r.random::<f64>();
+        Fault::Swing(
+            signed(r, 0.08, 0.3).abs(),
+            signed(r, 0.08, 0.3).abs(),
+            cycles,
+        )
+    }),
     ("zero-jump", |_, r| {
         let share = 0.1 + 0.8 * r.random::<f64>();
         Fault::Jump(signed(r, 0.1, 0.4), r.random(), share)
@@ -71,8 +79,10 @@ fn signed(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
 pub fn rows(seeds: u64) -> Vec<Row> {
     let mut pooled: Vec<Row> = Vec::new();
     let mut rows: Vec<Row> = Vec::new();
-    for case in CASES {
-        let found: Vec<Option<Vec<(&'static str, Tally)>>> = (0..seeds)
+    for (k, case) in CASES.iter().enumerate() {
+        // Every effect has machines and noise of its own, so that rows may be pooled.
+        let first = 100_000 * k as u64;
+        let found: Vec<Option<Vec<(&'static str, Tally)>>> = (first..first + seeds)
             .into_par_iter()
             .map(|seed| one(case, seed))
             .collect();
@@ -198,6 +208,11 @@ fn truths(
             ("near-drift", near),
             ("far-drift", far),
             ("time-constant", constant),
+        ],
+        Fault::Swing(near, far, cycles) => vec![
+            ("near-amplitude", near),
+            ("far-amplitude", far),
+            ("period", machine.duration() / cycles),
         ],
         Fault::Jump(size, _, share) => vec![("jump", size), ("time", share * machine.duration())],
         Fault::Play(width) => vec![("width", width)],

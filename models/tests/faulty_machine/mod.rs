@@ -75,6 +75,8 @@ pub enum Fault {
     Gain(f64),
     /// Drift of the near and far indicator's zero when all is over, µm, and the time constant, s.
     Drift(f64, f64, f64),
+    /// A swing of the near and far indicator's zero, µm, so many times during all.
+    Swing(f64, f64, f64),
     /// A jump of an indicator's zero, µm: near or far, at a share of all time.
     Jump(f64, bool, f64),
     /// Play of the indicators, µm.
@@ -217,6 +219,14 @@ impl Machine {
                 Fault::Drift(a, b, constant) => {
                     let gone = |t: f64| 1.0 - (-t / constant).exp();
                     (if near { a } else { b }) * gone(time) / gone(self.duration())
+                }
+                Fault::Swing(a, b, cycles) => {
+                    let turn = 2.0 * std::f64::consts::PI * cycles * time / self.duration();
+                    if near {
+                        a * (turn + 0.7).sin()
+                    } else {
+                        b * (turn - 1.1).sin()
+                    }
                 }
                 Fault::Jump(size, of_near, share)
                     if of_near == near && time > share * self.duration() =>

@@ -170,6 +170,16 @@ fn what_happens_in_time_or_at_one_place_is_found_with_the_tilts() {
     );
     is_right(
         &machine,
+        &[Fault::Swing(0.12, 0.2, 5.3)],
+        "ambient-cycle",
+        &[
+            ("near-amplitude", 0.12),
+            ("far-amplitude", 0.2),
+            ("period", whole / 5.3),
+        ],
+    );
+    is_right(
+        &machine,
         &[Fault::Jump(0.15, false, 0.37)],
         "zero-jump",
         &[("jump", 0.15)],

@@ -11,7 +11,7 @@ use crate::io::Message;
 use crate::io::reversal::ReversalData;
 
 pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
-    let mut answer = json!({
+    Ok(json!({
         "schema": "errsep.reversal/1",
         "method": o.method,
         "convention": match o.convention {
@@ -24,6 +24,7 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
         "tilts": tilts(o)?,
         "tilt_combinations": combinations(o)?,
         "contrasts": contrasts(o)?,
+        "effects": effects::json(&o.effects),
         "closure": match &o.closure {
             Some(c) => json!({
                 "slope": match c.slope {
@@ -68,11 +69,7 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
         })).collect::<Vec<_>>(),
         "warnings": o.warnings,
         "not_shown": NOT_SHOWN.iter().map(|(name, _)| *name).collect::<Vec<_>>(),
-    });
-    if !o.effects.is_empty() {
-        answer["effects"] = json!(effects::json(&o.effects));
-    }
-    Ok(answer)
+    }))
 }
 
 /// An angle with its degrees of freedom and expanded uncertainty.

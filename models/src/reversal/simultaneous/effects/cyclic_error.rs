@@ -135,14 +135,12 @@ impl JoinedEffect for Cyclic {
                 value: size,
                 unit: "um",
                 gradient: vec![(0, values[0] / unit), (1, values[1] / unit)],
-                std: None,
             },
             Told {
                 name: "period".to_owned(),
                 value: self.span / cycles,
                 unit: if self.of == Of::Travel { "mm" } else { "um" },
                 gradient: vec![(2, -self.span / (cycles * cycles))],
-                std: None,
             },
         ]
     }

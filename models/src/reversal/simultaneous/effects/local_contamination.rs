@@ -120,7 +120,6 @@ impl JoinedEffect for Bump {
             value,
             unit,
             gradient: vec![(k, slope)],
-            std: None,
         };
         let width = values[2].exp();
         vec![

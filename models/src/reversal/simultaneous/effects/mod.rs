@@ -6,6 +6,7 @@
 //! ([`JoinedEffect::play`]). To add one, write its file and add it to [`CATALOGUE`].
 
 mod absorbed;
+mod ambient_cycle;
 mod axis_backlash;
 mod cyclic_error;
 mod gain_mismatch;
@@ -43,6 +44,7 @@ pub struct Entry {
 
 /// All effects by name.
 pub const CATALOGUE: &[Entry] = &[
+    ambient_cycle::ENTRY,
     axis_backlash::ENTRY,
     absorbed::COMMON_GAIN,
     cyclic_error::ENTRY,
@@ -153,8 +155,6 @@ pub struct Told {
     pub unit: &'static str,
     /// The derivatives by the effect's unknowns: place and value.
     pub gradient: Vec<(usize, f64)>,
-    /// Standard uncertainty where it does not come from those of the unknowns.
-    pub std: Option<f64>,
 }
 
 /// A reading as the search for a step sees it.
@@ -244,7 +244,6 @@ pub trait JoinedEffect: Debug + Send + Sync {
                 value: *value,
                 unit: unknown.unit,
                 gradient: vec![(k, 1.0)],
-                std: None,
             })
             .collect()
     }

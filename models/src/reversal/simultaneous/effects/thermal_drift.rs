@@ -82,7 +82,6 @@ impl JoinedEffect for ThermalDrift {
                 value: values[k],
                 unit: unknown.unit,
                 gradient: vec![(k, 1.0)],
-                std: None,
             })
             .collect();
         let rate = values[self.rate()];
@@ -91,7 +90,6 @@ impl JoinedEffect for ThermalDrift {
             value: self.duration / rate,
             unit: "s",
             gradient: vec![(self.rate(), -self.duration / (rate * rate))],
-            std: None,
         });
         told
     }

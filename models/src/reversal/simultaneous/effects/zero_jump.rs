@@ -121,7 +121,6 @@ impl JoinedEffect for ZeroJump {
             value: values[k],
             unit,
             gradient: vec![(k, 1.0)],
-            std: None,
         };
         vec![of(0, "jump", "um"), of(1, "time", "s")]
     }

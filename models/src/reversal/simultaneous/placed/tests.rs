@@ -147,24 +147,23 @@ fn rows_are_those_of_finite_differences() {
                     pairs.map(|(u, d)| (u - d) / (2.0 * step)).collect()
                 };
                 let of_effect = j.checked_sub(n + unknowns.effect(0));
-                let kind = of_effect.map(|k| effect.unknowns()[k].kind);
-                let found = if kind == Some(Kind::Shape) {
-                    // Shapes change by their own measure; Richardson's extrapolation.
-                    let step = 1e-3 * at.border[j - n].abs().max(0.1);
-                    let (whole, half) = (slope(step), slope(0.5 * step));
-                    let pairs = whole.iter().zip(&half);
-                    pairs.map(|(w, h)| (4.0 * h - w) / 3.0).collect()
-                } else {
-                    // Of about 10 nm in the readings.
-                    slope(1e-2 / norm.max(1e-2))
+                let step = match of_effect.map(|k| effect.unknowns()[k].kind) {
+                    // Shapes change by their own measure.
+                    Some(Kind::Shape) => 1e-3 * at.border[j - n].abs().max(0.1),
+                    // About 10 nm in the readings.
+                    _ => 1e-2 / norm.max(1e-2),
                 };
+                // Richardson's extrapolation.
+                let (whole, half) = (slope(step), slope(0.5 * step));
+                let pairs = whole.iter().zip(&half);
+                let found: Vec<f64> = pairs.map(|(w, h)| (4.0 * h - w) / 3.0).collect();
                 let error: f64 = found.iter().zip(column).map(|(f, c)| (f - c).powi(2)).sum();
                 let name = if j < n {
                     format!("c{j}")
                 } else {
                     unknowns.border_name(j - n)
                 };
-                // Truncation: the square of a relative step of 1e-3, and rounding of readings of some mm.
+                // Truncation: the fourth power of a step of a tenth of a period or width, rounding of mm.
                 assert!(
                     error.sqrt() < 2e-5 * norm.max(1e-2),
                     "{} {:?}: {name}, off by {:e} of {norm:e}",

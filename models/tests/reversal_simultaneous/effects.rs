@@ -117,6 +117,26 @@ fn what_stands_elsewhere_is_found_with_the_tilts() {
     );
 }
 
+/// Small tilts leave no trace of it; large ones move the artefact's knots off those of the truth, and finer
+/// ones follow.
+#[test]
+fn a_thickness_left_out_is_found_where_the_tilt_is_large() {
+    let machine = Machine {
+        tilts: [40e-6, -15e-6, 30e-3],
+        ..machine()
+    };
+    let mut options = options(&["thickness-shift"]);
+    options.knots = Knots::Cells(3 * CELLS);
+    let solution = fit(&machine.measured(&[Fault::Thicker(40.0)], 11), &options).unwrap();
+    let (value, std) = parameter(&solution, "thickness-shift", "thickness");
+    let std = std.unwrap();
+    assert!(
+        (value - 40.0).abs() < TIMES * std && std < 12.0,
+        "{value} ± {std}"
+    );
+    tilts_are_right(&machine, &solution, "thickness-shift");
+}
+
 #[test]
 fn what_an_indicator_does_is_found_with_the_tilts() {
     let machine = machine();

@@ -95,6 +95,45 @@ fn cad_model_in_one_fit() {
     assert!(one_fit["warnings"].to_string().contains("errsep diagnose"));
 }
 
+/// With the cone in the fit nothing is left but the rounding of the file: neither tilts nor forms take it.
+#[test]
+fn cad_model_with_its_cone_in_the_fit() {
+    let Some(file) = data("cad_reversal/cad_reversal_2.csv") else {
+        return;
+    };
+    let args = ["reversal", file.to_str().unwrap(), "--columns", CAD_COLUMNS];
+    let fit = json(&[&args, &["--simultaneous", "--with", "taper"][..]].concat());
+    let cone = &fit["effects"][0]["parameters"][0];
+    assert_eq!(
+        (&fit["effects"][0]["effect"], &cone["unit"]),
+        (&"taper".into(), &"rad".into())
+    );
+    assert!((degrees(cone) - 0.05).abs() < CAD, "{cone}");
+    for (tilt, truth) in [("alpha", -0.4), ("beta", 0.0), ("gamma", -0.1)] {
+        assert!(
+            (degrees(&fit["tilts"][tilt]) - truth).abs() < CAD,
+            "{tilt} {fit}"
+        );
+    }
+    // The attitude is exact: a column for the cone added outside alone would move β by 0.02 µrad.
+    assert!(
+        degrees(&fit["tilts"]["beta"]).to_radians().abs() < 5e-9,
+        "{fit}"
+    );
+    // Certified digits: readings rounded to 1e-6 to 1e-5 mm, below 3 nm root mean square.
+    assert!(fit["residual"]["rms"].as_f64().unwrap() < 3e-3);
+    assert!(fit["closure"]["rms"]["value"].as_f64().unwrap() < 3e-3);
+    assert!(fit["closure"]["slope"].is_null());
+    for form in ["M", "S_A", "S_B"] {
+        let values = fit["forms"][form].as_array().unwrap();
+        let most = values
+            .iter()
+            .map(|v| v.as_f64().unwrap().abs())
+            .fold(0.0, f64::max);
+        assert!(most < 1e-2, "{form} {most}");
+    }
+}
+
 #[test]
 fn cad_model_whose_slide_was_shifted_not_tilted() {
     let Some(file) = data("cad_reversal/cad_reversal_1.csv") else {

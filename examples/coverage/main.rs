@@ -17,6 +17,7 @@ mod reversal;
 mod staged;
 mod step_diagonal;
 mod tally;
+mod with;
 
 use std::process::ExitCode;
 
@@ -28,6 +29,7 @@ type Room = (&'static str, u64, fn(u64) -> Vec<Row>);
 /// One line a model.
 const ROOMS: &[Room] = &[
     ("reversal", 2000, reversal::rows),
+    ("with", 200, with::rows),
     ("staged", 2000, staged::rows),
     ("circle", 2000, circle::rows),
     ("four-sensor", 400, four_sensor::rows),

@@ -284,10 +284,12 @@ impl Case {
                 counted(tilt.angle.value - value, tilt.angle.std, freedom),
             ));
         }
-        if let Some(closure) = &solution.closure {
-            let error = closure.slope.value - 1e-6 * self.taper;
+        if let Some(closure) = &solution.closure
+            && let Some(slope) = closure.slope
+        {
+            let error = slope.value - 1e-6 * self.taper;
             let own = closure.degrees_of_freedom;
-            found.push(("closure".to_owned(), counted(error, closure.slope.std, own)));
+            found.push(("closure".to_owned(), counted(error, slope.std, own)));
         }
         let x: Vec<f64> = LOOKED_AT.iter().map(|share| share * LENGTH_MM).collect();
         let profiles = solution.forms(&x);

@@ -18,7 +18,7 @@ pub mod source;
 pub mod table;
 pub mod units;
 
-pub use folder::OutFolder;
+pub use folder::{OutFile, OutFolder};
 pub use message::{Message, Status};
 pub use output::CsvTable;
 pub use setup::SetupFile;

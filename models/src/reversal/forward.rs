@@ -75,7 +75,7 @@ impl Attitude {
     ///
     /// # Errors
     /// [`NoValue`] where the form is so steep that the probe would touch it in two places.
-    pub fn contact(&self, x: f64, form: impl Fn(f64) -> (f64, f64)) -> Result<f64, NoValue> {
+    pub fn contact(&self, x: f64, mut form: impl FnMut(f64) -> (f64, f64)) -> Result<f64, NoValue> {
         let mut u = (x + self.half_mm * self.sin) / self.cos;
         for _ in 0..MOST_STEPS {
             let (height, slope) = form(u);

@@ -78,7 +78,9 @@ fn with_small_tilts_no_thickness_and_equal_noise_it_is_the_staged_solution() {
         assert!(error.abs() < 1e-12, "{}: {error:e}", s.name);
     }
     let closure = simultaneous.closure.as_ref().unwrap();
-    assert!((closure.slope.value - staged.closure.as_ref().unwrap().slope.value).abs() < 1e-12);
+    assert!(
+        (closure.slope.unwrap().value - staged.closure.as_ref().unwrap().slope.value).abs() < 1e-12
+    );
     for (form, s) in simultaneous.forms(&staged.x).iter().zip(&staged.forms) {
         assert_eq!(form.name, s.name);
         for (a, b) in form.values.iter().zip(&s.values) {

@@ -4,6 +4,7 @@ use errsep_models::reversal::staged::Value as Measured;
 use errsep_models::reversal::{Convention, NOT_SHOWN};
 use serde_json::{Map, Value, json};
 
+use super::effects;
 use super::outcome::Outcome;
 use crate::cli::quantity::{quantity_json, unexpandable};
 use crate::io::Message;
@@ -23,9 +24,13 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
         "tilts": tilts(o)?,
         "tilt_combinations": combinations(o)?,
         "contrasts": contrasts(o)?,
+        "effects": effects::json(&o.effects),
         "closure": match &o.closure {
             Some(c) => json!({
-                "slope": angle(o, "closure slope", c.slope)?,
+                "slope": match c.slope {
+                    Some(slope) => angle(o, "closure slope", slope)?,
+                    None => Value::Null,
+                },
                 "rms": {"value": c.rms, "unit": "um"},
                 "expected_rms": {"value": c.expected_rms, "unit": "um"},
                 "x": c.x,

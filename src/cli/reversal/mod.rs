@@ -1,5 +1,6 @@
 //! `errsep reversal`: from the readings of a reversal to tilts and forms with their uncertainty.
 
+mod effects;
 mod json;
 mod outcome;
 mod page;
@@ -19,7 +20,7 @@ use serde_json::Value;
 
 use super::{Answer, CommonArgs, Format};
 use crate::io::reversal::{ColumnMap, ReversalData, ReversalSetup, read};
-use crate::io::{Message, Status};
+use crate::io::{Message, OutFile, Status};
 use crate::report::Page;
 use outcome::Outcome;
 
@@ -34,6 +35,7 @@ left out: the answer says what the rest determines.
 Examples:
     errsep reversal data.csv
     errsep reversal data.csv --setup setup.toml --simultaneous --out report
+    errsep reversal data.csv --simultaneous --with thermal-drift,zero-jump --corrected clean.csv
     errsep reversal cad.csv --columns x=z_mm:mm,1A=I_0_0:mm,2B=I_0_180:mm")]
 pub struct Args {
     /// The readings.
@@ -49,6 +51,18 @@ pub struct Args {
     /// Solve tilts and forms in one least-squares fit with exact geometry.
     #[arg(long)]
     simultaneous: bool,
+    /// Effects that are fitted along with tilts and forms, by the names of `errsep diagnose`, such as
+    /// thermal-drift,zero-jump.
+    #[arg(
+        long,
+        value_name = "EFFECT,...",
+        value_delimiter = ',',
+        requires = "simultaneous"
+    )]
+    with: Vec<String>,
+    /// Write the readings without what these effects change in them into this file.
+    #[arg(long, value_name = "FILE", requires = "with")]
+    corrected: Option<PathBuf>,
     /// Names and units of the columns, as role=column:unit,...
     #[arg(long, value_name = "ROLE=COLUMN:UNIT,...")]
     columns: Option<ColumnMap>,
@@ -78,12 +92,20 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     if let Some(columns) = &args.columns {
         setup.columns = columns.clone();
     }
+    let corrected = args
+        .corrected
+        .as_deref()
+        .map(OutFile::reserve)
+        .transpose()?;
     let progress = super::progress("reading", None);
     let data = read(&args.data, &setup.columns)?;
     progress.set_message("solving");
     let mut outcome = solve(args, &data, &setup)?;
     outcome.warnings.extend(still(&data));
     outcome.warnings.extend(pointer(args, &outcome));
+    if let Some(file) = corrected {
+        effects::write_corrected(&args.data, &setup, &data, &outcome, file)?;
+    }
     progress.finish_and_clear();
     let mut inputs = vec![args.data.clone()];
     inputs.extend(args.setup.clone());
@@ -141,7 +163,8 @@ fn pointer(args: &Args, o: &Outcome) -> Option<String> {
     let closes = o
         .closure
         .as_ref()
-        .is_none_or(|c| !staged::does_not_close(c.slope));
+        .and_then(|c| c.slope)
+        .is_none_or(|slope| !staged::does_not_close(slope));
     if o.disagree != Some(true) && closes {
         return None;
     }
@@ -157,7 +180,7 @@ fn pointer(args: &Args, o: &Outcome) -> Option<String> {
 
 fn solve(args: &Args, data: &ReversalData, setup: &ReversalSetup) -> Result<Outcome, Message> {
     if args.simultaneous {
-        return simultaneous::solve(&args.data, data, setup);
+        return simultaneous::solve(&args.data, data, setup, &args.with);
     }
     let begin = Instant::now();
     let removal = match args.method {

@@ -1,6 +1,7 @@
 //! The answer of either solution, in one form for terminal, JSON, tables and report.
 
 use errsep_models::noise::Law;
+use errsep_models::reversal::simultaneous::FittedEffect;
 use errsep_models::reversal::staged::Value;
 use errsep_models::reversal::{Channel, Contrast, Convention};
 use errsep_models::straightness::{ReferenceLine, straightness};
@@ -29,8 +30,8 @@ pub struct Form {
 }
 
 pub struct Closure {
-    /// rad.
-    pub slope: Value,
+    /// rad; absent where an effect in the fit takes it up.
+    pub slope: Option<Value>,
     /// How well its standard uncertainty is known.
     pub freedom: DegreesOfFreedom,
     pub x: Vec<f64>,
@@ -90,6 +91,10 @@ pub struct Outcome {
     pub knots: Option<report::reversal::Knots>,
     /// What the reader has to weigh.
     pub warnings: Vec<String>,
+    /// Effects in the fit.
+    pub effects: Vec<FittedEffect>,
+    /// What they change in each reading, µm, in the order of the data.
+    pub effect_changes: Vec<f64>,
 }
 
 impl Outcome {
@@ -108,7 +113,7 @@ impl Outcome {
     pub fn quantity(&self, label: &str, angle: Value) -> Result<Quantity, UncertaintyError> {
         // What is shown of the closure is its slope, whether as such or as a contrast.
         let freedom = match &self.closure {
-            Some(closure) if closure.slope == angle => closure.freedom,
+            Some(closure) if closure.slope == Some(angle) => closure.freedom,
             _ => self.noise_freedom,
         };
         Ok(Quantity::new(label, angle.value, angle.std, "rad")?.with_degrees_of_freedom(freedom))

@@ -5,12 +5,14 @@ use std::path::Path;
 use errsep_models::reversal::NOT_SHOWN;
 use errsep_models::uncertainty::coverage_factor;
 
+use super::effects;
 use super::outcome::Outcome;
 use super::text::summary;
 use crate::cli::quantity::COVERAGE;
 use crate::io::reversal::{ReversalData, ReversalSetup};
 use crate::report::reversal::{
-    Angle, Closure, Contrast, Convergence, Form, Residual, Straightness, View, page as lay_out,
+    Angle, Closure, Contrast, Convergence, Effect, Form, Residual, Straightness, View,
+    page as lay_out,
 };
 use crate::report::{Page, Standing};
 
@@ -32,6 +34,16 @@ pub fn page(file: &Path, data: &ReversalData, setup: &ReversalSetup, o: &Outcome
                 value: t.angle.value,
                 std: Some(t.angle.std),
                 meaning: o.meaning(t),
+            })
+            .collect(),
+        effects: o
+            .effects
+            .iter()
+            .flat_map(|e| e.parameters.iter().map(move |p| (e, p)))
+            .map(|(e, p)| Effect {
+                effect: effects::title(e),
+                parameter: p.name.clone(),
+                value: effects::in_words(p),
             })
             .collect(),
         contrasts: o

@@ -4,11 +4,13 @@ use std::path::Path;
 
 use errsep_models::reversal::simultaneous::{
     self, ChannelNoise, KnotVerdict, Knots, Noise, NoiseOrigin, Options, ReversalError,
-    Simultaneous, Thickness,
+    Simultaneous, Thickness, With,
 };
+use errsep_models::reversal::staged::Value as Measured;
 use errsep_models::reversal::{Channel, Contrast, Observations};
 use errsep_models::uncertainty::DegreesOfFreedom;
 
+use super::effects;
 use super::outcome::{Angle, Closure, Convergence, Form, Outcome, Residual};
 use super::refusal::OTHER_UNITS;
 use crate::io::Message;
@@ -18,7 +20,12 @@ use crate::report::{self, number};
 /// More positions than this of a form are not seen apart.
 const MOST_POSITIONS: usize = 1001;
 
-pub fn solve(file: &Path, data: &ReversalData, setup: &ReversalSetup) -> Result<Outcome, Message> {
+pub fn solve(
+    file: &Path,
+    data: &ReversalData,
+    setup: &ReversalSetup,
+    with: &[String],
+) -> Result<Outcome, Message> {
     let options = Options {
         convention: setup.convention,
         thickness: match setup.thickness {
@@ -28,6 +35,7 @@ pub fn solve(file: &Path, data: &ReversalData, setup: &ReversalSetup) -> Result<
         },
         noise: setup.noise.map_or(Noise::Estimated, Noise::Declared),
         knots: setup.knots.map_or(Knots::Chosen, Knots::Cells),
+        effects: with.iter().map(With::named).collect(),
         ..Options::default()
     };
     let fit =
@@ -36,6 +44,9 @@ pub fn solve(file: &Path, data: &ReversalData, setup: &ReversalSetup) -> Result<
 }
 
 fn refusal(why: &ReversalError, file: &Path, data: &ReversalData) -> Message {
+    if let Some(message) = effects::refusal(why) {
+        return message.in_file(file);
+    }
     let (message, remedy) = match why {
         ReversalError::NotConverged { .. } | ReversalError::NoStart(_) => (
             Message::not_solved(why.to_string()),
@@ -157,10 +168,15 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         rms: c.rms,
         expected_rms: expected_closure(fit, c.profile.len()),
     });
-    let contrasts = closure.as_ref().map(|closure| {
+    // The contrast that the convention holds at zero is the closure's, or the taper's that takes it up.
+    let held = closure
+        .as_ref()
+        .and_then(|c| c.slope)
+        .or_else(|| taper(fit));
+    let contrasts = held.map(|held| {
         Contrast::ALL.map(|contrast| {
             let tilt = tilts.iter().find(|t| t.contrast == Some(contrast));
-            (contrast, tilt.map_or(closure.slope, |t| t.angle))
+            (contrast, tilt.map_or(held, |t| t.angle))
         })
     });
     Outcome {
@@ -195,9 +211,21 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         },
         knots: Some(knots(fit, setup)),
         warnings: warnings(fit, closure.as_ref(), setup),
+        effects: fit.effects.clone(),
+        effect_changes: fit.effect_changes.clone(),
         closure,
         tilts,
     }
+}
+
+/// The half angle of a taper in the fit, rad.
+fn taper(fit: &Simultaneous) -> Option<Measured> {
+    let effect = fit.effects.iter().find(|e| e.effect == "taper")?;
+    let angle = effect.parameters.first()?;
+    Some(Measured {
+        value: angle.value,
+        std: angle.std?,
+    })
 }
 
 /// The least of some degrees of freedom.
@@ -309,10 +337,20 @@ fn warnings(fit: &Simultaneous, closure: Option<&Closure>, setup: &ReversalSetup
         ));
     }
     match closure {
-        Some(closure) => {
-            warnings.extend(super::staged::slope_warning(closure.slope, fit.convention))
-        }
+        Some(closure) => warnings.extend(
+            closure
+                .slope
+                .and_then(|slope| super::staged::slope_warning(slope, fit.convention)),
+        ),
         None => warnings.push(super::staged::NOTHING_CLOSES.to_owned()),
+    }
+    if fit.times_assumed {
+        warnings.push(
+            "no times are given: the readings are taken to follow each other evenly, one a second, first \
+             spindle position first, each repeat forward and then backward; for an effect in time add a \
+             column `time`"
+                .to_owned(),
+        );
     }
     if setup.fit_thickness {
         let thickness = fit.thickness();

@@ -62,7 +62,7 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         tilts,
         contrasts: s.contrasts,
         closure: s.closure.as_ref().map(|c| Closure {
-            slope: c.slope,
+            slope: Some(c.slope),
             freedom: freedom(s.noise.degrees_of_freedom),
             x: c.x.clone(),
             profile: c.profile.clone(),
@@ -89,6 +89,8 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         },
         knots: None,
         warnings: warnings(&s, setup),
+        effects: Vec::new(),
+        effect_changes: Vec::new(),
         forms: s
             .forms
             .into_iter()

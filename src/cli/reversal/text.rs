@@ -7,6 +7,7 @@ use errsep_models::reversal::staged::Value;
 use errsep_models::reversal::{Channel, NOT_SHOWN};
 use errsep_models::uncertainty::coverage_factor;
 
+use super::effects;
 use super::outcome::Outcome;
 use crate::cli::quantity::COVERAGE;
 use crate::io::reversal::ReversalData;
@@ -112,6 +113,7 @@ fn write_all(t: &mut String, file: &Path, data: &ReversalData, o: &Outcome) -> s
             names(&missing)
         )?;
     }
+    write_effects(t, o)?;
     if let Some(contrasts) = &o.contrasts {
         writeln!(t, "\nContrasts of the four slopes (1A 1B 2A 2B)")?;
         for (contrast, value) in contrasts {
@@ -144,10 +146,13 @@ fn write_all(t: &mut String, file: &Path, data: &ReversalData, o: &Outcome) -> s
     if let Some(closure) = &o.closure {
         writeln!(
             t,
-            "\nClosure: profile {} µm rms (noise alone: {}), slope {} µrad",
+            "\nClosure: profile {} µm rms (noise alone: {}), slope {}",
             number::plain(closure.rms, 3),
             number::plain(closure.expected_rms, 3),
-            measured_urad(closure.slope)
+            match closure.slope {
+                Some(slope) => format!("{} µrad", measured_urad(slope)),
+                None => "taken up by an effect in the fit".to_owned(),
+            }
         )?;
     }
     writeln!(
@@ -176,6 +181,21 @@ fn write_all(t: &mut String, file: &Path, data: &ReversalData, o: &Outcome) -> s
     writeln!(t, "\nNot shown by any such measurement:")?;
     for (name, why) in NOT_SHOWN {
         writeln!(t, "  {name}: {why}")?;
+    }
+    Ok(())
+}
+
+fn write_effects(t: &mut String, o: &Outcome) -> std::fmt::Result {
+    if o.effects.is_empty() {
+        return Ok(());
+    }
+    writeln!(t, "\nEffects in the fit (value ± standard uncertainty)")?;
+    for effect in &o.effects {
+        writeln!(t, "  {}", effects::title(effect))?;
+        for parameter in &effect.parameters {
+            let words = effects::in_words(parameter);
+            writeln!(t, "    {:16} {words}", parameter.name)?;
+        }
     }
     Ok(())
 }

@@ -15,6 +15,7 @@ mod belongings;
 mod contents;
 mod location;
 mod signals;
+mod single;
 mod staged;
 
 use std::ffi::OsStr;
@@ -26,6 +27,7 @@ use belongings::RESULT;
 use contents::Contents;
 use location::{Aside, Location, Lock, sweep};
 use signals::Held;
+pub use single::OutFile;
 use staged::Staged;
 
 use super::provenance::Digested;

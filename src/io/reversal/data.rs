@@ -66,22 +66,22 @@ impl ReversalData {
     }
 }
 
-struct Scales {
+pub(super) struct Scales {
     x_mm: f64,
     /// µm in the unit of each channel's readings.
-    reading_um: [f64; 4],
+    pub(super) reading_um: [f64; 4],
 }
 
-struct Columns {
+pub(super) struct Columns {
     x: Column,
     repeat: Option<Column>,
     direction: Option<Column>,
     time: Option<Column>,
-    readings: Readings,
-    scales: Scales,
+    pub(super) readings: Readings,
+    pub(super) scales: Scales,
 }
 
-enum Readings {
+pub(super) enum Readings {
     Tidy { channel: Column, reading: Column },
     Wide(Vec<(Channel, Column)>),
 }
@@ -134,7 +134,7 @@ pub fn read(path: &Path, map: &ColumnMap) -> Result<ReversalData, Message> {
     Ok(data)
 }
 
-fn find_columns(table: &TableReader, map: &ColumnMap) -> Result<Columns, Message> {
+pub(super) fn find_columns(table: &TableReader, map: &ColumnMap) -> Result<Columns, Message> {
     if map.is_empty() {
         table.only(&ROLES)?;
     }
@@ -244,7 +244,7 @@ fn read_row(row: Row<'_>, columns: &Columns, data: &mut ReversalData) -> Result<
     }
 }
 
-fn channel_of(row: Row<'_>, column: &Column) -> Result<Channel, Message> {
+pub(super) fn channel_of(row: Row<'_>, column: &Column) -> Result<Channel, Message> {
     let text = row.text(column);
     let names = Channel::ALL.map(Channel::name);
     Channel::from_name(text).ok_or_else(|| {

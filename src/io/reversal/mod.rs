@@ -1,9 +1,11 @@
 //! Readings and set-up of a reversal, as files hold them.
 
 mod columns;
+mod corrected;
 mod data;
 mod setup;
 
 pub use columns::ColumnMap;
+pub use corrected::corrected;
 pub use data::{Layout, ReversalData, read};
 pub use setup::ReversalSetup;

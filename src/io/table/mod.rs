@@ -32,6 +32,11 @@ impl Column {
     pub fn name(&self) -> &str {
         &self.name
     }
+
+    /// Its place among the fields of a row.
+    pub fn index(&self) -> usize {
+        self.index
+    }
 }
 
 /// A table being read, row by row.
@@ -134,6 +139,11 @@ impl TableReader {
     /// The file.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The line that names the columns, as it stands in the file.
+    pub fn header(&self) -> &str {
+        &self.header
     }
 
     /// How the file is written, as far as it has been read.

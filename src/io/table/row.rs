@@ -17,6 +17,11 @@ impl<'a> Row<'a> {
         self.table.line_number
     }
 
+    /// The line as it stands in the file, without its end.
+    pub fn line_text(self) -> &'a str {
+        std::str::from_utf8(&self.table.line).unwrap_or("")
+    }
+
     pub(super) fn field(self, index: usize) -> &'a str {
         let t = self.table;
         let start = match index {

@@ -5,7 +5,9 @@ mod view;
 
 use std::collections::BTreeSet;
 
-pub use view::{Angle, Closure, Contrast, Convergence, Form, Knots, Residual, Straightness, View};
+pub use view::{
+    Angle, Closure, Contrast, Convergence, Effect, Form, Knots, Residual, Straightness, View,
+};
 
 use super::plot::{Axis, Chart, Mark, Panels, Series};
 use super::{Cell, Figure, KeyFigure, Page, Section, Standing, Table, number};
@@ -19,6 +21,7 @@ pub fn page(view: &View) -> Page {
     Page::new("Reversal", format!("{} · {}", view.data, view.method))
         .summary(standing, view.summary.clone())
         .section(tilts(view))
+        .section(effects(view))
         .section(forms(view))
         .section(straightness(view))
         .section(residuals(view))
@@ -50,6 +53,27 @@ fn tilts(view: &View) -> Section {
     warned
         .key_figures(figures)
         .paragraph("After ±: standard uncertainty (k = 1). 1 µrad is 1 µm over a metre.")
+}
+
+fn effects(view: &View) -> Section {
+    let section = Section::new("Effects in the fit");
+    if view.effects.is_empty() {
+        return section;
+    }
+    let rows = view.effects.iter().map(|e| {
+        [
+            e.effect.clone().into(),
+            e.parameter.clone().into(),
+            e.value.clone().into(),
+        ]
+    });
+    section.table(
+        Table::new(
+            "Fitted along with tilts and forms, with one covariance",
+            ["effect", "parameter", "value ± standard uncertainty"],
+        )
+        .rows(rows),
+    )
 }
 
 /// Names are spelled out in data and code; a page has room for the letter.

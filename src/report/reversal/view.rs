@@ -16,6 +16,8 @@ pub struct View {
     pub standing: Option<Standing>,
     /// The tilts that these data determine.
     pub tilts: Vec<Angle>,
+    /// Effects in the fit, one row a parameter.
+    pub effects: Vec<Effect>,
     /// All slope contrasts with their meaning.
     pub contrasts: Vec<Contrast>,
     /// The forms, each over its own positions.
@@ -61,6 +63,17 @@ pub struct Angle {
     pub std: Option<f64>,
     /// What it means on the machine.
     pub meaning: String,
+}
+
+/// A parameter of an effect in the fit.
+#[derive(Debug, Clone, Default)]
+pub struct Effect {
+    /// The effect, with its variant.
+    pub effect: String,
+    /// The parameter.
+    pub parameter: String,
+    /// Value, standard uncertainty and unit in words.
+    pub value: String,
 }
 
 /// One combination of the channels' slopes.

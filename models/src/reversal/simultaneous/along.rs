@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::noise::{Survey, sum_of_squares};
 use super::problem::Reversal;
+use super::row_source::RowSource;
 use super::solution::Simultaneous;
 use super::traces::Group;
 use crate::noise::{Contrasts, Law, Posterior, decays, markov_form};
@@ -53,7 +54,7 @@ pub struct Gathered {
 impl Gathered {
     /// Gathers the readings of groups around a solution.
     pub fn new(
-        solution: &Simultaneous,
+        source: &RowSource,
         survey: &Survey,
         groups: &[Group],
         weights: &[f64],
@@ -61,7 +62,6 @@ impl Gathered {
         let mut traces = Vec::new();
         let mut places = 0;
         for group in groups {
-            let channel = &survey.channels[group.channel];
             for (trace, on_cells) in group.traces.iter().zip(&group.on_cells) {
                 let rows_of = &survey.traces[group.channel][*trace];
                 let mut cells = Cells {
@@ -80,8 +80,7 @@ impl Gathered {
                     };
                     for k in 0..taken {
                         let at = range.start + (2 * k + 1) * range.len() / (2 * taken);
-                        let x = channel.x[rows_of.row(at)];
-                        let own = solution.predict(channel.channel, x)?;
+                        let own = source.row(group.channel, rows_of.row(at))?;
                         row.band
                             .extend(own.band.iter().map(|(j, v)| (*j, factor * v)));
                         row.border.resize(own.border.len(), 0.0);
@@ -195,7 +194,8 @@ impl AlongTraces {
         let Some(posterior) = Posterior::of(&contrasts) else {
             return Ok(None);
         };
-        let gathered = Gathered::new(solution, survey, &survey.repeats, &problem.weights)?;
+        let source = RowSource::new(solution, problem)?;
+        let gathered = Gathered::new(&source, survey, &survey.repeats, &problem.weights)?;
         let mut lengths: Vec<(f64, Vec<Vec<f64>>)> = Vec::new();
         let length_of = posterior
             .possible()

@@ -4,7 +4,8 @@ use errsep_solvers::structured::Fit;
 
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
-use super::solution::{Closure, Scatter};
+use super::scatter::Scatter;
+use super::solution::Closure;
 use crate::reversal::staged::Value;
 
 /// The closure: the contrast the convention holds at zero, if it were released; and the closure
@@ -17,17 +18,21 @@ pub fn of(
     scatter: &Scatter,
 ) -> Option<Closure> {
     let index = problem.unknowns.closure_index()?;
-    let (value, covariance) = result.released(problem, index)?;
-    let own = covariance.variance(&[], &[(index, 1.0)]);
-    let (std, degrees_of_freedom) =
-        scatter
-            .released(value * value / own)
-            .spread(&covariance, &[], &[(index, 1.0)]);
+    let released = result.released(problem, index);
+    if released.is_none() && problem.joined.is_none() {
+        return None;
+    }
+    let slope = released.map(|(value, covariance)| {
+        let own = covariance.variance(&[], &[(index, 1.0)]);
+        let scatter = scatter.released(value * value / own);
+        let (std, freedom) = scatter.spread(&covariance, &[], &[(index, 1.0)]);
+        (Value { value, std }, freedom)
+    });
     let (x, profile) = profile(problem, channels, residuals);
     let rms = (profile.iter().map(|c| c * c).sum::<f64>() / profile.len().max(1) as f64).sqrt();
     Some(Closure {
-        slope: Value { value, std },
-        degrees_of_freedom,
+        slope: slope.map(|s| s.0),
+        degrees_of_freedom: slope.map_or(f64::INFINITY, |s| s.1),
         x,
         profile,
         rms,

@@ -99,6 +99,74 @@ pub enum ReversalError {
         /// How many times.
         times: f64,
     },
+    /// An effect that nobody knows.
+    #[error("no effect is called `{effect}`")]
+    UnknownEffect {
+        /// The name.
+        effect: String,
+    },
+    /// An effect asked for twice.
+    #[error("the effect {effect} is asked for twice")]
+    EffectTwice {
+        /// Its name.
+        effect: &'static str,
+    },
+    /// A start of an effect that has no such variant or another number of unknowns.
+    #[error("the effect {effect} has no variant and unknowns like those of the start given")]
+    EffectStart {
+        /// Its name.
+        effect: &'static str,
+    },
+    /// An effect that the fit takes up, or has in it already.
+    #[error("{effect} cannot join this fit: {why}")]
+    EffectRefused {
+        /// Its name.
+        effect: &'static str,
+        /// Why.
+        why: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A size that the readings leave open.
+    #[error(
+        "these readings do not determine the {parameter} of {effect}: its standard uncertainty would be {std:.3} {unit}, more than its whole plausible range"
+    )]
+    EffectNotDetermined {
+        /// The effect.
+        effect: &'static str,
+        /// Its parameter.
+        parameter: String,
+        /// Its standard uncertainty.
+        std: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
+    /// A size that no machine has.
+    #[error(
+        "with {effect} in the fit its {parameter} would be {value:.4} {unit}; plausible is {low} to {high} {unit}: it is not what these readings show"
+    )]
+    EffectImplausible {
+        /// The effect.
+        effect: &'static str,
+        /// Its parameter.
+        parameter: String,
+        /// Its value.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// Smallest plausible value.
+        low: f64,
+        /// Greatest plausible value.
+        high: f64,
+    },
+    /// The fit with effects does not end at a minimum that determines everything.
+    #[error("the fit with {effects} has no answer: {ending}")]
+    EffectsNotConverged {
+        /// The effects.
+        effects: String,
+        /// How it ended, in words.
+        ending: String,
+    },
     /// Break points that carry no spline.
     #[error("knots: {0}")]
     Breaks(#[from] BreakError),

@@ -5,26 +5,28 @@ use std::time::Instant;
 
 use errsep_solvers::linear::bordered::BorderedCovariance;
 use errsep_solvers::loss::Loss;
-use errsep_solvers::structured::{Options as Minimisation, Parameters, minimise};
+use errsep_solvers::structured::{self, Options as Minimisation, Parameters};
 
 use super::along::AlongTraces;
 use super::closure;
-use super::error::{FEWEST_FREE, ReversalError};
-use super::gauge::Axis;
-use super::knots::{self, Choice, FEWEST_POSITIONS, KnotTrial};
+use super::descent::{approach, minimise};
+use super::effects::{CATALOGUE, Setting, times};
+use super::error::ReversalError;
+use super::fitted_knots::FittedKnots;
+use super::ground::{Begun, Ground};
+use super::knots::{self, FEWEST_POSITIONS};
 use super::noise::{self, Left, Settled, Survey, freedom_left, sum_of_squares, weights_of};
-use super::options::{Knots, Noise, Options, Thickness};
+use super::options::{Noise, Options, Thickness};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
-use super::seed;
-use super::solution::{
-    Agreement, ChannelNoise, Convergence, FittedKnots, NoiseOrigin, Scatter, Simultaneous,
-};
-use super::unknowns::Unknowns;
+use super::scatter::Scatter;
+use super::search::search;
+use super::solution::{Agreement, ChannelNoise, Convergence, NoiseOrigin, Simultaneous};
+use super::told;
 use crate::reversal::Observations;
 use crate::units::mm_from_um;
 
-/// Fits tilts, offsets and forms to all readings at once.
+/// Fits tilts, offsets and forms to all readings at once, with the effects that are asked for.
 ///
 /// # Errors
 /// [`ReversalError`]: input that cannot be used, or a fit that has no answer.
@@ -32,92 +34,100 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
     let began = Instant::now();
     check(observations, options)?;
     let channels = ChannelReadings::sort(observations);
-    let lines = seed::lines(&channels)?;
-    let axis = Axis::of(&channels).ok_or(ReversalError::OnePosition {
-        channel: channels[0].channel.name(),
-        x: channels[0].x[0],
-    })?;
-    let (thickness_mm, thickness_free) = match options.thickness {
-        Thickness::NotKnown => (0.0, false),
-        Thickness::Known(mm) => (mm, false),
-        Thickness::Fitted(mm) => (mm, true),
-    };
     let survey = Survey::new(&channels, observations);
-    let mut sigmas = survey.first_noise(options.noise);
-    let unknowns_of = |coefficients: usize| {
-        Unknowns::new(
-            channels.iter().map(|c| c.channel).collect(),
+    let sigmas = survey.first_noise(options.noise);
+    let ground = Ground::new(observations, options, &channels, weights_of(&sigmas))?;
+    let mut solution = if options.effects.is_empty() {
+        solve(&ground, &survey, sigmas, None)?
+    } else {
+        let times = times(observations);
+        let setting = Setting::of(
+            observations,
+            &times,
             options.convention,
-            thickness_free,
-            coefficients,
-        )
+            ground.thickness_free,
+        );
+        let found = search(&ground, &times, &setting)?;
+        let begun = Begun::new(observations, &times, &found);
+        let mut solution = solve(&ground, &survey, sigmas, Some(&begun))?;
+        solution.times_assumed = !setting.timed && asks_for_time(options);
+        solution
     };
-    let choice = Choice {
-        channels: &channels,
-        lines: &lines,
-        axis,
-        thickness_mm,
-        weights: &weights_of(&sigmas),
-    };
-    let declared = matches!(options.noise, Noise::Declared(_));
-    let free = if declared { 0 } else { FEWEST_FREE };
-    let most = knots::most_cells(&channels, &unknowns_of(FEWEST_POSITIONS), free);
-    let (breaks, table) = choose_breaks(&choice, &options.knots, most, unknowns_of)?;
-    let unknowns = unknowns_of(breaks.len() + 2);
-    let readings = observations.readings.len();
-    enough(&channels, readings, unknowns.free_count(), free)?;
-    let bases = match &options.knots {
-        Knots::At(_) => {
-            let basis = crate::basis::bspline::CubicBSpline::new(breaks.clone())?;
-            vec![basis; unknowns.forms.len()]
-        }
-        _ => choice.bases(&unknowns, &breaks)?,
-    };
-    let tilts = match &options.start_tilts_rad {
-        None => seed::tilts(&unknowns, &lines),
-        Some(given) if given.len() == unknowns.tilt_count() => given.clone(),
-        Some(given) => {
-            return Err(ReversalError::StartLength {
-                given: given.len(),
-                needed: unknowns.tilt_count(),
-            });
-        }
-    };
-    let start = seed::start(&unknowns, &tilts, &lines, thickness_mm);
-    let mut problem = Reversal::new(
-        &channels,
-        unknowns,
-        bases,
-        axis,
-        thickness_mm,
-        weights_of(&sigmas),
-    );
+    solution.convergence.seconds = began.elapsed().as_secs_f64();
+    Ok(solution)
+}
+
+/// Whether any effect goes by the time of the readings.
+fn asks_for_time(options: &Options) -> bool {
+    let timed = CATALOGUE.iter().filter(|entry| entry.timed);
+    timed
+        .into_iter()
+        .any(|entry| options.effects.iter().any(|with| with.effect == entry.name))
+}
+
+/// The fit with these effects: knots, minimum, noise, uncertainty.
+fn solve(
+    ground: &Ground,
+    survey: &Survey,
+    mut sigmas: Vec<f64>,
+    effects: Option<&Begun>,
+) -> Result<Simultaneous, ReversalError> {
+    let (options, channels) = (ground.options, ground.channels);
+    let (breaks, table) = ground.breaks(effects)?;
+    let readings = ground.observations.readings.len();
+    let unknowns = ground.unknowns(breaks.len() + 2, effects);
+    enough(
+        channels,
+        readings,
+        unknowns.free_count(),
+        ground.fewest_free(),
+    )?;
+    let (mut problem, start) = ground.problem(&breaks, effects)?;
     let start = match problem.unknowns.thickness_index() {
         Some(index) => start_of_thickness(&mut problem, index, start, options.minimisation)?,
         None => head_start(&problem, &start, options.minimisation).unwrap_or(start),
     };
-    let Settled {
-        fit: result,
-        residuals: by_channel,
-        known,
-        history,
-        first_run,
-    } = noise::settle(&mut problem, start, options, &survey, &mut sigmas)?;
-    let Some(covariance) = result.covariance() else {
-        return Err(ReversalError::NotConverged {
-            ending: result.ending.to_string(),
-        });
-    };
+    let start = approach(&problem, start, options.minimisation)?;
+    let settled = noise::settle(&mut problem, start, options, survey, &mut sigmas)?;
+    let knots = FittedKnots::new(breaks, table, &settled.residuals);
+    let mut solution = assemble(ground, &problem, &settled, &sigmas, knots)?;
+    is_determined(&solution, &solution.covariance, channels, &problem.weights)?;
+    let declared = matches!(options.noise, Noise::Declared(_));
+    if !declared && options.loss == Loss::Quadratic && !survey.repeats.is_empty() {
+        learn_from_repeats(&mut solution, &problem, survey, &settled.residuals, &sigmas)?;
+    }
+    let (fit, residuals) = (&settled.fit, &settled.residuals);
+    solution.closure = closure::of(&problem, fit, channels, residuals, &solution.scatter);
+    if problem.joined.is_some() {
+        solution.effects = told::effects(&solution, &problem)?;
+        solution.effect_changes = told::changes(&solution, &problem)?;
+    }
+    Ok(solution)
+}
 
-    let freedom = freedom_left(&problem);
-    let left = Left::of_residuals(&problem, &by_channel, known);
+/// The solution with white noise.
+fn assemble(
+    ground: &Ground,
+    problem: &Reversal,
+    settled: &Settled,
+    sigmas: &[f64],
+    knots: FittedKnots,
+) -> Result<Simultaneous, ReversalError> {
+    let (options, channels) = (ground.options, ground.channels);
+    let (result, by_channel) = (&settled.fit, &settled.residuals);
+    let Some(covariance) = result.covariance() else {
+        return Err(not_converged(problem, result.ending.to_string()));
+    };
+    let freedom = freedom_left(problem);
+    let left = Left::of_residuals(problem, by_channel, settled.known);
     let robust = options.loss != Loss::Quadratic;
+    let declared = matches!(options.noise, Noise::Declared(_));
     // Rows in units of the declared noise have a variance of one, and what the model misses; otherwise
     // their own scatter tells it, with what the model misses in it.
     let variance = match (declared, robust) {
-        (_, true) => noise::robust_unit(&problem, &by_channel).powi(2),
+        (_, true) => noise::robust_unit(problem, by_channel).powi(2),
         (true, _) => 1.0 + left.variance,
-        _ => weighted_squares(&by_channel, &problem.weights) / freedom,
+        _ => weighted_squares(by_channel, &problem.weights) / freedom,
     };
     let scatter = Scatter::White {
         variance,
@@ -132,17 +142,18 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
     } else {
         (variance - left.variance).max(0.0).sqrt()
     };
-    let mut residuals = vec![0.0; readings];
-    for (channel, own) in channels.iter().zip(&by_channel) {
+    let mut residuals = vec![0.0; ground.observations.readings.len()];
+    for (channel, own) in channels.iter().zip(by_channel) {
         for (i, r) in channel.source.iter().zip(own) {
             residuals[*i as usize] = *r;
         }
     }
-    let mut solution = Simultaneous {
+    let joined = problem.joined.iter().flat_map(|j| j.members());
+    Ok(Simultaneous {
         convention: options.convention,
         unknowns: problem.unknowns.clone(),
         bases: problem.bases.clone(),
-        axis,
+        axis: ground.axis,
         thickness_mm: problem.thickness(&result.parameters),
         cubics: problem.cubics(&result.parameters),
         gauge: problem.gauge().clone(),
@@ -150,7 +161,7 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         covariance,
         scatter,
         weights: problem.weights.clone(),
-        noise: channel_noise(&channels, &sigmas, &by_channel, unit, freedom),
+        noise: channel_noise(channels, sigmas, by_channel, unit, freedom),
         noise_origin: if declared {
             NoiseOrigin::Declared
         } else {
@@ -158,38 +169,62 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         },
         agreement: Agreement {
             disagree: left.clear,
-            missed: left.variance.sqrt() * rms(&sigmas),
+            missed: left.variance.sqrt() * rms(sigmas),
         },
         residuals,
         degrees_of_freedom: freedom,
         closure: None,
-        knots: FittedKnots::new(breaks, table, &by_channel),
+        effects: Vec::new(),
+        effect_changes: Vec::new(),
+        times_assumed: false,
+        joined: joined.map(|m| (m.name, Arc::clone(&m.effect))).collect(),
+        knots,
         convergence: Convergence {
             ending: result.ending.clone(),
-            history,
-            first_run,
+            history: settled.history.clone(),
+            first_run: settled.first_run,
             seconds: 0.0,
         },
-    };
-    is_determined(&solution, &solution.covariance, &channels, &problem.weights)?;
-    if !declared && !robust && !survey.repeats.is_empty() {
-        let along = AlongTraces::new(&solution, &problem, &survey, &by_channel)?;
-        if let Some(along) = along {
-            let (law, missed) = (along.law(), along.missed_variance());
-            let unit = law.variance().sqrt();
-            solution.noise = channel_noise(&channels, &sigmas, &by_channel, unit, freedom);
-            let mean_square = rms(&sigmas).powi(2);
-            solution.noise_origin = NoiseOrigin::Repeats(law.times(mean_square));
-            solution.agreement = Agreement {
-                disagree: Some(missed > 0.0),
-                missed: (missed * mean_square).sqrt(),
-            };
-            solution.scatter = Scatter::Along(Arc::new(along));
+    })
+}
+
+/// The fit has no answer, with the effects in it named.
+fn not_converged(problem: &Reversal, ending: String) -> ReversalError {
+    match &problem.joined {
+        None => ReversalError::NotConverged { ending },
+        Some(joined) => {
+            let names: Vec<&str> = joined.members().iter().map(|m| m.name).collect();
+            ReversalError::EffectsNotConverged {
+                effects: names.join(" and "),
+                ending,
+            }
         }
     }
-    solution.closure = closure::of(&problem, &result, &channels, &by_channel, &solution.scatter);
-    solution.convergence.seconds = began.elapsed().as_secs_f64();
-    Ok(solution)
+}
+
+/// Puts the laws of noise that repeats allow in the place of white noise, where they tell.
+fn learn_from_repeats(
+    solution: &mut Simultaneous,
+    problem: &Reversal,
+    survey: &Survey,
+    residuals: &[Vec<f64>],
+    sigmas: &[f64],
+) -> Result<(), ReversalError> {
+    let Some(along) = AlongTraces::new(solution, problem, survey, residuals)? else {
+        return Ok(());
+    };
+    let (law, missed) = (along.law(), along.missed_variance());
+    let unit = law.variance().sqrt();
+    let freedom = solution.degrees_of_freedom;
+    solution.noise = channel_noise(survey.channels, sigmas, residuals, unit, freedom);
+    let mean_square = rms(sigmas).powi(2);
+    solution.noise_origin = NoiseOrigin::Repeats(law.times(mean_square));
+    solution.agreement = Agreement {
+        disagree: Some(missed > 0.0),
+        missed: (missed * mean_square).sqrt(),
+    };
+    solution.scatter = Scatter::Along(Arc::new(along));
+    Ok(())
 }
 
 /// Whether there are as many readings and positions as the unknowns need.
@@ -300,6 +335,11 @@ fn check(observations: &Observations, options: &Options) -> Result<(), ReversalE
         if !reading.value.is_finite() {
             return refuse(&format!("reading {}", i + 1), reading.value, "finite");
         }
+        if let Some(time) = reading.time
+            && !(time.is_finite() || options.effects.is_empty())
+        {
+            return refuse(&format!("the time of reading {}", i + 1), time, "finite");
+        }
     }
     if let Thickness::Known(mm) | Thickness::Fitted(mm) = options.thickness
         && !(mm >= 0.0 && mm.is_finite())
@@ -339,28 +379,6 @@ fn start_of_thickness(
     Ok(held.parameters)
 }
 
-fn choose_breaks(
-    choice: &Choice,
-    knots: &Knots,
-    most: usize,
-    unknowns_of: impl Fn(usize) -> Unknowns,
-) -> Result<(Vec<f64>, Vec<KnotTrial>), ReversalError> {
-    match knots {
-        Knots::At(breaks) => Ok((breaks.clone(), Vec::new())),
-        Knots::Cells(asked) if *asked > most && most > 0 => Err(ReversalError::TooManyKnots {
-            asked: *asked,
-            most,
-        }),
-        // Not even one cell is carried: what is missing is told when the unknowns are counted.
-        Knots::Cells(_) if most == 0 => Ok((choice.breaks(&unknowns_of(4), 1)?, Vec::new())),
-        Knots::Cells(cells) => Ok((choice.breaks(&unknowns_of(cells + 3), *cells)?, Vec::new())),
-        Knots::Chosen => {
-            let (cells, table) = choice.choose(&unknowns_of)?;
-            Ok((choice.breaks(&unknowns_of(cells + 3), cells)?, table))
-        }
-    }
-}
-
 /// Readings a cell and channel from which a head start is made.
 const HEAD_START_READINGS: usize = 24;
 
@@ -371,12 +389,15 @@ const HEAD_START_GAIN: usize = 4;
 /// where one more step is enough. `None` where there are not many more readings than that, or
 /// where those few determine no minimum.
 fn head_start(problem: &Reversal, start: &Parameters, options: Minimisation) -> Option<Parameters> {
+    if problem.joined.is_some() {
+        return None;
+    }
     let thin = problem.thinned(HEAD_START_READINGS);
     let count = |channels: &[ChannelReadings]| channels.iter().map(|c| c.len()).sum::<usize>();
     if HEAD_START_GAIN * count(&thin) > count(problem.channels) {
         return None;
     }
-    let fit = minimise(&problem.over(&thin), start.clone(), options).ok()?;
+    let fit = structured::minimise(&problem.over(&thin), start.clone(), options).ok()?;
     fit.converged().then_some(fit.parameters)
 }
 

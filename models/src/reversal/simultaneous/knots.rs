@@ -5,10 +5,12 @@
 //! m ln(RSS/m) + 2pm/(m − p − 1); Schwarz's criterion and generalised cross-validation stand beside
 //! it in the table.
 
-use errsep_solvers::linear::bordered::Bordered;
-use errsep_solvers::structured::{StructuredProblem, evaluate};
+use errsep_solvers::linear::bordered::{Bordered, Solved};
+use errsep_solvers::problem::NoValue;
+use errsep_solvers::structured::{Parameters, StructuredProblem, evaluate};
 
 use super::error::FEWEST_FREE;
+use super::ground::{Begun, begin};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
 use super::seed;
@@ -87,6 +89,8 @@ pub struct Choice<'a> {
     pub thickness_mm: f64,
     /// 1/σ by channel.
     pub weights: &'a [f64],
+    /// Effects in the fit.
+    pub effects: Option<&'a Begun<'a>>,
 }
 
 impl Choice<'_> {
@@ -175,7 +179,13 @@ impl Choice<'_> {
             }
             let bases = self.bases(&unknowns, &breaks)?;
             let tilts = seed::tilts(&unknowns, self.lines);
-            let start = seed::start(&unknowns, &tilts, self.lines, self.thickness_mm);
+            let start = begin(
+                &unknowns,
+                &tilts,
+                self.lines,
+                self.thickness_mm,
+                self.effects,
+            );
             let problem = Reversal::new(
                 self.channels,
                 unknowns,
@@ -183,9 +193,9 @@ impl Choice<'_> {
                 self.axis,
                 self.thickness_mm,
                 self.weights.to_vec(),
-            );
-            let evaluation = evaluate(&problem, &start)?;
-            let Some(squares) = linear_squares(&problem, &evaluation.system) else {
+            )
+            .joining(self.effects.map(|e| &e.joined));
+            let Some(squares) = squares_left(problem, start)? else {
                 break;
             };
             table.push(trial(breaks.len() - 1, readings, count, squares));
@@ -215,15 +225,34 @@ fn trial(cells: usize, readings: usize, unknowns: usize, squares: f64) -> KnotTr
     }
 }
 
+/// The sum of squares that the linear fit leaves; with effects, which hang on the forms, that of a second
+/// step from the forms that the first has found.
+fn squares_left(mut problem: Reversal, start: Parameters) -> Result<Option<f64>, NoValue> {
+    let mut evaluation = evaluate(&problem, &start)?;
+    if problem.joined.is_some() {
+        let free = problem.held().to_vec();
+        for k in 0..problem.unknowns.effects.len() {
+            problem.hold(problem.unknowns.effect(k), true);
+        }
+        if let Some(step) = solved(&problem, &evaluation.system) {
+            evaluation = evaluate(&problem, &start.stepped(&step.band, &step.border))?;
+        }
+        for (j, held) in free.into_iter().enumerate() {
+            problem.hold(j, held);
+        }
+    }
+    Ok(linear_squares(&problem, &evaluation.system))
+}
+
+fn solved(problem: &Reversal, system: &Bordered) -> Option<Solved> {
+    let missing = nalgebra::DVector::zeros(problem.constraints().len());
+    let solved = system.solve(problem.constraints(), &missing, problem.held());
+    solved.ok()
+}
+
 /// The sum of squares that the linear fit leaves.
 fn linear_squares(problem: &Reversal, system: &Bordered) -> Option<f64> {
-    let solved = system
-        .solve(
-            problem.constraints(),
-            &nalgebra::DVector::zeros(problem.constraints().len()),
-            problem.held(),
-        )
-        .ok()?;
+    let solved = solved(problem, system)?;
     let left =
         system.sum_of_squares() - 2.0 * system.predicted_reduction(&solved.band, &solved.border);
     Some(left.max(system.unreachable_residual().powi(2)))

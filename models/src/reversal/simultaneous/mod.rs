@@ -2,43 +2,62 @@
 //!
 //! [`fit`] takes all readings as they are (repeats, directions, different grids) and returns a
 //! [`Simultaneous`]: tilts with uncertainty, forms as functions with bands, the noise of every
-//! channel, residuals, knots and convergence. See `docs/theory/reversal-simultaneous.md`.
+//! channel, residuals, knots and convergence. Effects that the model leaves out can be unknowns of
+//! the same fit ([`effects`]). See `docs/theory/reversal-simultaneous.md`.
 
 mod along;
 mod closure;
+mod columns;
 mod dense;
+mod descent;
+pub mod effects;
 mod error;
 mod fit;
+mod fitted_knots;
 mod gauge;
+mod ground;
+mod joined;
 mod knots;
 mod levels;
 mod monte_carlo;
 mod noise;
 mod options;
+mod placed;
+mod placed_rows;
+mod pointer;
+mod predict;
 mod problem;
+mod profiles;
 mod readings;
 mod robust;
+mod row_source;
 mod rows;
+mod scatter;
+mod search;
 mod seed;
 mod solution;
 mod starts;
+mod told;
 mod traces;
 mod unknowns;
 
 pub use dense::DenseReversal;
 pub use error::ReversalError;
 pub use fit::fit;
+pub use fitted_knots::{FittedKnots, KnotVerdict};
 pub use gauge::Axis;
 pub use knots::KnotTrial;
 pub use monte_carlo::{MonteCarlo, Spread, monte_carlo};
-pub use options::{Knots, Noise, Options, Thickness};
+pub use options::{Knots, Noise, Options, Thickness, With};
+pub use predict::{MOST_DENSE_READINGS, Prediction};
 pub use problem::Reversal;
 pub use readings::ChannelReadings;
 pub use seed::{lines, start, tilts};
 pub use solution::{
-    Agreement, ChannelNoise, Closure, Convergence, FittedKnots, KnotVerdict, MOST_DENSE_READINGS,
-    NoiseOrigin, Prediction, Profile, ResidualRecord, Simultaneous, Tilt,
+    Agreement, ChannelNoise, Closure, Convergence, NoiseOrigin, Profile, ResidualRecord,
+    Simultaneous, Tilt,
 };
+pub use told::{EffectParameter, FittedEffect};
 pub use unknowns::{Form, Unknowns};
 
 pub use super::staged::Value;

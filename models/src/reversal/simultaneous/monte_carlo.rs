@@ -1,13 +1,14 @@
 //! Uncertainty by propagation of distributions (JCGM 101:2008, clause 7): readings are drawn anew
 //! around the fitted model with the estimated noise, and fitted again on the same knots.
 
-use errsep_solvers::structured::{Options as Minimisation, minimise};
+use errsep_solvers::structured::Options as Minimisation;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::descent::minimise;
+use super::effects::times;
 use super::error::ReversalError;
 use super::noise::Survey;
-use super::problem::Reversal;
 use super::readings::ChannelReadings;
 use super::solution::{NoiseOrigin, Simultaneous};
 use crate::noise::Law;
@@ -68,6 +69,8 @@ pub fn monte_carlo(
         .collect();
     let sigmas: Vec<f64> = solution.noise.iter().map(|n| n.sigma).collect();
     let laws = laws(solution);
+    let times = times(observations);
+    let joined = solution.joined(observations, &times);
     let sorted = channels.clone();
     let survey = Survey::new(&sorted, observations);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -85,16 +88,10 @@ pub fn monte_carlo(
                 }
             }
         }
-        let problem = Reversal::new(
-            &channels,
-            solution.unknowns.clone(),
-            solution.bases.clone(),
-            solution.axis,
-            solution.thickness_mm,
-            sigmas.iter().map(|s| 1.0 / s).collect(),
-        );
+        let mut problem = solution.problem(&channels, joined.as_ref());
+        problem.weights = sigmas.iter().map(|s| 1.0 / s).collect();
         let fit = minimise(
-            &problem,
+            &mut problem,
             solution.parameters.clone(),
             Minimisation::default(),
         )?;

@@ -5,10 +5,9 @@
 //! take it all and the others would be trusted. What the model misses is shared by all channels alike.
 
 use errsep_solvers::loss::Loss;
-use errsep_solvers::structured::{
-    Fit, Iteration, Options as Minimisation, Parameters, hat_traces, minimise,
-};
+use errsep_solvers::structured::{Fit, Iteration, Options as Minimisation, Parameters, hat_traces};
 
+use super::descent::minimise;
 use super::error::ReversalError;
 use super::levels::{Level, Levels};
 use super::options::{Noise, Options};

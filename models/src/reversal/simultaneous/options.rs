@@ -21,6 +21,30 @@ pub struct Options {
     pub start_tilts_rad: Option<Vec<f64>>,
     /// Settings of the minimisation.
     pub minimisation: errsep_solvers::structured::Options,
+    /// Effects that are unknowns of the fit too.
+    pub effects: Vec<With>,
+}
+
+/// An effect that joins the fit.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct With {
+    /// Its name in the catalogue.
+    pub effect: String,
+    /// Its variant in words, as [`FittedEffect`](super::FittedEffect) tells it; the best where `None`.
+    pub variant: Option<String>,
+    /// The values of its unknowns to begin with, in the units in which it has them; searched where
+    /// `None`.
+    pub start: Option<Vec<f64>>,
+}
+
+impl With {
+    /// An effect by its name, all else searched.
+    pub fn named(effect: impl Into<String>) -> Self {
+        Self {
+            effect: effect.into(),
+            ..Self::default()
+        }
+    }
 }
 
 /// What is known of the artefact's thickness.

@@ -13,6 +13,8 @@ use errsep_solvers::structured::{Parameters, Sink, StructuredProblem};
 use rayon::prelude::*;
 
 use super::gauge::{self, Axis};
+use super::joined::Joined;
+use super::placed::Placed;
 use super::readings::ChannelReadings;
 use super::robust::Robust;
 use super::rows::{CellForm, Points, Run};
@@ -43,8 +45,10 @@ pub struct Reversal<'a> {
     /// anywhere but converges linearly. Otherwise they carry the loss's curvature, which converges
     /// quadratically from nearby.
     pub far: bool,
+    /// Effects that are unknowns of the fit.
+    pub(super) joined: Option<Joined<'a>>,
     /// The coefficients of ξ in each basis.
-    xi: Vec<Vec<f64>>,
+    pub(super) xi: Vec<Vec<f64>>,
     constraints: Constraints,
     held: Vec<bool>,
     /// First reading at or beyond each break of the slide's form, by channel.
@@ -77,11 +81,37 @@ impl<'a> Reversal<'a> {
             weights,
             loss: Loss::Quadratic,
             far: false,
+            joined: None,
             xi,
             constraints,
             held,
             slide_starts,
         }
+    }
+
+    /// The same with effects, whose unknowns are among those of this problem.
+    pub(super) fn joining(mut self, joined: Option<&Joined<'a>>) -> Self {
+        self.joined = joined.cloned();
+        for (k, searched) in joined.iter().flat_map(|j| j.are_searched()).enumerate() {
+            self.held[self.unknowns.effect(k)] = searched;
+        }
+        self
+    }
+
+    /// The same without effects.
+    pub(super) fn joining_none(&self) -> Self {
+        let mut without = self.clone();
+        without.joined = None;
+        without.held.truncate(self.unknowns.effect(0));
+        without.unknowns.effects.clear();
+        without.constraints =
+            gauge::constraints(&without.unknowns, &self.bases, self.channels, self.axis);
+        without
+    }
+
+    /// Whether a border unknown keeps the value it has.
+    pub(super) fn is_held(&self, index: usize) -> bool {
+        self.held[index]
     }
 
     /// Number of cells of every form.
@@ -124,6 +154,11 @@ impl<'a> Reversal<'a> {
                     .collect()
             })
             .collect()
+    }
+
+    /// Unknowns of the band that a row spans where its two cells lie at most so far apart.
+    fn width(&self, apart: usize) -> usize {
+        (self.unknowns.forms.len() * (4 + apart)).min(self.unknowns.band_count())
     }
 
     /// Goes through the runs of a task: readings from..to, cell of the artefact's form, cell of
@@ -194,6 +229,9 @@ impl<'a> Reversal<'a> {
     /// [`NoValue`] where the model is not defined.
     pub fn residuals(&self, at: &Parameters) -> Result<Vec<Vec<f64>>, NoValue> {
         let prepared = self.prepare(at)?;
+        if let Some(placed) = &prepared.placed {
+            return Ok(placed.residuals(self.channels));
+        }
         self.channels
             .par_iter()
             .enumerate()
@@ -234,8 +272,16 @@ impl<'a> Reversal<'a> {
     }
 
     /// The same unknowns, gauge and weights over other readings of the same channels.
-    pub fn over<'b>(&self, channels: &'b [ChannelReadings]) -> Reversal<'b> {
+    pub fn over<'b>(&self, channels: &'b [ChannelReadings]) -> Reversal<'b>
+    where
+        'a: 'b,
+    {
+        let mut joined = self.joined.clone();
+        if let Some(joined) = &mut joined {
+            joined.hold_turning(None);
+        }
         Reversal {
+            joined,
             channels,
             unknowns: self.unknowns.clone(),
             bases: self.bases.clone(),
@@ -253,71 +299,6 @@ impl<'a> Reversal<'a> {
 }
 
 impl Reversal<'_> {
-    /// The band unknowns of the local columns of a run: by coefficient, the slide's before the
-    /// artefact's, so that the triangle of a run keeps its shape in the band.
-    fn band_columns(&self, channel: usize, side: usize, slide: usize) -> Vec<Option<usize>> {
-        let form = self.unknowns.side_of(self.channels[channel].channel);
-        let place = self.unknowns.place(Form::Slide);
-        let mut band = Vec::with_capacity(8);
-        for k in 0..4 {
-            if let Some(m) = place {
-                band.push(self.unknowns.coefficient(m, slide + k));
-            }
-            band.push(self.unknowns.coefficient(form, side + k));
-        }
-        band
-    }
-
-    /// What the local columns of a run are to the unknowns of the border. A constant and ξ are
-    /// combinations of the functions of a cell: offset and lines have no column of their own.
-    fn shares(&self, channel: usize, side: usize, slide: usize) -> Vec<Share> {
-        let unknowns = &self.unknowns;
-        let name = self.channels[channel].channel;
-        let mut shares = Vec::with_capacity(28);
-        let mut push = |column: usize, unknown: usize, weight: f64| {
-            if weight != 0.0 {
-                shares.push(Share {
-                    column: column as u32,
-                    unknown: unknown as u32,
-                    weight,
-                });
-            }
-        };
-        let forms = if unknowns.place(Form::Slide).is_some() {
-            2
-        } else {
-            1
-        };
-        if let Some(form) = unknowns.place(Form::Slide) {
-            let [height, slope] = unknowns.line(form);
-            for k in 0..4 {
-                push(2 * k, unknowns.offset(channel), name.indicator_sign());
-                push(2 * k, height, -1.0);
-                push(2 * k, slope, -self.xi[form][slide + k]);
-            }
-        }
-        let form = unknowns.side_of(name);
-        let [height, slope] = unknowns.line(form);
-        for k in 0..4 {
-            let column = forms * k + forms - 1;
-            push(column, height, -1.0);
-            push(column, slope, -self.xi[form][side + k]);
-        }
-        let mut next = 4 * forms;
-        for (j, sign) in unknowns.slope_signs(channel).into_iter().enumerate() {
-            push(next, j, sign);
-        }
-        next += 1;
-        if forms == 1 {
-            push(next, unknowns.offset(channel), 1.0);
-            next += 1;
-        }
-        if let Some(thickness) = unknowns.thickness_index() {
-            push(next, thickness, 1.0);
-        }
-        shares
-    }
-
     /// Where the rows of each channel begin when all are written below each other.
     pub fn row_starts(&self) -> Vec<usize> {
         self.channels
@@ -341,6 +322,10 @@ impl Reversal<'_> {
         mut take: impl FnMut(usize, usize, &[Option<usize>], &[Share], &Tall),
     ) -> Result<(), NoValue> {
         let prepared = self.prepare(at)?;
+        if let Some(placed) = &prepared.placed {
+            placed.for_each_row(self, take);
+            return Ok(());
+        }
         let mut points = Box::<Points>::default();
         let mut batch = Tall::new(16);
         for (c, channel) in self.channels.iter().enumerate() {
@@ -374,6 +359,8 @@ pub struct Prepared {
     /// First reading whose probe point is at or beyond each break of the artefact's form.
     side_starts: Vec<Vec<usize>>,
     width: usize,
+    /// Every reading in its own place, where there are effects.
+    pub(super) placed: Option<Placed>,
 }
 
 impl StructuredProblem for Reversal<'_> {
@@ -402,6 +389,17 @@ impl StructuredProblem for Reversal<'_> {
     fn prepare(&self, at: &Parameters) -> Result<Prepared, NoValue> {
         let half_mm = self.thickness(at) / 2.0;
         let cubics = self.cubics(at);
+        if let Some(joined) = &self.joined {
+            let placed = Placed::new(self, joined, at, &cubics)?;
+            return Ok(Prepared {
+                cubics,
+                attitudes: Vec::new(),
+                offsets: Vec::new(),
+                side_starts: Vec::new(),
+                width: self.width(placed.apart()),
+                placed: Some(placed),
+            });
+        }
         let mut attitudes = Vec::with_capacity(self.channels.len());
         let mut side_starts = Vec::with_capacity(self.channels.len());
         for (c, channel) in self.channels.iter().enumerate() {
@@ -435,6 +433,7 @@ impl StructuredProblem for Reversal<'_> {
                 .collect(),
             side_starts,
             width: 0,
+            placed: None,
         };
         let mut apart = 0;
         for channel in 0..self.channels.len() {
@@ -445,7 +444,7 @@ impl StructuredProblem for Reversal<'_> {
                 })?;
             }
         }
-        prepared.width = (self.unknowns.forms.len() * (4 + apart)).min(self.band_count());
+        prepared.width = self.width(apart);
         Ok(prepared)
     }
 
@@ -459,6 +458,10 @@ impl StructuredProblem for Reversal<'_> {
 
     fn task(&self, prepared: &Prepared, index: usize, sink: &mut Sink) -> Result<(), NoValue> {
         let (cell, c) = (index / self.channels.len(), index % self.channels.len());
+        if let Some(placed) = &prepared.placed {
+            placed.task(self, c, cell, sink);
+            return Ok(());
+        }
         let channel = &self.channels[c];
         let mut points = Points::default();
         self.runs(prepared, c, cell, |from, to, side, slide| {
@@ -475,12 +478,8 @@ impl StructuredProblem for Reversal<'_> {
                     let robust = Robust::of(self.loss, self.far, &points.residual[..last - first]);
                     let batch = sink.batch(last - first);
                     points.fill(&run, x, Some(&robust.rows), batch);
-                    let residual = batch.columns() - 1;
-                    batch
-                        .column_mut(residual)
-                        .copy_from_slice(&robust.residuals[..last - first]);
-                    let cost = robust.cost;
-                    sink.push_with_cost(cost);
+                    robust.replace_residuals(batch);
+                    sink.push_with_cost(robust.cost);
                 }
             }
             let band = self.band_columns(c, side, slide);

@@ -30,4 +30,21 @@ impl Robust {
         }
         robust
     }
+
+    /// Puts its residuals in the place of a batch's.
+    pub fn replace_residuals(&self, batch: &mut Tall) {
+        let (rows, last) = (batch.rows(), batch.columns() - 1);
+        batch
+            .column_mut(last)
+            .copy_from_slice(&self.residuals[..rows]);
+    }
+
+    /// Multiplies the derivatives of a batch by the factors of its rows.
+    pub fn scale_rows(&self, batch: &mut Tall) {
+        for j in 0..batch.columns() - 1 {
+            for (out, s) in batch.column_mut(j).iter_mut().zip(&self.rows) {
+                *out *= s;
+            }
+        }
+    }
 }

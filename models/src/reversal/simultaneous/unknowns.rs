@@ -2,8 +2,8 @@
 //!
 //! Band: the coefficients of the forms, interleaved by knot; the first and last of each form are
 //! fixed at zero, which takes every straight line out of the splines. Border: tilts, offsets, the
-//! straight line that is subtracted from each form (the gauge ties it to the band), and the
-//! thickness where it is asked for.
+//! straight line that is subtracted from each form (the gauge ties it to the band), the thickness
+//! where it is asked for, and the unknowns of effects.
 
 use crate::reversal::{Channel, Contrast, Convention};
 
@@ -35,6 +35,8 @@ pub struct Unknowns {
     pub thickness: bool,
     /// Coefficients of one form, the two fixed ones included.
     pub coefficients: usize,
+    /// The names of the effects' unknowns.
+    pub effects: Vec<String>,
 }
 
 impl Unknowns {
@@ -72,7 +74,15 @@ impl Unknowns {
             closure,
             thickness,
             coefficients,
+            effects: Vec::new(),
         }
+    }
+
+    /// The same with the unknowns of effects, by name.
+    #[must_use]
+    pub fn with_effects(mut self, names: Vec<String>) -> Self {
+        self.effects = names;
+        self
     }
 
     /// Number of unknowns in the band.
@@ -153,15 +163,26 @@ impl Unknowns {
 
     /// The border unknown of the thickness.
     pub fn thickness_index(&self) -> Option<usize> {
-        self.thickness.then(|| self.border_count() - 1)
+        self.thickness.then(|| self.effect(0) - 1)
     }
 
-    /// Number of unknowns in the border.
-    pub fn border_count(&self) -> usize {
+    /// The border unknown of an unknown of the effects.
+    pub fn effect(&self, index: usize) -> usize {
         self.offsets_from()
             + self.channels.len()
             + 2 * self.forms.len()
             + usize::from(self.thickness)
+            + index
+    }
+
+    /// The values of the effects' unknowns, out of the border.
+    pub fn effect_values<'v>(&self, border: &'v [f64]) -> &'v [f64] {
+        &border[self.effect(0)..]
+    }
+
+    /// Number of unknowns in the border.
+    pub fn border_count(&self) -> usize {
+        self.effect(self.effects.len())
     }
 
     /// Which border unknowns are held: the closure.
@@ -197,7 +218,11 @@ impl Unknowns {
     /// Number of unknowns that the fit is free to choose: band and border less the closure and the
     /// lines, which the gauge ties to the band.
     pub fn free_count(&self) -> usize {
-        self.band_count() + self.tilt_count() + self.channels.len() + usize::from(self.thickness)
+        self.band_count()
+            + self.tilt_count()
+            + self.channels.len()
+            + usize::from(self.thickness)
+            + self.effects.len()
     }
 
     /// Whether channels with a reading somewhere (one flag each) tell all fitted forms apart there.
@@ -225,6 +250,12 @@ impl Unknowns {
         }
         if index < self.tilt_count() {
             return format!("slope of {}", self.channels[index].name());
+        }
+        if let Some(name) = index
+            .checked_sub(self.effect(0))
+            .and_then(|k| self.effects.get(k))
+        {
+            return name.clone();
         }
         let after_tilts = index - self.offsets_from();
         if let Some(channel) = self.channels.get(after_tilts) {

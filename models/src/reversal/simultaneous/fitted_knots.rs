@@ -1,0 +1,82 @@
+//! The knots of a fit, and whether they are enough.
+
+use rayon::prelude::*;
+
+use super::knots::KnotTrial;
+
+/// Whether there are enough knots.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum KnotVerdict {
+    /// Neighbouring residuals are not correlated.
+    Enough,
+    /// Neighbouring residuals go together: forms have detail that the knots cannot follow (or the
+    /// noise itself is correlated).
+    TooFew,
+    /// The ladder did better with fewer.
+    TooMany,
+}
+
+/// The knots of the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedKnots {
+    /// Break points on the slide's axis, mm.
+    pub breaks: Vec<f64>,
+    /// The ladder, where the number was chosen from the data.
+    pub table: Vec<KnotTrial>,
+    /// Correlation of residuals next to each other in a channel.
+    pub neighbour_correlation: f64,
+    /// That correlation in units of its standard deviation for white noise.
+    pub neighbour_z: f64,
+    /// What it says.
+    pub verdict: KnotVerdict,
+}
+
+/// Correlation of neighbours beyond this many standard deviations is told.
+const SUSPICIOUS_Z: f64 = 4.0;
+
+impl FittedKnots {
+    pub(super) fn new(breaks: Vec<f64>, table: Vec<KnotTrial>, residuals: &[Vec<f64>]) -> Self {
+        let sums: Vec<[f64; 3]> = residuals
+            .par_iter()
+            .map(|channel| {
+                let count = channel.len() as f64;
+                let scale = channel.iter().map(|r| r * r).sum::<f64>() / count;
+                if !(scale > 0.0) {
+                    return [0.0; 3];
+                }
+                let neighbours = channel.windows(2).map(|pair| pair[0] * pair[1]);
+                [neighbours.sum::<f64>() / scale, count, count - 1.0]
+            })
+            .collect();
+        let [products, squares, pairs] =
+            [0, 1, 2].map(|k| sums.iter().map(|sum| sum[k]).sum::<f64>());
+        let correlation = if squares > 0.0 {
+            products / squares
+        } else {
+            0.0
+        };
+        // A fit with p unknowns leaves neighbours a correlation of about −p/m on average.
+        let z = correlation * pairs.sqrt();
+        let cells = breaks.len() - 1;
+        let best = table.iter().min_by(|a, b| a.aicc.total_cmp(&b.aicc));
+        let verdict = if z > SUSPICIOUS_Z {
+            KnotVerdict::TooFew
+        } else if best.is_some_and(|b| b.cells < cells) {
+            KnotVerdict::TooMany
+        } else {
+            KnotVerdict::Enough
+        };
+        Self {
+            breaks,
+            table,
+            neighbour_correlation: correlation,
+            neighbour_z: z,
+            verdict,
+        }
+    }
+
+    /// Number of cells.
+    pub fn cells(&self) -> usize {
+        self.breaks.len() - 1
+    }
+}

@@ -1,0 +1,215 @@
+//! What every stage of a fit stands on: readings, lines, axis, and how problems over them are made.
+
+use errsep_solvers::structured::Parameters;
+
+use super::effects::JoinedEffect;
+use super::error::{FEWEST_FREE, ReversalError};
+use super::gauge::Axis;
+use super::joined::Joined;
+use super::knots::{self, Choice, FEWEST_POSITIONS, KnotTrial};
+use super::options::{Knots, Noise, Options, Thickness};
+use super::problem::Reversal;
+use super::readings::ChannelReadings;
+use super::seed;
+use super::unknowns::Unknowns;
+use crate::basis::bspline::CubicBSpline;
+use crate::reversal::Observations;
+
+/// Readings and what is known of them before the fit.
+pub struct Ground<'a> {
+    pub observations: &'a Observations,
+    pub options: &'a Options,
+    pub channels: &'a [ChannelReadings],
+    /// Tilt and offset of each channel's line.
+    pub lines: Vec<(f64, f64)>,
+    pub axis: Axis,
+    pub thickness_mm: f64,
+    pub thickness_free: bool,
+    /// First weights, 1/σ by channel.
+    pub weights: Vec<f64>,
+}
+
+/// Effects with the values from which the fit begins.
+#[derive(Debug, Clone)]
+pub struct Begun<'a> {
+    pub joined: Joined<'a>,
+    pub values: Vec<f64>,
+}
+
+/// Effects by name with their values.
+pub type Found = (&'static str, std::sync::Arc<dyn JoinedEffect>, Vec<f64>);
+
+impl<'a> Begun<'a> {
+    /// These effects at their values.
+    pub fn new(observations: &'a Observations, times: &'a [f64], found: &[Found]) -> Self {
+        let effects: Vec<_> = found
+            .iter()
+            .map(|(name, effect, _)| (*name, std::sync::Arc::clone(effect)))
+            .collect();
+        Self {
+            joined: Joined::new(observations, times, &effects),
+            values: found.iter().flat_map(|f| f.2.clone()).collect(),
+        }
+    }
+}
+
+impl<'a> Ground<'a> {
+    /// Lines and axis of the readings.
+    ///
+    /// # Errors
+    /// [`ReversalError::OnePosition`] or [`ReversalError::TooSteep`].
+    pub fn new(
+        observations: &'a Observations,
+        options: &'a Options,
+        channels: &'a [ChannelReadings],
+        weights: Vec<f64>,
+    ) -> Result<Self, ReversalError> {
+        let lines = seed::lines(channels)?;
+        let axis = Axis::of(channels).ok_or(ReversalError::OnePosition {
+            channel: channels[0].channel.name(),
+            x: channels[0].x[0],
+        })?;
+        let (thickness_mm, thickness_free) = match options.thickness {
+            Thickness::NotKnown => (0.0, false),
+            Thickness::Known(mm) => (mm, false),
+            Thickness::Fitted(mm) => (mm, true),
+        };
+        Ok(Self {
+            observations,
+            options,
+            channels,
+            lines,
+            axis,
+            thickness_mm,
+            thickness_free,
+            weights,
+        })
+    }
+
+    /// The unknowns with so many coefficients a form.
+    pub fn unknowns(&self, coefficients: usize, effects: Option<&Begun>) -> Unknowns {
+        Unknowns::new(
+            self.channels.iter().map(|c| c.channel).collect(),
+            self.options.convention,
+            self.thickness_free,
+            coefficients,
+        )
+        .with_effects(effects.map_or_else(Vec::new, |e| e.joined.names()))
+    }
+
+    fn choice<'c>(&'c self, effects: Option<&'c Begun<'a>>) -> Choice<'c> {
+        Choice {
+            channels: self.channels,
+            lines: &self.lines,
+            axis: self.axis,
+            thickness_mm: self.thickness_mm,
+            weights: &self.weights,
+            effects,
+        }
+    }
+
+    /// Degrees of freedom that the readings must leave.
+    pub fn fewest_free(&self) -> usize {
+        match self.options.noise {
+            Noise::Declared(_) => 0,
+            _ => FEWEST_FREE,
+        }
+    }
+
+    /// Most cells that the readings carry.
+    pub fn most_cells(&self, effects: Option<&Begun>) -> usize {
+        let unknowns = self.unknowns(FEWEST_POSITIONS, effects);
+        knots::most_cells(self.channels, &unknowns, self.fewest_free())
+    }
+
+    /// The break points that the options ask for, and the ladder where they are chosen: beside the
+    /// effects, which fine knots would take up otherwise.
+    ///
+    /// # Errors
+    /// [`ReversalError`] where the readings do not carry them.
+    pub fn breaks(
+        &self,
+        effects: Option<&Begun<'a>>,
+    ) -> Result<(Vec<f64>, Vec<KnotTrial>), ReversalError> {
+        let choice = self.choice(effects);
+        let most = self.most_cells(effects);
+        let of = |coefficients: usize| self.unknowns(coefficients, effects);
+        match &self.options.knots {
+            Knots::At(breaks) => Ok((breaks.clone(), Vec::new())),
+            Knots::Cells(asked) if *asked > most && most > 0 => Err(ReversalError::TooManyKnots {
+                asked: *asked,
+                most,
+            }),
+            // Not even one cell is carried: what is missing is told when the unknowns are counted.
+            Knots::Cells(_) if most == 0 => Ok((choice.breaks(&of(4), 1)?, Vec::new())),
+            Knots::Cells(cells) => Ok((choice.breaks(&of(cells + 3), *cells)?, Vec::new())),
+            Knots::Chosen => {
+                let (cells, table) = choice.choose(of)?;
+                Ok((choice.breaks(&of(cells + 3), cells)?, table))
+            }
+        }
+    }
+
+    /// So many equal cells.
+    ///
+    /// # Errors
+    /// [`ReversalError::Breaks`].
+    pub fn even_breaks(&self, cells: usize) -> Result<Vec<f64>, ReversalError> {
+        self.choice(None)
+            .breaks(&self.unknowns(cells + 3, None), cells)
+    }
+
+    /// The problem on these breaks, and where to start: at the lines, or the tilts that are given.
+    ///
+    /// # Errors
+    /// [`ReversalError::Breaks`], [`ReversalError::StartLength`].
+    pub fn problem(
+        &self,
+        breaks: &[f64],
+        effects: Option<&Begun<'a>>,
+    ) -> Result<(Reversal<'a>, Parameters), ReversalError> {
+        let unknowns = self.unknowns(breaks.len() + 2, effects);
+        let bases = match &self.options.knots {
+            Knots::At(_) => {
+                let basis = CubicBSpline::new(breaks.to_vec())?;
+                vec![basis; unknowns.forms.len()]
+            }
+            _ => self.choice(effects).bases(&unknowns, breaks)?,
+        };
+        let tilts = match &self.options.start_tilts_rad {
+            None => seed::tilts(&unknowns, &self.lines),
+            Some(given) if given.len() == unknowns.tilt_count() => given.clone(),
+            Some(given) => {
+                return Err(ReversalError::StartLength {
+                    given: given.len(),
+                    needed: unknowns.tilt_count(),
+                });
+            }
+        };
+        let start = begin(&unknowns, &tilts, &self.lines, self.thickness_mm, effects);
+        let problem = Reversal::new(
+            self.channels,
+            unknowns,
+            bases,
+            self.axis,
+            self.thickness_mm,
+            self.weights.clone(),
+        );
+        Ok((problem.joining(effects.map(|e| &e.joined)), start))
+    }
+}
+
+/// The start at the lines of the channels and the values of the effects.
+pub fn begin(
+    unknowns: &Unknowns,
+    tilts: &[f64],
+    lines: &[(f64, f64)],
+    thickness_mm: f64,
+    effects: Option<&Begun>,
+) -> Parameters {
+    let mut start = seed::start(unknowns, tilts, lines, thickness_mm);
+    for (k, value) in effects.iter().flat_map(|e| &e.values).enumerate() {
+        start.border[unknowns.effect(k)] = *value;
+    }
+    start
+}

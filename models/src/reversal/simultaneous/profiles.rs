@@ -1,0 +1,120 @@
+//! The forms of a solution, with their bands.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::solution::{Profile, Simultaneous};
+use super::unknowns::Form;
+use crate::basis::bspline::{horner, horner_slope};
+use crate::reversal::combinations::determined;
+
+/// Names of the forms, in the order of their columns.
+const FORMS: [&str; 3] = ["M", "S_A", "S_B"];
+
+impl Simultaneous {
+    /// The forms, or the combinations of forms which the channels determine, at positions (mm):
+    /// M on the slide, S_A and S_B on the artefact's own axis.
+    pub fn forms(&self, x: &[f64]) -> Vec<Profile> {
+        self.determined_forms()
+            .into_iter()
+            .map(|(name, weights)| {
+                let spread: Vec<(f64, f64)> =
+                    x.par_iter().map(|x| self.form_std(&weights, *x)).collect();
+                Profile {
+                    name,
+                    x: x.to_vec(),
+                    values: x.iter().map(|x| self.form_value(&weights, *x)).collect(),
+                    std: spread.iter().map(|s| s.0).collect(),
+                    degrees_of_freedom: spread.iter().fold(f64::INFINITY, |m, s| m.min(s.1)),
+                }
+            })
+            .collect()
+    }
+
+    /// Names and values of the forms at positions, without their uncertainty.
+    pub(super) fn form_values(&self, x: &[f64]) -> Vec<(String, Vec<f64>)> {
+        self.determined_forms()
+            .into_iter()
+            .map(|(name, weights)| {
+                let values = x.iter().map(|x| self.form_value(&weights, *x)).collect();
+                (name, values)
+            })
+            .collect()
+    }
+
+    /// Name and weights on the fitted forms of every combination that the channels determine.
+    fn determined_forms(&self) -> Vec<(String, Vec<f64>)> {
+        let channels = self.channels();
+        let design = DMatrix::from_fn(channels.len(), 3, |r, c| match c {
+            0 => channels[r].indicator_sign(),
+            1 => f64::from(u8::from(channels[r].is_side_a())),
+            _ => f64::from(u8::from(!channels[r].is_side_a())),
+        });
+        determined(&design, &[1, 2])
+            .into_iter()
+            .map(|combination| {
+                // Σ weight·channel, each channel a sum of the fitted forms.
+                let mut weights = vec![0.0; self.unknowns.forms.len()];
+                for (channel, weight) in channels.iter().zip(&combination.weights) {
+                    weights[self.unknowns.side_of(*channel)] += weight;
+                    if let Some(slide) = self.unknowns.place(Form::Slide) {
+                        weights[slide] += weight * channel.indicator_sign();
+                    }
+                }
+                // Weights are sums of halves and quarters: less is rounding.
+                for weight in &mut weights {
+                    if weight.abs() < 1e-12 {
+                        *weight = 0.0;
+                    }
+                }
+                (combination.name(&FORMS), weights)
+            })
+            .collect()
+    }
+
+    fn form_value(&self, weights: &[f64], x: f64) -> f64 {
+        weights
+            .iter()
+            .enumerate()
+            .filter(|(_, weight)| **weight != 0.0)
+            .map(|(form, weight)| weight * self.value_of(form, x).0)
+            .sum()
+    }
+
+    /// Standard uncertainty of a form and its degrees of freedom. What the model misses may lie in the
+    /// form itself, finer than the knots.
+    fn form_std(&self, weights: &[f64], x: f64) -> (f64, f64) {
+        let (mut band, mut border) = (Vec::with_capacity(12), Vec::with_capacity(6));
+        for (form, weight) in weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+            self.push_basis(form, x, *weight, &mut band);
+            let [height, slope] = self.unknowns.line(form);
+            border.push((height, -weight));
+            border.push((slope, -weight * self.axis.xi(x)));
+        }
+        let (std, freedom) = self.scatter.spread(&self.covariance, &band, &border);
+        (std.hypot(self.agreement.missed), freedom)
+    }
+
+    pub(super) fn value_of(&self, form: usize, at: f64) -> (f64, f64) {
+        let basis = &self.bases[form];
+        let k = basis.cell_of(at);
+        let (left, width) = basis.cell(k);
+        let (cubic, t) = (&self.cubics[form][k], (at - left) / width);
+        (horner(cubic, t), horner_slope(cubic, t) / width)
+    }
+
+    pub(super) fn push_basis(
+        &self,
+        form: usize,
+        at: f64,
+        factor: f64,
+        band: &mut Vec<(usize, f64)>,
+    ) {
+        let (k, functions) = self.bases[form].values(at);
+        for (l, function) in functions.into_iter().enumerate() {
+            if let Some(j) = self.unknowns.coefficient(form, k + l) {
+                band.push((j, factor * function));
+            }
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! From the weights of a quantity on the readings to its standard uncertainty.
+
+use std::sync::Arc;
+
+use errsep_solvers::linear::bordered::BorderedCovariance;
+
+use super::along::AlongTraces;
+
+/// What makes a standard uncertainty of a quantity's weights on the readings.
+#[derive(Debug, Clone)]
+pub enum Scatter {
+    /// White noise of this variance, in weighted units.
+    White { variance: f64, freedom: f64 },
+    /// Noise along traces, as repeats tell.
+    Along(Arc<AlongTraces>),
+}
+
+impl Scatter {
+    /// The same after a further unknown has taken so much of the weighted sum of squares.
+    pub fn released(&self, taken: f64) -> Self {
+        match self {
+            Self::White { variance, freedom } if freedom.is_finite() && *freedom > 1.0 => {
+                let left = freedom - 1.0;
+                Self::White {
+                    variance: ((variance * freedom - taken) / left).max(0.0),
+                    freedom: left,
+                }
+            }
+            other => other.clone(),
+        }
+    }
+
+    /// Standard uncertainty of a combination of unknowns, and its degrees of freedom.
+    pub fn spread(
+        &self,
+        covariance: &BorderedCovariance,
+        band: &[(usize, f64)],
+        border: &[(usize, f64)],
+    ) -> (f64, f64) {
+        match self {
+            Self::White { variance, freedom } => (
+                (variance * covariance.variance(band, border)).sqrt(),
+                *freedom,
+            ),
+            Self::Along(along) => {
+                let (variance, freedom) = along.variance(covariance, band, border);
+                (variance.max(0.0).sqrt(), freedom)
+            }
+        }
+    }
+}

@@ -4,58 +4,28 @@
 //! The order is that of the functions of [`diagnose`]: noise first, then detection, then places,
 //! causes, sizes and the verdict. The method and its sources are in `docs/theory/diagnosis.md`.
 
-mod attribute;
-mod bench;
-mod bias;
-mod candidates;
-mod conclusion;
-mod confidence;
-mod contrasts;
-mod dictionary;
-mod doubt;
-mod folding;
-mod formula;
-mod geometry;
-mod hidden;
-mod localise;
-mod mixing;
+mod attribution;
+mod catalogue;
+mod detection;
 mod noise;
-mod null;
-mod places;
-mod posterior;
-mod prove;
-mod quantify;
-mod refine;
-mod refit;
-mod report;
-mod scatter;
+mod planning;
 mod search;
-mod shape;
-mod sizes;
-mod space;
-mod spikes;
-mod splitting;
-mod statement;
-mod steps;
-mod tabulated;
-mod told;
 mod verdict;
-mod whitening;
 
 use errsep_models::model::{Effect, FittedModel};
 use nalgebra::DVector;
 
-use attribute::{attribute, roughly};
-use bench::{Bench, Remainder};
-use confidence::Answer;
-pub use formula::{Circumstances, Formula};
-pub use geometry::{Diagnosability, certificate};
-pub use noise::{NoiseLaw, NoiseSource};
-pub use prove::{Trials, prove};
-use spikes::Spikes;
-pub use tabulated::{Tabulated, TabulatedEffects};
-pub use told::{Told, for_people, scaled};
-pub use verdict::{
+use attribution::attribute::{attribute, roughly};
+use attribution::confidence::Answer;
+use attribution::context::{Context, Remainder};
+pub use catalogue::formula::{Circumstances, Formula};
+pub use catalogue::tabulated::{Tabulated, TabulatedEffects};
+pub use noise::law::{NoiseLaw, NoiseSource};
+use noise::spikes::Spikes;
+pub use planning::certificate::{Diagnosability, certificate};
+pub use planning::prove::{Trials, prove};
+pub use verdict::told::{Told, for_people, scaled};
+pub use verdict::types::{
     Bias, Candidate, Detail, Diagnosis, Elsewhere, Fingerprint, Gap, Harm, HeldOut, Hidden, Kind,
     Linear, Nearest, NoiseOut, ParameterOut, Size, Verdict, Where,
 };
@@ -110,15 +80,15 @@ pub fn diagnose_with<M: FittedModel>(
         (model, readings)
     };
     let law = NoiseLaw::estimate(model, &readings).with_tails(calm.tails);
-    let bench = Bench::new(model, &catalogue, law, options.draws, options.seed);
-    examined(&bench, &readings, options.false_alarm, |examined| {
-        report::compose(&examined, &calm, options)
+    let context = Context::new(model, &catalogue, law, options.draws, options.seed);
+    examined(&context, &readings, options.false_alarm, |examined| {
+        verdict::compose::compose(&examined, &calm, options)
     })
 }
 
 /// What a diagnosis has come to before it is put in words.
 struct Examined<'a, M: FittedModel> {
-    bench: &'a Bench<'a, M>,
+    context: &'a Context<'a, M>,
     readings: &'a DVector<f64>,
     first: &'a Remainder,
     /// Probability of as much standing out with nothing there.
@@ -129,48 +99,48 @@ struct Examined<'a, M: FittedModel> {
 /// Causes bend the fitted state and swell the noise; both are found again without them, and the
 /// diagnosis is made once more from there.
 fn examined<M: FittedModel, R>(
-    bench: &Bench<'_, M>,
+    context: &Context<'_, M>,
     readings: &DVector<f64>,
     false_alarm: f64,
     then: impl FnOnce(Examined<'_, M>) -> R,
 ) -> R {
-    let first = bench.remainder(readings, &[]);
-    let detected = bench.detection(&first);
+    let first = context.remainder(readings, &[]);
+    let detected = context.detection(&first);
     if detected > false_alarm {
         return then(Examined {
-            bench,
+            context,
             readings,
             first: &first,
             detected,
             found: None,
         });
     }
-    let found = roughly(bench, readings, &first);
+    let found = roughly(context, readings, &first);
     let none = || {
         (
             DVector::zeros(readings.len()),
-            bench.model.refit(bench.model.observed().clone()),
+            context.model.refit(context.model.observed().clone()),
         )
     };
-    let (change, state) = bench
+    let (change, state) = context
         .changes(readings, &found)
         .map(|changes| {
-            let clean = bench.without(bench.model.observed(), &found, &changes);
-            (changes.column_sum(), bench.model.refit(clean))
+            let clean = context.without(context.model.observed(), &found, &changes);
+            (changes.column_sum(), context.model.refit(clean))
         })
         .unwrap_or_else(none);
     // The readings themselves keep what an effect had hidden of the state.
-    let clean = bench
+    let clean = context
         .model
-        .refit(bench.model.observed() - &change)
+        .refit(context.model.observed() - &change)
         .linearised();
     let law = NoiseLaw::estimate(&state, &clean);
-    let bench = bench.moved(&state, law);
+    let context = context.moved(&state, law);
     let readings = clean + change;
-    let first = bench.remainder(&readings, &[]);
-    let found = attribute(&bench, &readings, &first);
+    let first = context.remainder(&readings, &[]);
+    let found = attribute(&context, &readings, &first);
     then(Examined {
-        bench: &bench,
+        context: &context,
         readings: &readings,
         first: &first,
         detected,

@@ -1,0 +1,185 @@
+//! Which effects: the search.
+//!
+//! One cause is tried first, then two, then three; each further one must earn its place beside the
+//! others (`confidence.rs`). If no step forward succeeds, all pairs are tried.
+
+use errsep_models::model::FittedModel;
+use nalgebra::DVector;
+
+use crate::diagnosis::attribution::confidence::{
+    Answer, EARNED, HOPELESS, confidence_set, possible, without,
+};
+use crate::diagnosis::attribution::context::{Cause, Context, Remainder, adequate, finer};
+
+/// A swap must raise the statistic by more than what searches leave open.
+const BETTER: f64 = 0.01;
+/// Number of pairs that are fitted with everything else free.
+const PAIRS: usize = 3;
+/// Greatest number of effects in one verdict.
+const MOST: usize = 3;
+
+/// Seeks the causes of what stands out in readings.
+pub(in crate::diagnosis) fn attribute<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    first: &Remainder,
+) -> Option<Answer> {
+    let mut causes: Vec<Cause> = Vec::new();
+    let mut partial: Option<Answer> = None;
+    for size in 1..=MOST {
+        let here = partial.as_ref().map_or(first, |answer| &answer.remainder);
+        let Some(next) = strongest(context, readings, here, &causes) else {
+            break;
+        };
+        causes.push(next);
+        if size > 1 {
+            polish(context, readings, &mut causes);
+        }
+        let answer = confidence_set(context, readings, &causes);
+        if answer.complete {
+            return Some(answer);
+        }
+        // Causes that have come to coincide cannot be fitted together: those before stand.
+        if context.amplitudes(readings, &answer.causes).is_none() {
+            break;
+        }
+        causes.clone_from(&answer.causes);
+        partial = Some(answer);
+    }
+    let least = partial.as_ref().map_or(f64::INFINITY, |answer| {
+        answer.remainder.residual.norm_squared() + HOPELESS
+    });
+    pairs(context, readings, first)
+        .into_iter()
+        .filter(|causes| {
+            context.misfit(readings, &context.relinearised(readings, causes, least)) < least
+        })
+        .map(|causes| confidence_set(context, readings, &causes))
+        .find(|answer| answer.complete)
+        .or(partial)
+}
+
+/// The causes without which noise and state cannot be had: by strength, each refitted, no others
+/// tried in their place.
+pub(in crate::diagnosis) fn roughly<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    first: &Remainder,
+) -> Vec<Cause> {
+    let mut causes: Vec<Cause> = Vec::new();
+    let mut left: Option<Remainder> = None;
+    for _ in 0..MOST {
+        let here = left.as_ref().unwrap_or(first);
+        let Some(next) = strongest(context, readings, here, &causes) else {
+            break;
+        };
+        causes.push(next);
+        if causes.len() > 1 {
+            polish(context, readings, &mut causes);
+        }
+        causes = context.relinearised(readings, &causes, f64::INFINITY);
+        let remainder = context.judged(readings, &causes);
+        if adequate(&causes, &remainder) {
+            break;
+        }
+        left = Some(remainder);
+    }
+    causes
+}
+
+/// Pairs of effects of which each stands out beside the other though neither need do so alone, the
+/// best fits first.
+fn pairs<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    first: &Remainder,
+) -> Vec<Vec<Cause>> {
+    let mut found: Vec<(f64, Vec<Cause>)> = Vec::new();
+    for effect in 0..context.catalogue.len() {
+        let Some(start) = context.start(first, effect) else {
+            continue;
+        };
+        let one = vec![context.cause(context.model, effect, start.clone())];
+        let beside = context.remainder(readings, &one);
+        for other in effect + 1..context.catalogue.len() {
+            if context.p_value(&beside, other) > EARNED {
+                continue;
+            }
+            let Some(start) = context.start(&beside, other) else {
+                continue;
+            };
+            let second = context.cause(context.model, other, start.clone());
+            let pair = vec![one[0].clone(), second];
+            found.push((context.misfit(readings, &pair), pair));
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Coarse fits further above the best than this cannot become the best by refining.
+    let reach = found.first().map_or(0.0, |(least, _)| 1.3 * least);
+    found.retain(|(misfit, _)| *misfit <= reach);
+    found.truncate(PAIRS);
+    let polished = found.into_iter().map(|(_, mut pair)| {
+        polish(context, readings, &mut pair);
+        pair
+    });
+    polished.collect()
+}
+
+/// The refined effect with the greatest statistic beside the causes.
+fn strongest<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    remainder: &Remainder,
+    causes: &[Cause],
+) -> Option<Cause> {
+    let mut ranked: Vec<(f64, usize)> = (0..context.catalogue.len())
+        .filter(|effect| causes.iter().all(|c| c.effect != *effect))
+        .filter(|effect| context.p_value(remainder, *effect) < EARNED)
+        .filter_map(|effect| {
+            let family = context.family_of(effect)?;
+            Some((remainder.best[family].0, effect))
+        })
+        .collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranked
+        .into_iter()
+        .take(5)
+        .filter_map(|(_, effect)| {
+            let start = context.start(remainder, effect)?;
+            let (cause, t) = context.refine(context.model, readings, effect, start, causes);
+            possible(context, readings, causes, &cause).then_some((cause, t))
+        })
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(cause, _)| cause)
+}
+
+/// Refines each cause beside the others, and swaps it for any effect that explains more, itself
+/// begun elsewhere among them.
+fn polish<M: FittedModel>(context: &Context<'_, M>, readings: &DVector<f64>, causes: &mut [Cause]) {
+    for _ in 0..3 {
+        let mut changed = false;
+        for k in 0..causes.len() {
+            let others = without(causes, k);
+            let start = finer(&causes[k].shape);
+            let (refined, t) =
+                context.refine(context.model, readings, causes[k].effect, &start, &others);
+            let remainder = context.remainder(readings, &others);
+            let swapped = strongest(context, readings, &remainder, &others).map(|c| {
+                context.refine(context.model, readings, c.effect, &finer(&c.shape), &others)
+            });
+            match swapped {
+                Some((other, other_t)) if other_t > t + BETTER => {
+                    causes[k] = other;
+                    changed = true;
+                }
+                _ => {
+                    changed |= refined.shape.values != causes[k].shape.values;
+                    causes[k] = refined;
+                }
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! What each effect of the catalogue says of the gap.
+
+use std::collections::BTreeMap;
+
+use errsep_models::model::{FittedModel, Shape};
+use nalgebra::DVector;
+
+use crate::diagnosis::attribution::confidence::{Alternative, possible, without};
+use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
+use crate::diagnosis::attribution::sizes::Sizes;
+use crate::diagnosis::detection::dictionary::statistic;
+use crate::diagnosis::verdict::types::{Candidate, Elsewhere};
+
+/// Variants of a cause whose misfits are above the best by less are as likely: χ² of two unknowns,
+/// 95 %.
+const AS_LIKELY: f64 = 5.99;
+
+/// What each effect explains, by that. `groups` are those of the causes, where they are named.
+pub(in crate::diagnosis) fn candidates<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    first: &Remainder,
+    excess: f64,
+    groups: &[Vec<Alternative>],
+    causes: &[Cause],
+) -> Vec<Candidate> {
+    let readings_count = context.space.readings() as f64;
+    let fitted = Sizes::fitted_with_state(context, readings, causes);
+    let mut list: Vec<(f64, Candidate)> = Vec::new();
+    for (effect, description) in context.catalogue.iter().enumerate() {
+        let Some(family) = context.family_of(effect) else {
+            continue;
+        };
+        let about = description.about();
+        let named = causes.iter().position(|c| c.effect == effect);
+        let member = groups.iter().enumerate().find_map(|(k, group)| {
+            let own = group.iter().find(|a| a.cause.effect == effect)?;
+            Some((k, own))
+        });
+        let (cause, parameters) = match (named, member) {
+            (Some(which), _) => (
+                Some(causes[which].clone()),
+                fitted.as_ref().map(|f| f.of(context, causes, which)),
+            ),
+            (None, Some((k, own))) => {
+                let mut trial = causes.to_vec();
+                trial[k] = own.cause.clone();
+                let sizes = Sizes::fitted(context, readings, &trial);
+                (
+                    Some(own.cause.clone()),
+                    sizes.map(|sizes| sizes.of(context, &trial, k)),
+                )
+            }
+            (None, None) => {
+                let start = context.start(first, effect).cloned();
+                let cause = start.map(|shape| context.cause(context.model, effect, shape));
+                let parameters = cause.as_ref().and_then(|cause| {
+                    let alone = std::slice::from_ref(cause);
+                    Some(Sizes::fitted(context, readings, alone)?.of(context, alone, 0))
+                });
+                (cause, parameters)
+            }
+        };
+        let (t, unknowns) = cause.as_ref().map_or((0.0, 0), |c| {
+            let gram = c.projected.tr_mul(&c.projected);
+            let score = c.projected.tr_mul(&first.residual);
+            (statistic(&gram, &score, false), c.unknowns())
+        });
+        let alone = 0.5 * (t - unknowns as f64 * readings_count.ln());
+        list.push((
+            t,
+            Candidate {
+                effect: description.name().to_owned(),
+                // No negative zero.
+                explained: ((t - unknowns as f64) / excess).clamp(0.0, 1.0) + 0.0,
+                p_value: context.p_value(first, effect),
+                evidence: member.map_or(alone, |(_, own)| own.evidence),
+                visible: context.dictionary.families[family].visible,
+                in_set: member.is_some(),
+                variant: cause
+                    .as_ref()
+                    .and_then(|c| description.variant_name(context.model, &c.shape)),
+                parameters: parameters.into_iter().flatten().map(Into::into).collect(),
+                elsewhere: named.map_or_else(Vec::new, |which| {
+                    elsewhere(context, readings, causes, which)
+                }),
+                physics: about.physics.to_owned(),
+                confirm: about.confirm.to_owned(),
+            },
+        ));
+    }
+    list.sort_by(|a, b| {
+        let by_set = b.1.in_set.cmp(&a.1.in_set);
+        by_set.then(if a.1.in_set {
+            b.1.evidence.total_cmp(&a.1.evidence)
+        } else {
+            b.0.total_cmp(&a.0)
+        })
+    });
+    list.into_iter().map(|(_, c)| c).collect()
+}
+
+/// The variants of a named cause that fit as well: which sensor, which channel may be open where
+/// the effect is not.
+fn elsewhere<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    which: usize,
+) -> Vec<Elsewhere> {
+    let cause = &causes[which];
+    let effect = &context.catalogue[cause.effect];
+    let others = without(causes, which);
+    let least = context.misfit(readings, causes);
+    let mut starts: BTreeMap<usize, Shape> = BTreeMap::new();
+    for shape in effect.grid(context.model) {
+        starts.entry(shape.variant).or_insert(shape);
+    }
+    starts.remove(&cause.shape.variant);
+    let alike = |start: Shape| {
+        let near = Shape {
+            values: cause.shape.values.clone(),
+            ..start.clone()
+        };
+        let fits = near.values.len() == near.steps.len() && effect.allowed(context.model, &near);
+        let start = if fits { near } else { start };
+        let other = context.refine_alone(context.model, readings, cause.effect, &start, &others);
+        // One that holds this variant fits as well whatever the readings are.
+        if other.unknowns() > cause.unknowns() {
+            return None;
+        }
+        let variant = effect.variant_name(context.model, &other.shape)?;
+        if !possible(context, readings, &others, &other) {
+            return None;
+        }
+        let mut trial = others.clone();
+        trial.push(other);
+        if context.misfit(readings, &trial) > least + AS_LIKELY {
+            return None;
+        }
+        let sizes = Sizes::fitted_with_state(context, readings, &trial)?;
+        let own = sizes.of(context, &trial, others.len());
+        Some(Elsewhere {
+            variant,
+            parameters: own.into_iter().map(Into::into).collect(),
+        })
+    };
+    starts.into_values().filter_map(alike).collect()
+}

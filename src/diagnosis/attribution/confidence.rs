@@ -1,0 +1,376 @@
+//! Which effect: a confidence set, not a winner.
+//!
+//! A cause is accepted when, refitted with everything else free, it leaves nothing that stands out
+//! of the noise: no other effect, no place. All causes that pass are the confidence set (the
+//! inversion of the test); significance alone names nothing. Of several each must earn its place.
+
+use errsep_models::model::{FittedModel, Shape};
+use nalgebra::DVector;
+
+use crate::diagnosis::attribution::context::{Cause, Context, Remainder, adequate, raw_signatures};
+use crate::diagnosis::attribution::sizes::Sizes;
+use crate::diagnosis::detection::space::{Space, orthonormal};
+use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
+use crate::diagnosis::verdict::shrink::held_out_square;
+
+/// A further cause must stand out beside the others at this level.
+pub(in crate::diagnosis) const EARNED: f64 = 0.002;
+/// A cause whose statistic is this much below the best cannot be adequate.
+pub(in crate::diagnosis) const HOPELESS: f64 = 80.0;
+/// Part of the strongest cause's change, squared, that a further one must reach. What is less may be
+/// the remainder of a cause taken for another whose signature is off by a seventh of its size.
+const WEIGHTY: f64 = 0.02;
+/// Causes whose misfits differ by less fit equally well: beside others the one of more usual size is
+/// kept.
+const TIED: f64 = 9.2;
+/// A relative of a cause that explains less than this part of what it does cannot stand for it.
+const NEAR: f64 = 0.7;
+/// A size counts from this many of its standard uncertainties on.
+const STANDS: f64 = 2.0;
+/// Evidence that differs by less is equal: of exact aliases the one of more usual size goes first.
+const EQUAL: f64 = 1e-3;
+
+/// An effect that explains the gap in the place of one of the causes.
+pub(in crate::diagnosis) struct Alternative {
+    /// The cause, the others beside it.
+    pub cause: Cause,
+    /// Logarithm of the evidence for it against nothing in its place (Schwarz's approximation).
+    pub evidence: f64,
+}
+
+/// Causes that together explain the gap, and those that do it as well.
+pub(in crate::diagnosis) struct Answer {
+    /// The causes, by what each adds.
+    pub causes: Vec<Cause>,
+    /// For each cause the effects that these data cannot tell from it and itself, the cause first: it
+    /// has the greatest evidence, unless those of greatest evidence do not pass together.
+    pub groups: Vec<Vec<Alternative>>,
+    /// What remains beside them.
+    pub remainder: Remainder,
+    /// Whether the remainder is adequate.
+    pub complete: bool,
+}
+
+/// One way to explain the gap: causes with one of them varied.
+struct Member {
+    causes: Vec<Cause>,
+    misfit: f64,
+    evidence: f64,
+    left: Remainder,
+    /// Size as a part of what is physically plausible.
+    size: f64,
+}
+
+/// All effects that could stand in place of each cause, the others kept.
+pub(in crate::diagnosis) fn confidence_set<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> Answer {
+    let mut best = context.relinearised(readings, causes, f64::INFINITY);
+    let mut remainder = context.judged(readings, &best);
+    let mut groups = Vec::new();
+    for k in 0..causes.len() {
+        let members = alternatives(context, readings, &best, k);
+        let mut group: Vec<Alternative> = members
+            .iter()
+            .map(|m| Alternative {
+                cause: m.causes[k].clone(),
+                evidence: m.evidence,
+            })
+            .collect();
+        if let Some(first) = members.into_iter().next() {
+            best = first.causes;
+            remainder = first.left;
+        } else {
+            let misfit = context.misfit(readings, &best);
+            group.push(Alternative {
+                cause: best[k].clone(),
+                evidence: evidence(context, readings, &best, k, misfit),
+            });
+        }
+        groups.push(group);
+    }
+    led_by_evidence(context, readings, &mut groups, &mut best, &mut remainder);
+    let needed = best.len() == 1
+        || weighty(context, readings, &best)
+            && (0..best.len()).all(|k| {
+                let beside = context.remainder(readings, &without(&best, k));
+                context.p_value(&beside, best[k].effect) < EARNED
+            })
+            && predicts(context, readings, &best);
+    Answer {
+        complete: needed && adequate(&best, &remainder) && sized(context, readings, &best),
+        causes: best,
+        groups,
+        remainder,
+    }
+}
+
+/// Whether of every cause one size at least is beyond twice its standard uncertainty, that of the
+/// state included: what may as well be nothing stands for something that it only imitates.
+fn sized<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> bool {
+    let all = |sizes: Sizes| (0..causes.len()).all(|k| stands(context, causes, &sizes, k));
+    // Without the state it is seen sooner.
+    Sizes::fitted(context, readings, causes).is_some_and(all)
+        && Sizes::fitted_with_state(context, readings, causes).is_some_and(all)
+}
+
+/// Whether one of the sizes that are told of a cause is beyond twice its standard uncertainty.
+fn stands<M: FittedModel>(
+    context: &Context<'_, M>,
+    causes: &[Cause],
+    sizes: &Sizes,
+    which: usize,
+) -> bool {
+    let shapes = context.catalogue[causes[which].effect].shape_parameters();
+    let own = sizes.of(context, causes, which);
+    own.iter()
+        .filter(|estimate| shapes.iter().all(|p| p.name != estimate.name))
+        .any(|estimate| estimate.value.abs() > STANDS * estimate.std)
+}
+
+/// Whether each of several causes, beside the others, changes the readings by more than may be left
+/// of the strongest of them because its signature is not quite that of the true cause. Counted in
+/// the readings' own unit, as signatures differ, and not by the noise, under which a slow change
+/// shows less; of the strongest all that shows, as that is what a wrong signature errs by.
+fn weighty<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> bool {
+    let Some(changes) = context.changes(readings, causes) else {
+        return false;
+    };
+    let unit = NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated);
+    let shown = Space::new(context.model, &unit).forward(changes).0;
+    let sizes: Vec<f64> = shown.column_iter().map(|c| c.norm()).collect();
+    let own: Vec<f64> = (0..causes.len())
+        .map(|k| {
+            let mut others = sizes.clone();
+            others.remove(k);
+            let basis = orthonormal(&shown.clone().remove_column(k), &others);
+            let change = shown.column(k);
+            (change - &basis * basis.tr_mul(&change)).norm_squared()
+        })
+        .collect();
+    let most = sizes.iter().map(|size| size * size).fold(0.0, f64::max);
+    own.iter().all(|square| *square > WEIGHTY * most)
+}
+
+/// Whether each of several causes makes the prediction of held-out repeats better; a cause that
+/// happened once cannot be judged so.
+fn predicts<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> bool {
+    let noise = context.law.sigma().powi(2);
+    let square = |causes: &[Cause]| {
+        let signatures = raw_signatures(context, causes);
+        held_out_square(context.model, readings, &signatures, noise)
+    };
+    let Some(with) = square(causes) else {
+        return true;
+    };
+    (0..causes.len()).all(|k| square(&without(causes, k)).is_none_or(|s| s > with))
+}
+
+/// The effects that are adequate in the place of cause `k`, the best fit first.
+fn alternatives<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    best: &[Cause],
+    k: usize,
+) -> Vec<Member> {
+    let others = without(best, k);
+    let remainder = context.remainder(readings, &others);
+    let strength = |cause: &Cause| {
+        let mut all = others.clone();
+        all.push(cause.clone());
+        remainder.residual.norm_squared() - context.misfit(readings, &all)
+    };
+    let own = strength(&best[k]);
+    let least = context.misfit(readings, best) + HOPELESS + 0.1 * own;
+    let mut members = Vec::new();
+    for effect in 0..context.catalogue.len() {
+        if others.iter().any(|c| c.effect == effect) {
+            continue;
+        }
+        let trials = if effect == best[k].effect {
+            // Relatives that a state bent by the first may hide.
+            let relatives = context.catalogue[effect].relatives(context.model, &best[k].shape);
+            let columns = best[k].columns.len();
+            let other = |shape: Shape| {
+                let here = context.cause(context.model, effect, shape.clone());
+                let near = here.columns.len() <= columns && strength(&here) > NEAR * own - HOPELESS;
+                near.then(|| context.refine_alone(context.model, readings, effect, &shape, &others))
+            };
+            let mut own = vec![Some(best[k].clone())];
+            own.extend(relatives.into_iter().map(other));
+            own
+        } else {
+            if context.p_value(&remainder, effect) > EARNED {
+                continue;
+            }
+            let start = context.start(&remainder, effect);
+            vec![start.map(|start| {
+                context
+                    .refine(context.model, readings, effect, start, &others)
+                    .0
+            })]
+        };
+        let judged = trials.into_iter().flatten().filter_map(|cause| {
+            if strength(&cause) < own - HOPELESS - 0.1 * own
+                || !possible(context, readings, &others, &cause)
+            {
+                return None;
+            }
+            let known = cause.shape == best[k].shape && effect == best[k].effect;
+            let mut trial = others.clone();
+            trial.insert(k, cause);
+            let trial = if known {
+                trial
+            } else {
+                context.relinearised(readings, &trial, least)
+            };
+            let left = context.judged(readings, &trial);
+            let misfit = left.residual.norm_squared();
+            let passes = adequate(&trial, &left)
+                && Sizes::fitted(context, readings, &trial)
+                    .is_some_and(|sizes| stands(context, &trial, &sizes, k));
+            passes.then(|| Member {
+                misfit,
+                size: part_of_plausible(context, readings, &trial, k),
+                evidence: evidence(context, readings, &trial, k, misfit),
+                causes: trial,
+                left,
+            })
+        });
+        members.extend(judged.max_by(|a, b| a.evidence.total_cmp(&b.evidence)));
+    }
+    let least = members
+        .iter()
+        .map(|m| m.misfit)
+        .fold(f64::INFINITY, f64::min);
+    members.sort_by(|a, b| {
+        let behind = |m: &Member| m.misfit > least + TIED;
+        let by_fit = a.misfit.total_cmp(&b.misfit);
+        let by_size = a.size.total_cmp(&b.size);
+        behind(a).cmp(&behind(b)).then(if behind(a) {
+            by_fit
+        } else {
+            by_size.then(by_fit)
+        })
+    });
+    members
+}
+
+/// Brings the greatest evidence of each group to its front and makes it the cause, where these causes
+/// pass together too; else the cause that was kept goes first.
+fn led_by_evidence<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    groups: &mut [Vec<Alternative>],
+    best: &mut Vec<Cause>,
+    remainder: &mut Remainder,
+) {
+    for group in groups.iter_mut() {
+        let rounded = |a: &Alternative| (a.evidence / EQUAL).round();
+        group.sort_by(|a, b| rounded(b).total_cmp(&rounded(a)));
+    }
+    let leaders: Vec<Cause> = best
+        .iter()
+        .zip(groups.iter())
+        .map(|(kept, group)| match group.first() {
+            Some(first) if first.cause.effect != kept.effect => first.cause.clone(),
+            _ => kept.clone(),
+        })
+        .collect();
+    let of = |causes: &[Cause]| -> Vec<usize> { causes.iter().map(|c| c.effect).collect() };
+    let (led, kept) = (of(&leaders), of(best));
+    if led == kept {
+        return;
+    }
+    let distinct = led.iter().enumerate().all(|(k, e)| !led[..k].contains(e));
+    if distinct {
+        let trial = context.relinearised(readings, &leaders, f64::INFINITY);
+        let left = context.judged(readings, &trial);
+        if adequate(&trial, &left) && context.amplitudes(readings, &trial).is_some() {
+            (*best, *remainder) = (trial, left);
+            return;
+        }
+    }
+    for (group, kept) in groups.iter_mut().zip(best.iter()) {
+        group.sort_by_key(|a| a.cause.effect != kept.effect);
+    }
+}
+
+/// Logarithm of the evidence for cause `k` beside the others against nothing in its place, by the
+/// misfit that all of them leave (Schwarz, Ann. Statist. 6 (1978) 461).
+fn evidence<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    k: usize,
+    misfit: f64,
+) -> f64 {
+    let beside = context.misfit(readings, &without(causes, k));
+    let unknowns = causes[k].unknowns() as f64;
+    0.5 * (beside - misfit - unknowns * (context.space.readings() as f64).ln())
+}
+
+/// The greatest amplitude of a cause as a part of the plausible one.
+fn part_of_plausible<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    k: usize,
+) -> f64 {
+    let Some((amplitudes, _)) = context.amplitudes(readings, causes) else {
+        return f64::INFINITY;
+    };
+    let from: usize = causes[..k].iter().map(|c| c.projected.ncols()).sum();
+    context.catalogue[causes[k].effect]
+        .amplitudes_at(&causes[k].shape)
+        .iter()
+        .zip(amplitudes.iter().skip(from))
+        .map(|(p, a)| a.abs() / p.low.abs().max(p.high.abs()))
+        .fold(0.0, f64::max)
+}
+
+/// Whether a cause beside others has a physically possible size.
+pub(in crate::diagnosis) fn possible<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    others: &[Cause],
+    cause: &Cause,
+) -> bool {
+    let mut all = others.to_vec();
+    all.push(cause.clone());
+    let Some((amplitudes, covariance)) = context.amplitudes(readings, &all) else {
+        return false;
+    };
+    let own = cause.projected.ncols();
+    let from = amplitudes.len() - own;
+    let stds: Vec<f64> = (from..amplitudes.len())
+        .map(|k| covariance[(k, k)].max(0.0).sqrt())
+        .collect();
+    context.plausible(
+        cause.effect,
+        &cause.shape,
+        &amplitudes.as_slice()[from..],
+        &stds,
+    )
+}
+
+/// The causes but one.
+pub(in crate::diagnosis) fn without(causes: &[Cause], k: usize) -> Vec<Cause> {
+    let mut others = causes.to_vec();
+    others.remove(k);
+    others
+}

@@ -1,0 +1,383 @@
+//! The workbench of one pass: state of the model, noise, space, dictionary and their null law.
+
+use std::sync::Arc;
+
+use errsep_models::model::{Column, Effect, FittedModel, Shape};
+use nalgebra::{DMatrix, DVector};
+
+use rayon::prelude::*;
+
+use crate::diagnosis::attribution::doubt::Doubt;
+use crate::diagnosis::detection::dictionary::{
+    Dictionary, Entry, Meaning, Places, statistic, surprise,
+};
+use crate::diagnosis::detection::folding::Sums;
+use crate::diagnosis::detection::null::NullLaw;
+use crate::diagnosis::detection::space::{Space, orthonormal};
+use crate::diagnosis::noise::law::NoiseLaw;
+
+/// Beside other causes a signature must keep this part of its visible length to be told apart.
+const SEPARABLE: f64 = 0.02;
+
+/// A set of one, two, three causes whose remainder is less probable than this is not adequate:
+/// three imitate freely what none of them is.
+const ADEQUATE: [f64; 3] = [0.001, 0.001, 0.01];
+
+/// Standard deviations of chi-squared beyond which no doubt about the state excuses a remainder.
+const FAR: f64 = 6.0;
+
+/// Part of a plausible range by which an uncertain size may lie outside it.
+const SLACK: f64 = 0.1;
+
+/// Everything that is fixed while causes are sought.
+pub(in crate::diagnosis) struct Context<'a, M: FittedModel> {
+    pub model: &'a M,
+    pub catalogue: &'a [Box<dyn Effect<M>>],
+    pub law: NoiseLaw,
+    pub space: Space,
+    pub dictionary: Dictionary,
+    pub null: Arc<NullLaw>,
+}
+
+/// A cause at a shape, with its whitened, projected signature.
+#[derive(Clone)]
+pub(in crate::diagnosis) struct Cause {
+    pub effect: usize,
+    pub shape: Shape,
+    pub columns: Vec<Column>,
+    pub projected: DMatrix<f64>,
+}
+
+impl Cause {
+    /// Number of its amplitudes and free shape parameters.
+    pub fn unknowns(&self) -> usize {
+        self.projected.ncols() + self.shape.free()
+    }
+}
+
+/// What remains beside some causes.
+pub(in crate::diagnosis) struct Remainder {
+    pub residual: DVector<f64>,
+    /// Greatest score of each family and the entry where it is.
+    pub best: Vec<(f64, Option<usize>)>,
+    /// Probability that any family stands out as much.
+    pub global: f64,
+}
+
+impl<'a, M: FittedModel> Context<'a, M> {
+    /// A context with a null law of its own.
+    pub fn new(
+        model: &'a M,
+        catalogue: &'a [Box<dyn Effect<M>>],
+        law: NoiseLaw,
+        draws: usize,
+        seed: u64,
+    ) -> Self {
+        let places = Arc::new(Places::new(model));
+        let space = Space::expecting(model, &law);
+        let dictionary = Dictionary::new(model, catalogue, places, &space);
+        let null = Arc::new(NullLaw::simulate(
+            model,
+            &dictionary,
+            &space,
+            &law,
+            draws,
+            seed,
+        ));
+        Self {
+            model,
+            catalogue,
+            law,
+            space,
+            dictionary,
+            null,
+        }
+    }
+
+    /// The context of another state and law of noise of the same readings. The null law is kept: it
+    /// is one of standardised scores, so it knows the noise only through the angles between the
+    /// signatures, and a state some hundredths away leaves those as they are.
+    pub fn moved<'b>(&self, model: &'b M, law: NoiseLaw) -> Context<'b, M>
+    where
+        'a: 'b,
+    {
+        let space = Space::expecting(model, &law);
+        let places = Arc::clone(&self.dictionary.places);
+        let dictionary = Dictionary::new(model, self.catalogue, places, &space);
+        Context {
+            model,
+            catalogue: self.catalogue,
+            law,
+            space,
+            dictionary,
+            null: Arc::clone(&self.null),
+        }
+    }
+
+    /// The whitened, projected residual of readings.
+    pub fn residual(&self, readings: &DVector<f64>) -> DVector<f64> {
+        self.space.forward_vector(readings)
+    }
+
+    /// A cause of the catalogue at a shape, by the signature at a state of the model.
+    pub fn cause(&self, state: &M, effect: usize, shape: Shape) -> Cause {
+        let columns = self.catalogue[effect].columns(state, &shape);
+        Cause {
+            effect,
+            shape,
+            projected: self.space.forward_columns(&columns).0,
+            columns,
+        }
+    }
+
+    /// Scores of everything beside some causes.
+    pub fn remainder(&self, readings: &DVector<f64>, causes: &[Cause]) -> Remainder {
+        let basis = span(causes, self.space.readings());
+        self.scores(readings, &basis, &Doubt::default())
+    }
+
+    /// The same with the doubt about the state at which the causes' signatures are taken, where
+    /// that can make the difference.
+    pub fn judged(&self, readings: &DVector<f64>, causes: &[Cause]) -> Remainder {
+        let plain = self.remainder(readings, causes);
+        let freedom = self.space.degrees_of_freedom() as f64;
+        let far = plain.residual.norm_squared() > freedom + FAR * (2.0 * freedom).sqrt();
+        if causes.is_empty() || adequate(causes, &plain) || far {
+            return plain;
+        }
+        let basis = span(causes, self.space.readings());
+        let doubt = self.doubt(readings, causes, &basis);
+        if doubt.weights.is_empty() {
+            return plain;
+        }
+        self.scores(readings, &basis, &doubt)
+    }
+
+    /// Probability that as much would stand out with nothing there: in any effect, at any place or
+    /// in the misfit as a whole.
+    pub fn detection(&self, first: &Remainder) -> f64 {
+        let surprises: Vec<f64> = first.best.iter().map(|(s, _)| *s).collect();
+        self.null
+            .detection(&surprises, first.residual.norm_squared())
+    }
+
+    fn scores(&self, readings: &DVector<f64>, basis: &DMatrix<f64>, doubt: &Doubt) -> Remainder {
+        let whole = self.residual(readings);
+        let residual = &whole - basis * basis.tr_mul(&whole);
+        let mut trusted = residual.clone();
+        for (direction, weight) in doubt.directions.iter().zip(&doubt.weights) {
+            trusted.axpy(-weight * direction.dot(&residual), direction, 1.0);
+        }
+        let mut spans: Vec<DVector<f64>> = basis.column_iter().map(|c| c.clone_owned()).collect();
+        // A part w of a product is taken away by √w of the direction.
+        let halves = doubt.directions.iter().zip(&doubt.weights);
+        spans.extend(halves.map(|(direction, weight)| direction * weight.sqrt()));
+        let sums = |c: DVector<f64>| self.dictionary.places.sums(&c);
+        let adjoint = sums(column(self.space.adjoint(as_matrix(&trusted))));
+        let directions: Vec<Sums> = if spans.is_empty() {
+            Vec::new()
+        } else {
+            self.space
+                .adjoint(DMatrix::from_columns(&spans))
+                .column_iter()
+                .map(|c| sums(c.clone_owned()))
+                .collect()
+        };
+        let surprise_of = |entry: &Entry| -> f64 {
+            let score = entry.products(&adjoint);
+            let t = if directions.is_empty() {
+                statistic(&entry.gram, &score, entry.positive)
+            } else {
+                let overlap = overlaps(entry, &directions);
+                let left = &entry.gram - &overlap * overlap.transpose();
+                if left.trace() < SEPARABLE * entry.gram.trace() {
+                    return 0.0;
+                }
+                statistic(&left, &score, entry.positive)
+            };
+            surprise(t, entry.order())
+        };
+        let surprises: Vec<f64> = self
+            .dictionary
+            .entries
+            .par_iter()
+            .map(surprise_of)
+            .collect();
+        let best: Vec<(f64, Option<usize>)> = self
+            .dictionary
+            .families
+            .iter()
+            .map(|family| {
+                family
+                    .entries
+                    .clone()
+                    .filter(|k| surprises[*k] > 0.0)
+                    .max_by(|a, b| surprises[*a].total_cmp(&surprises[*b]))
+                    .map_or((0.0, None), |k| (surprises[k], Some(k)))
+            })
+            .collect();
+        let surprises: Vec<f64> = best.iter().map(|(s, _)| *s).collect();
+        Remainder {
+            residual,
+            global: self.null.global(&surprises),
+            best,
+        }
+    }
+
+    /// Square of what remains beside causes.
+    pub fn misfit(&self, readings: &DVector<f64>, causes: &[Cause]) -> f64 {
+        let whole = self.residual(readings);
+        let basis = span(causes, self.space.readings());
+        (&whole - &basis * basis.tr_mul(&whole)).norm_squared()
+    }
+
+    /// The start of an effect's search beside other causes: the best entry of its family.
+    pub fn start(&self, remainder: &Remainder, effect: usize) -> Option<&Shape> {
+        let family = self.family_of(effect)?;
+        let entry = remainder.best[family].1?;
+        match &self.dictionary.entries[entry].meaning {
+            Meaning::Effect(shape) => Some(shape),
+            Meaning::Place(_) => None,
+        }
+    }
+
+    /// The family of an effect.
+    pub fn family_of(&self, effect: usize) -> Option<usize> {
+        let name = self.catalogue[effect].name();
+        self.dictionary
+            .families
+            .iter()
+            .position(|f| f.is_effect && f.name == name)
+    }
+
+    /// Tail probability of an effect's greatest score.
+    pub fn p_value(&self, remainder: &Remainder, effect: usize) -> f64 {
+        self.family_of(effect)
+            .map_or(1.0, |f| self.null.family(f, remainder.best[f].0))
+    }
+
+    /// Amplitudes of causes fitted together, with their covariance.
+    pub fn amplitudes(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let stacked = stack(causes, self.space.readings());
+        let covariance = stacked.tr_mul(&stacked).cholesky()?.inverse();
+        let score = stacked.tr_mul(&self.residual(readings));
+        Some((&covariance * score, covariance))
+    }
+
+    /// The readings' change by causes at given amplitudes.
+    pub fn change(&self, causes: &[Cause], amplitudes: &DVector<f64>) -> DVector<f64> {
+        let mut change = DVector::zeros(self.space.readings());
+        let mut at = 0;
+        for cause in causes {
+            for column in &cause.columns {
+                for (&row, value) in column.rows.iter().zip(&column.values) {
+                    change[row] += amplitudes[at] * value;
+                }
+                at += 1;
+            }
+        }
+        change
+    }
+
+    /// Whether amplitudes and shapes lie where the effect is physically possible.
+    pub fn plausible(
+        &self,
+        effect: usize,
+        shape: &Shape,
+        amplitudes: &[f64],
+        stds: &[f64],
+    ) -> bool {
+        let effect = &self.catalogue[effect];
+        let inside = effect
+            .amplitudes_at(shape)
+            .iter()
+            .zip(amplitudes)
+            .zip(stds)
+            .all(|((p, a), u)| {
+                // A size that the readings hardly know excuses none far out of range.
+                let slack = (2.0 * u).min(SLACK * (p.high - p.low));
+                *a > p.low - slack && *a < p.high + slack
+            });
+        inside
+            && effect.possible(self.model, shape, amplitudes)
+            && effect
+                .shape_parameters()
+                .iter()
+                .zip(&shape.values)
+                .all(|(p, v)| *v >= p.low && *v <= p.high)
+    }
+}
+
+fn overlaps(entry: &Entry, directions: &[Sums]) -> DMatrix<f64> {
+    let mut overlap = DMatrix::zeros(entry.order(), directions.len());
+    for (j, direction) in directions.iter().enumerate() {
+        overlap.set_column(j, &entry.products(direction));
+    }
+    overlap
+}
+
+/// Whether causes leave nothing that stands out.
+pub(in crate::diagnosis) fn adequate(causes: &[Cause], left: &Remainder) -> bool {
+    let least = ADEQUATE[causes.len().clamp(1, ADEQUATE.len()) - 1];
+    left.global > least
+}
+
+/// The same shape with the steps of a finer search.
+pub(in crate::diagnosis) fn finer(shape: &Shape) -> Shape {
+    Shape {
+        steps: shape.steps.iter().map(|s| 0.3 * s).collect(),
+        ..shape.clone()
+    }
+}
+
+/// Signatures of several causes side by side.
+pub(in crate::diagnosis) fn stack(causes: &[Cause], readings: usize) -> DMatrix<f64> {
+    let columns: Vec<DVector<f64>> = causes
+        .iter()
+        .flat_map(|c| c.projected.column_iter().map(|v| v.clone_owned()))
+        .collect();
+    if columns.is_empty() {
+        DMatrix::zeros(readings, 0)
+    } else {
+        DMatrix::from_columns(&columns)
+    }
+}
+
+/// Signatures as they stand in the readings, readings × amplitudes.
+pub(in crate::diagnosis) fn raw_signatures<M: FittedModel>(
+    context: &Context<'_, M>,
+    causes: &[Cause],
+) -> DMatrix<f64> {
+    let n = context.space.readings();
+    let columns: Vec<DVector<f64>> = causes
+        .iter()
+        .flat_map(|c| &c.columns)
+        .map(|c| c.dense(n))
+        .collect();
+    if columns.is_empty() {
+        DMatrix::zeros(n, 0)
+    } else {
+        DMatrix::from_columns(&columns)
+    }
+}
+
+/// An orthonormal basis of the causes' signatures.
+pub(in crate::diagnosis) fn span(causes: &[Cause], readings: usize) -> DMatrix<f64> {
+    let stacked = stack(causes, readings);
+    let sizes: Vec<f64> = stacked.column_iter().map(|c| c.norm()).collect();
+    orthonormal(&stacked, &sizes)
+}
+
+/// A vector as a matrix of one column.
+pub(in crate::diagnosis) fn as_matrix(vector: &DVector<f64>) -> DMatrix<f64> {
+    DMatrix::from_column_slice(vector.len(), 1, vector.as_slice())
+}
+
+/// The only column of a matrix.
+pub(in crate::diagnosis) fn column(matrix: DMatrix<f64>) -> DVector<f64> {
+    matrix.column(0).clone_owned()
+}

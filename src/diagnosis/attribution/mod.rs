@@ -1,0 +1,13 @@
+//! Which effects cause the gap: search, confidence set, sizes, and how far the answers move without
+//! them.
+
+pub(super) mod attribute;
+pub(super) mod bias;
+pub(super) mod candidates;
+pub(super) mod confidence;
+pub(super) mod context;
+pub(super) mod doubt;
+pub(super) mod mixing;
+pub(super) mod refine;
+pub(super) mod refit;
+pub(super) mod sizes;

@@ -1,0 +1,141 @@
+//! The best member of an effect's family beside other causes, from a start.
+
+use errsep_models::model::{Effect, FittedModel, Shape};
+use nalgebra::{DMatrix, DVector};
+
+use crate::diagnosis::attribution::context::{Cause, Context, as_matrix, column, span};
+use crate::diagnosis::detection::dictionary::{is_positive, products, statistic};
+use crate::diagnosis::search::coordinate_search;
+
+/// Part of a shape's first step that its search settles to.
+const PRECISION: f64 = 1e-2;
+
+/// Part of a statistic that searching may add to that of a relative where it stands.
+const UNSEARCHED: f64 = 0.2;
+
+impl<M: FittedModel> Context<'_, M> {
+    /// The best shape of an effect beside other causes, from a start, and the statistic there; its
+    /// relatives are tried too, and the one of greatest evidence is taken.
+    pub fn refine(
+        &self,
+        state: &M,
+        readings: &DVector<f64>,
+        effect: usize,
+        start: &Shape,
+        beside: &[Cause],
+    ) -> (Cause, f64) {
+        let seen = Seen::of(self, state, readings, effect, beside);
+        let (mut shape, mut t) = seen.searched(start);
+        let log_readings = (self.space.readings() as f64).ln();
+        let weighed = |shape: &Shape, t: f64| {
+            let columns = self.catalogue[effect].amplitudes_at(shape).len();
+            (t - (columns + shape.free()) as f64 * log_readings, columns)
+        };
+        for other in self.catalogue[effect].relatives(state, &shape) {
+            let (least, columns) = weighed(&shape, t);
+            let (here, own) = weighed(&other, seen.value(&other).0);
+            // One that holds the other needs no search to be better; one of another kind does.
+            let reach = if own == columns { UNSEARCHED * t } else { 0.0 };
+            if here <= least - reach {
+                continue;
+            }
+            let (found, own_t) = seen.searched(&other);
+            if weighed(&found, own_t).0 > least {
+                (shape, t) = (found, own_t);
+            }
+        }
+        (self.cause(state, effect, shape), t)
+    }
+
+    /// The same without its relatives.
+    pub fn refine_alone(
+        &self,
+        state: &M,
+        readings: &DVector<f64>,
+        effect: usize,
+        start: &Shape,
+        beside: &[Cause],
+    ) -> Cause {
+        let (shape, _) = Seen::of(self, state, readings, effect, beside).searched(start);
+        self.cause(state, effect, shape)
+    }
+}
+
+/// An effect as it is seen beside other causes at a state of the model.
+struct Seen<'s, M: FittedModel> {
+    context: &'s Context<'s, M>,
+    effect: &'s dyn Effect<M>,
+    state: &'s M,
+    adjoint: DVector<f64>,
+    directions: Vec<DVector<f64>>,
+}
+
+impl<'s, M: FittedModel> Seen<'s, M> {
+    fn of(
+        context: &'s Context<'s, M>,
+        state: &'s M,
+        readings: &DVector<f64>,
+        effect: usize,
+        beside: &[Cause],
+    ) -> Self {
+        let whole = context.residual(readings);
+        let basis = span(beside, context.space.readings());
+        let residual = &whole - &basis * basis.tr_mul(&whole);
+        let adjoint = column(context.space.adjoint(as_matrix(&residual)));
+        let directions = context.space.adjoint(basis);
+        Self {
+            context,
+            effect: context.catalogue[effect].as_ref(),
+            state,
+            adjoint,
+            directions: directions.column_iter().map(|c| c.clone_owned()).collect(),
+        }
+    }
+
+    /// Statistic, EᵀPE and score of a shape.
+    fn value(&self, shape: &Shape) -> (f64, DMatrix<f64>, DVector<f64>) {
+        let columns = self.effect.columns(self.state, shape);
+        let mut gram = self.context.space.gram(&columns).matrix;
+        for direction in &self.directions {
+            let along = products(&columns, direction);
+            gram -= &along * along.transpose();
+        }
+        let score = products(&columns, &self.adjoint);
+        let positive = is_positive(self.effect, shape);
+        (statistic(&gram, &score, positive), gram, score)
+    }
+
+    /// The best shape from a start, settled, and its statistic.
+    fn searched(&self, start: &Shape) -> (Shape, f64) {
+        let mut shape = start.clone();
+        if shape.free() > 0 {
+            let (values, _) = coordinate_search(&start.values, &start.steps, PRECISION, |values| {
+                let trial = Shape {
+                    values: values.to_vec(),
+                    ..start.clone()
+                };
+                if self.effect.allowed(self.state, &trial) {
+                    -self.value(&trial).0
+                } else {
+                    f64::INFINITY
+                }
+            });
+            shape.values = values;
+        }
+        let (mut t, mut gram, mut score) = self.value(&shape);
+        for _ in 0..8 {
+            let Some(amplitude) = gram.clone().cholesky().map(|c| c.solve(&score)) else {
+                break;
+            };
+            let Some(next) = self.effect.settled(&shape, amplitude.as_slice()) else {
+                break;
+            };
+            if next.values == shape.values {
+                break;
+            }
+            shape = next;
+            (t, gram, score) = self.value(&shape);
+        }
+        (shape, t)
+    }
+}

@@ -1,0 +1,126 @@
+//! Causes refitted with the state of the model: what each changes, seen after the others, taken out
+//! of the readings until nothing moves.
+
+use std::borrow::Cow;
+
+use errsep_models::model::FittedModel;
+use nalgebra::{DMatrix, DVector};
+
+use crate::diagnosis::attribution::context::{Cause, Context, finer};
+use crate::diagnosis::attribution::mixing::Mixing;
+
+/// Relative change of the amplitudes at which refining stops.
+const AT_REST: f64 = 1e-4;
+
+/// Most rounds of fitting the state without the causes.
+const ROUNDS: usize = 16;
+
+impl<M: FittedModel> Context<'_, M> {
+    /// Causes bend the state at which their signatures are taken: takes their change out of the
+    /// readings, fits the model again and refines each there, until the change rests. The rounds
+    /// are those of a fixed point, sped up by Anderson's mixing; the best fit seen is kept. They
+    /// end early where the misfit will not come below `hopeless`.
+    pub fn relinearised(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+        hopeless: f64,
+    ) -> Vec<Cause> {
+        let mut best = (f64::INFINITY, causes.to_vec());
+        let mut causes = causes.to_vec();
+        for cause in &mut causes {
+            cause.shape = finer(&cause.shape);
+        }
+        let Some(mut changes) = self.changes(readings, &causes) else {
+            return causes;
+        };
+        let mut mixing = Mixing::default();
+        for round in 0..ROUNDS {
+            let state = self
+                .model
+                .refit_as_smooth(self.without(readings, &causes, &changes));
+            for k in 0..causes.len() {
+                let mut others = causes.clone();
+                let own = others.remove(k);
+                let state = self.seen_by(k, &state, &causes, &changes);
+                let refined = self.refine(&state, readings, own.effect, &own.shape, &others);
+                causes[k] = refined.0;
+            }
+            let misfit = self.misfit(readings, &causes);
+            let gained = best.0 - misfit;
+            if round > 0 && gained < 0.2 * (misfit - hopeless) {
+                break;
+            }
+            if misfit < best.0 {
+                best = (misfit, causes.clone());
+            }
+            let Some(next) = self.changes(readings, &causes) else {
+                break;
+            };
+            if (&next - &changes).norm() < AT_REST * next.norm() {
+                break;
+            }
+            changes = mixing.mixed(&changes, next);
+        }
+        best.1
+    }
+
+    /// The state at which the signature of one of several causes is taken: with what the others
+    /// change before it.
+    pub fn seen_by<'s>(
+        &self,
+        which: usize,
+        state: &'s M,
+        causes: &[Cause],
+        changes: &DMatrix<f64>,
+    ) -> Cow<'s, M> {
+        let link = |k: usize| self.catalogue[causes[k].effect].link();
+        let mut sum = DVector::zeros(self.space.readings());
+        let mut any = false;
+        for k in (0..causes.len()).filter(|k| *k != which && link(which).sees(link(*k))) {
+            sum += changes.column(k);
+            any = true;
+        }
+        if any {
+            Cow::Owned(state.clone().beneath(&sum))
+        } else {
+            Cow::Borrowed(state)
+        }
+    }
+
+    /// What each cause changes in the readings at its fitted amplitudes, readings × causes.
+    pub fn changes(&self, readings: &DVector<f64>, causes: &[Cause]) -> Option<DMatrix<f64>> {
+        let (amplitudes, _) = self.amplitudes(readings, causes)?;
+        Some(self.changes_at(causes, &amplitudes))
+    }
+
+    /// The same at given amplitudes.
+    pub fn changes_at(&self, causes: &[Cause], amplitudes: &DVector<f64>) -> DMatrix<f64> {
+        let mut changes = DMatrix::zeros(self.space.readings(), causes.len());
+        let mut at = 0;
+        for (k, cause) in causes.iter().enumerate() {
+            let own = amplitudes.rows(at, cause.columns.len()).clone_owned();
+            at += cause.columns.len();
+            changes.set_column(k, &self.change(std::slice::from_ref(cause), &own));
+        }
+        changes
+    }
+
+    /// Readings without what causes change in them, and what they hide of the state restored.
+    pub fn without(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+        changes: &DMatrix<f64>,
+    ) -> DVector<f64> {
+        let mut clean = readings - changes.column_sum();
+        for (cause, change) in causes.iter().zip(changes.column_iter()) {
+            let with = &clean + change;
+            if let Some(restored) = self.catalogue[cause.effect].restored(self.model, &with, &clean)
+            {
+                clean = restored;
+            }
+        }
+        clean
+    }
+}

@@ -1,0 +1,247 @@
+//! Sizes and shapes of causes with their uncertainty.
+//!
+//! The causes' amplitudes a solve Sᵀ(r − Σ aE(a)) = 0, where the signatures E(a) are taken at the
+//! state that is left without the causes and at the sizes that belong to them. With D the total
+//! derivative of Σ aE(a), noise ν of the readings moves them by G ν, G = (SᵀD)⁻¹Sᵀ; D = S where a
+//! signature depends on nothing. Noise also moves the state at which signatures are taken: that is
+//! drawn.
+
+use errsep_models::model::{Estimate, FittedModel, Shape};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use crate::diagnosis::attribution::context::{Cause, Context, stack};
+use crate::diagnosis::attribution::doubt::{ROUNDS, StateDraws};
+
+/// What the noise of the state may take away of a variance, at most: it is known from draws.
+const LEAST: f64 = -0.5;
+
+/// Amplitudes and shapes of causes fitted together.
+pub(in crate::diagnosis) struct Sizes {
+    /// The amplitudes, cause by cause.
+    pub amplitudes: DVector<f64>,
+    /// Covariance of the parameters.
+    pub covariance: DMatrix<f64>,
+    /// How noise of whitened, projected readings moves the parameters.
+    pub gain: DMatrix<f64>,
+    /// What the parameters are: those that readings determine at all.
+    pub parameters: Vec<Unknown>,
+    /// Draws of the state, where signatures depend on it.
+    pub draws: Option<StateDraws>,
+}
+
+/// One parameter of several causes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::diagnosis) enum Unknown {
+    /// An amplitude: the cause, and its place among the cause's own.
+    Amplitude(usize, usize),
+    /// A shape parameter, likewise.
+    Shape(usize, usize),
+}
+
+impl Sizes {
+    /// Causes at fixed signatures.
+    pub fn fitted<M: FittedModel>(
+        context: &Context<'_, M>,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+    ) -> Option<Self> {
+        let (amplitudes, _) = context.amplitudes(readings, causes)?;
+        let (columns, parameters) = instruments(context, causes, &amplitudes);
+        let gram = columns.tr_mul(&columns);
+        let covariance = gram
+            .clone()
+            .cholesky()
+            .map(|c| c.inverse())
+            .or_else(|| gram.pseudo_inverse(1e-12).ok())?;
+        Some(Self {
+            amplitudes,
+            gain: &covariance * columns.transpose(),
+            covariance,
+            parameters,
+            draws: None,
+        })
+    }
+
+    /// The same where signatures depend on the sizes and on the state.
+    pub fn fitted_with_state<M: FittedModel>(
+        context: &Context<'_, M>,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+    ) -> Option<Self> {
+        let plain = Self::fitted(context, readings, causes)?;
+        let Some(draws) = context.state_draws(readings, causes) else {
+            return Some(plain);
+        };
+        let (columns, _) = instruments(context, causes, &plain.amplitudes);
+        let mut derivatives = columns.clone();
+        for (parameter, unknown) in plain.parameters.iter().enumerate() {
+            let Unknown::Amplitude(cause, k) = *unknown else {
+                continue;
+            };
+            let at = first_amplitude(causes, cause) + k;
+            let step = 0.5 * plain.covariance[(parameter, parameter)].sqrt();
+            let predicted = |sign: f64| {
+                let mut moved = plain.amplitudes.clone();
+                moved[at] += sign * step;
+                predicted(context, readings, causes, &moved)
+            };
+            let slope = (predicted(1.0) - predicted(-1.0)) / (2.0 * step);
+            if slope.iter().all(|v| v.is_finite()) {
+                derivatives.set_column(parameter, &slope);
+            }
+        }
+        let Some(inverse) = columns.tr_mul(&derivatives).try_inverse() else {
+            return Some(plain);
+        };
+        let gain = inverse * columns.transpose();
+        let added = draws.added(&gain);
+        Some(Self {
+            covariance: with_state(&gain * gain.transpose(), &added),
+            gain,
+            draws: Some(draws),
+            ..plain
+        })
+    }
+
+    /// What is reported of one of the causes.
+    pub fn of<M: FittedModel>(
+        &self,
+        context: &Context<'_, M>,
+        causes: &[Cause],
+        which: usize,
+    ) -> Vec<Estimate> {
+        let cause = &causes[which];
+        let (effect, shape) = (&context.catalogue[cause.effect], &cause.shape);
+        let first = first_amplitude(causes, which);
+        let count = cause.projected.ncols();
+        let place = |i: usize| {
+            let unknown = if i < count {
+                Unknown::Amplitude(which, i)
+            } else {
+                Unknown::Shape(which, i - count)
+            };
+            self.parameters.iter().position(|p| *p == unknown)
+        };
+        let size = count + shape.values.len();
+        let covariance = DMatrix::from_fn(size, size, |i, j| match (place(i), place(j)) {
+            (Some(i), Some(j)) => self.covariance[(i, j)],
+            _ => f64::NAN,
+        });
+        let mut estimates = effect.estimates(
+            shape,
+            &self.amplitudes.as_slice()[first..first + count],
+            &covariance,
+        );
+        // Shape parameters follow the amplitudes. A step between two readings has no derivative.
+        for (estimate, own) in estimates
+            .iter_mut()
+            .skip(count)
+            .zip(effect.resolution(context.model, shape))
+        {
+            estimate.std = if estimate.std.is_nan() {
+                own
+            } else {
+                estimate.std.hypot(own)
+            };
+        }
+        estimates
+    }
+}
+
+/// The place of a cause's first amplitude among those of all.
+pub(in crate::diagnosis) fn first_amplitude(causes: &[Cause], which: usize) -> usize {
+    causes[..which].iter().map(|c| c.projected.ncols()).sum()
+}
+
+/// Signatures and their derivatives by the shapes, and what they belong to.
+fn instruments<M: FittedModel>(
+    context: &Context<'_, M>,
+    causes: &[Cause],
+    amplitudes: &DVector<f64>,
+) -> (DMatrix<f64>, Vec<Unknown>) {
+    let mut columns: Vec<DVector<f64>> = Vec::new();
+    let mut parameters = Vec::new();
+    for (which, cause) in causes.iter().enumerate() {
+        let count = cause.projected.ncols();
+        let used = amplitudes
+            .rows(first_amplitude(causes, which), count)
+            .clone_owned();
+        for (k, column) in cause.projected.column_iter().enumerate() {
+            parameters.push(Unknown::Amplitude(which, k));
+            columns.push(column.clone_owned());
+        }
+        for j in 0..cause.shape.values.len() {
+            let Some((low, high, apart)) = beside(cause, j) else {
+                continue;
+            };
+            let at =
+                |shape: Shape| context.cause(context.model, cause.effect, shape).projected * &used;
+            let slope = (at(high) - at(low)) / apart;
+            if slope.norm() > 0.0 {
+                parameters.push(Unknown::Shape(which, j));
+                columns.push(slope);
+            }
+        }
+    }
+    if columns.is_empty() {
+        return (DMatrix::zeros(context.space.readings(), 0), parameters);
+    }
+    (DMatrix::from_columns(&columns), parameters)
+}
+
+/// The shapes on either side of a cause's along one of its free parameters, and how far apart.
+pub(in crate::diagnosis) fn beside(cause: &Cause, parameter: usize) -> Option<(Shape, Shape, f64)> {
+    let step = *cause.shape.steps.get(parameter)?;
+    if step == 0.0 {
+        return None;
+    }
+    let moved = |sign: f64| {
+        let mut shape = cause.shape.clone();
+        shape.values[parameter] += sign * 0.1 * step;
+        shape
+    };
+    Some((moved(-1.0), moved(1.0), 0.2 * step))
+}
+
+/// The whitened, projected change by causes of given amplitudes, at the state that is left without
+/// them.
+fn predicted<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    amplitudes: &DVector<f64>,
+) -> DVector<f64> {
+    let mut changes = context.changes_at(causes, amplitudes);
+    let mut moved: Vec<Cause> = Vec::new();
+    for _ in 0..ROUNDS {
+        let clean = context.without(readings, causes, &changes);
+        let state = context.model.refit_as_smooth(clean);
+        let mut at = 0;
+        moved.clear();
+        for (k, cause) in causes.iter().enumerate() {
+            let own = &amplitudes.as_slice()[at..at + cause.columns.len()];
+            at += own.len();
+            let shape = context.catalogue[cause.effect]
+                .settled(&cause.shape, own)
+                .unwrap_or_else(|| cause.shape.clone());
+            let state = context.seen_by(k, &state, causes, &changes);
+            moved.push(context.cause(&state, cause.effect, shape));
+        }
+        changes = context.changes_at(&moved, amplitudes);
+    }
+    stack(&moved, readings.len()) * amplitudes
+}
+
+/// A covariance with what the noise of the state adds to it.
+fn with_state(own: DMatrix<f64>, added: &DMatrix<f64>) -> DMatrix<f64> {
+    let Some(root) = own.clone().cholesky().map(|c| c.unpack()) else {
+        return own;
+    };
+    let Some(inverse) = root.clone().try_inverse() else {
+        return own;
+    };
+    let relative = &inverse * added * inverse.transpose();
+    let mut eigen = SymmetricEigen::new(0.5 * (&relative + relative.transpose()));
+    eigen.eigenvalues.apply(|v| *v = v.max(LEAST));
+    own + &root * eigen.recompose() * root.transpose()
+}

@@ -1,0 +1,4 @@
+//! Effects of the user's own: by a table or by a formula.
+
+pub(super) mod formula;
+pub(super) mod tabulated;

@@ -1,0 +1,10 @@
+//! What stands out of the noise: readings in units of it with what the fit absorbs projected off, the
+//! dictionary of signatures and places, and the null distribution that says how seldom as much would
+//! stand out with nothing there.
+
+pub(super) mod dictionary;
+pub(super) mod folding;
+pub(super) mod localise;
+pub(super) mod null;
+pub(super) mod scatter;
+pub(super) mod space;

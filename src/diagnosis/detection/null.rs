@@ -1,0 +1,223 @@
+//! What the greatest score of each family does when nothing is there.
+//!
+//! Draws of the noise, seen through the same projection and the same signatures,
+//! give the law of the greatest score over every shape and place looked at (Westfall and Young's
+//! max-T); the smallest tail probability over the families gives one verdict (min-P). The law of the
+//! noise is itself an estimate: each draw is made by a law that the repeats allow (`posterior.rs`)
+//! and seen through the whitening of the estimated one.
+
+use std::collections::BTreeMap;
+
+use errsep_models::model::FittedModel;
+use nalgebra::DMatrix;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use crate::diagnosis::detection::dictionary::{Dictionary, inverse, surprise};
+use crate::diagnosis::detection::space::Space;
+use crate::diagnosis::noise::law::{NoiseLaw, draw_scatter};
+use crate::diagnosis::noise::spikes::Spikes;
+
+/// Draws handled at once.
+const BATCH: usize = 64;
+
+/// The law of the greatest score of every family, of the misfit as a whole, and of the smallest tail
+/// probability among them.
+#[derive(Debug, Clone)]
+pub struct NullLaw {
+    families: Vec<Tail>,
+    /// Of the sum of squares that the fit leaves, in units of the noise.
+    misfit: Tail,
+    /// Over the families.
+    smallest: Tail,
+    /// Over the families and the misfit.
+    any: Tail,
+}
+
+/// A sorted sample with an exponential tail fitted to its upper tenth.
+#[derive(Debug, Clone)]
+struct Tail {
+    sorted: Vec<f64>,
+    from: f64,
+    scale: f64,
+}
+
+impl Tail {
+    fn new(mut sample: Vec<f64>) -> Self {
+        sample.sort_by(f64::total_cmp);
+        let start = sample.len() * 9 / 10;
+        let from = sample.get(start).copied().unwrap_or(0.0);
+        let excess: f64 = sample[start..].iter().map(|s| s - from).sum();
+        let scale = (excess / (sample.len() - start).max(1) as f64).max(1e-9);
+        Self {
+            sorted: sample,
+            from,
+            scale,
+        }
+    }
+
+    fn beyond(&self, value: f64) -> f64 {
+        // A family that showed nothing in any draw was not there to be judged.
+        if self.from <= 0.0 {
+            return 1.0;
+        }
+        if value > self.from {
+            return 0.1 * (-(value - self.from) / self.scale).exp();
+        }
+        let below = self.sorted.partition_point(|s| *s < value);
+        (self.sorted.len() - below) as f64 / self.sorted.len() as f64
+    }
+}
+
+impl NullLaw {
+    /// The law under a space and a dictionary, from a number of draws.
+    pub fn simulate<M: FittedModel>(
+        model: &M,
+        dictionary: &Dictionary,
+        space: &Space,
+        law: &NoiseLaw,
+        draws: usize,
+        seed: u64,
+    ) -> Self {
+        let spikes = Spikes::new(model);
+        let batches = draws.div_ceil(BATCH);
+        let all: Vec<Vec<Vec<f64>>> = (0..batches)
+            .into_par_iter()
+            .map(|batch| greatest(model, dictionary, space, (law, &spikes), seed, batch))
+            .collect();
+        let mut rows: Vec<Vec<f64>> = all.into_iter().flatten().collect();
+        // Two samples: tails judged by the draws that made them would look better than they are.
+        let others = rows.split_off(rows.len() / 2);
+        let count = dictionary.families.len();
+        let of = |place: usize| Tail::new(rows.iter().map(|row| row[place]).collect());
+        let mut null = Self {
+            families: (0..count).map(of).collect(),
+            misfit: of(count),
+            smallest: Tail::new(vec![0.0]),
+            any: Tail::new(vec![0.0]),
+        };
+        // A row holds the families' greatest scores and, last, the misfit.
+        let least = |row: &Vec<f64>| null.smallest_of(&row[..count]);
+        let smallest = others.iter().map(|row| -2.0 * least(row).ln());
+        let any = others
+            .iter()
+            .map(|row| -2.0 * least(row).min(null.misfit.beyond(row[count])).ln());
+        let (smallest, any) = (smallest.collect(), any.collect());
+        null.smallest = Tail::new(smallest);
+        null.any = Tail::new(any);
+        null
+    }
+
+    /// Probability that any family or the misfit as a whole would stand out as much with nothing
+    /// there: the one test of whether there is a gap.
+    pub fn detection(&self, surprises: &[f64], misfit: f64) -> f64 {
+        let least = self
+            .smallest_of(surprises)
+            .min(self.misfit.beyond(misfit))
+            .max(f64::MIN_POSITIVE);
+        self.any.beyond(-2.0 * least.ln())
+    }
+
+    /// Probability that the greatest score of a family would be as great with nothing there.
+    pub fn family(&self, family: usize, surprise: f64) -> f64 {
+        self.families
+            .get(family)
+            .map_or(1.0, |t| t.beyond(surprise))
+    }
+
+    /// The statistic of one degree of freedom whose surprise a family exceeds with a probability.
+    pub fn threshold(&self, family: usize, probability: f64) -> f64 {
+        let (mut low, mut high) = (0.0, 1e3);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if self.family(family, surprise(middle, 1)) > probability {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        high
+    }
+
+    /// The tail probability of one family at which a gap is detected with a probability.
+    pub fn level(&self, probability: f64) -> f64 {
+        let (mut low, mut high) = (-700.0, 0.0);
+        for _ in 0..60 {
+            let middle: f64 = 0.5 * (low + high);
+            if self.any.beyond(-2.0 * middle) > probability {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        low.exp()
+    }
+
+    fn smallest_of(&self, surprises: &[f64]) -> f64 {
+        surprises
+            .iter()
+            .enumerate()
+            .map(|(family, s)| self.family(family, *s))
+            .fold(1.0, f64::min)
+            .max(f64::MIN_POSITIVE)
+    }
+
+    /// Probability that any family would stand out as much, from the greatest scores of all.
+    pub fn global(&self, surprises: &[f64]) -> f64 {
+        self.smallest
+            .beyond(-2.0 * self.smallest_of(surprises).ln())
+    }
+}
+
+/// The greatest score of each family, and last the misfit, in each draw of one batch.
+fn greatest<M: FittedModel>(
+    model: &M,
+    dictionary: &Dictionary,
+    space: &Space,
+    (law, spikes): (&NoiseLaw, &Spikes),
+    seed: u64,
+    batch: usize,
+) -> Vec<Vec<f64>> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(batch as u64 + 1);
+    let mut draws = DMatrix::zeros(space.readings(), BATCH);
+    for (k, mut column) in draws.column_iter_mut().enumerate() {
+        let noise = law.draw_possible(model, spikes, batch * BATCH + k, &mut random);
+        column.copy_from(&(noise + draw_scatter(model, &mut random)));
+    }
+    let (left, _) = space.forward(draws);
+    let misfits: Vec<f64> = left.column_iter().map(|c| c.norm_squared()).collect();
+    let adjoint = dictionary.places.batch_sums::<BATCH>(&space.adjoint(left));
+    let mut rows: Vec<Vec<f64>> = vec![vec![0.0; dictionary.families.len()]; BATCH];
+    for (place, family) in dictionary.families.iter().enumerate() {
+        // Signatures of one, two … columns are weighed each by its own law.
+        let mut greatest: BTreeMap<usize, [f64; BATCH]> = BTreeMap::new();
+        for entry in &dictionary.entries[family.entries.clone()] {
+            let most = greatest.entry(entry.order()).or_insert([0.0; BATCH]);
+            let products = entry.batch_products(&adjoint);
+            let inverse = inverse(&entry.gram);
+            for (draw, most) in most.iter_mut().enumerate() {
+                let score = |k: usize| f64::from(products[k][draw]);
+                let t = if entry.positive && score(0) <= 0.0 {
+                    0.0
+                } else {
+                    (0..products.len())
+                        .flat_map(|i| (0..products.len()).map(move |j| (i, j)))
+                        .map(|(i, j)| score(i) * inverse[(i, j)] * score(j))
+                        .sum()
+                };
+                *most = most.max(t);
+            }
+        }
+        for (order, most) in greatest {
+            for (row, t) in rows.iter_mut().zip(most) {
+                row[place] = row[place].max(surprise(t, order));
+            }
+        }
+    }
+    for (row, misfit) in rows.iter_mut().zip(misfits) {
+        row.push(misfit);
+    }
+    rows
+}

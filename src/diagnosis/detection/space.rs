@@ -1,0 +1,430 @@
+//! Readings in units of their noise, with what the fit can absorb projected out.
+//!
+//! With V = L Lᵀ the covariance of the readings, r̃ = L⁻¹ r; with P the projector onto the
+//! complement of the whitened Jacobian, e = P r̃ is standard normal there when the model is true.
+//! Profiles that are free at every position and traces that share their positions make P a
+//! Kronecker product, so nothing here is ever a readings × unknowns matrix of them.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use errsep_models::model::{Column, FittedModel, Profiles};
+use nalgebra::{DMatrix, DVector};
+
+use crate::diagnosis::detection::scatter::ScatterRoot;
+use crate::diagnosis::noise::law::NoiseLaw;
+use crate::diagnosis::noise::whitening::Whitening;
+
+/// Columns that project to less than this part of their length lie in the span of the others.
+const DEPENDENT: f64 = 1e-7;
+
+/// The whitened space of one set of readings under one model and one law of noise.
+#[derive(Debug, Clone)]
+pub struct Space {
+    readings: usize,
+    traces: Vec<Range<usize>>,
+    /// The trace of every reading.
+    trace_of: Vec<u32>,
+    /// L⁻¹ of each trace.
+    whitening: Vec<Arc<Whitening>>,
+    /// What makes the scatter that the model expects one with the noise.
+    scatter: Option<ScatterRoot>,
+    /// Orthonormal patterns over the traces, traces × functions.
+    patterns: Option<DMatrix<f64>>,
+    /// Directions inside the patterns that the model does not have, given back; orthonormal.
+    returned: DMatrix<f64>,
+    /// The rest of what the fit absorbs; orthonormal.
+    absorbed: DMatrix<f64>,
+    /// Number of directions the fit absorbs.
+    pub rank: usize,
+}
+
+impl Space {
+    /// The space of all readings.
+    pub fn new<M: FittedModel>(model: &M, law: &NoiseLaw) -> Self {
+        let all: Vec<usize> = (0..model.traces().len()).collect();
+        Self::of_traces(model, law, &all)
+    }
+
+    /// The space of all readings, in units of the noise and of the scatter that the model expects.
+    /// (Profiles that are free at every position and such scatter do not go together.)
+    pub fn expecting<M: FittedModel>(model: &M, law: &NoiseLaw) -> Self {
+        let all: Vec<usize> = (0..model.traces().len()).collect();
+        Self::made(model, law, &all, model.expected_scatter())
+    }
+
+    /// The space of the readings of some traces, in the order of those traces.
+    pub fn of_traces<M: FittedModel>(model: &M, law: &NoiseLaw, chosen: &[usize]) -> Self {
+        Self::made(model, law, chosen, &[])
+    }
+
+    fn made<M: FittedModel>(
+        model: &M,
+        law: &NoiseLaw,
+        chosen: &[usize],
+        scatter: &[Column],
+    ) -> Self {
+        let mut traces = Vec::new();
+        let mut whitening: Vec<Arc<Whitening>> = Vec::new();
+        let mut cache: Vec<(Vec<f64>, Arc<Whitening>)> = Vec::new();
+        let mut rows = Vec::new();
+        let mut start = 0;
+        for &t in chosen {
+            let trace = model.traces()[t].clone();
+            let x: Vec<f64> = model.places()[trace.clone()].iter().map(|p| p.x).collect();
+            let known = cache.iter().find(|(positions, _)| *positions == x);
+            let inverse = if let Some((_, inverse)) = known {
+                Arc::clone(inverse)
+            } else {
+                let inverse = Arc::new(Whitening::new(law, &x));
+                cache.push((x, Arc::clone(&inverse)));
+                inverse
+            };
+            whitening.push(inverse);
+            traces.push(start..start + trace.len());
+            start += trace.len();
+            rows.extend(trace);
+        }
+        let freedom = model.freedom();
+        let trace_of = traces
+            .iter()
+            .enumerate()
+            .flat_map(|(t, trace): (usize, &Range<usize>)| trace.clone().map(move |_| t as u32))
+            .collect();
+        let mut space = Self {
+            readings: start,
+            traces,
+            trace_of,
+            whitening,
+            scatter: None,
+            patterns: None,
+            returned: DMatrix::zeros(start, 0),
+            absorbed: DMatrix::zeros(start, 0),
+            rank: 0,
+        };
+        if !scatter.is_empty() {
+            let whitened = scatter.iter().map(|column| {
+                let mut dense = DMatrix::zeros(start, 1);
+                for (&row, &value) in column.rows.iter().zip(&column.values) {
+                    dense[row] += value;
+                }
+                space.whiten(&mut dense);
+                dense.column(0).clone_owned()
+            });
+            space.scatter = Some(ScatterRoot::new(whitened));
+        }
+        let columns = freedom.columns.select_rows(&rows);
+        let mut whitened = columns;
+        space.whiten(&mut whitened);
+        let sizes: Vec<f64> = whitened.column_iter().map(|c| c.norm()).collect();
+        if let Some(profiles) = &freedom.profiles {
+            let x: Vec<f64> = chosen.first().map_or_else(Vec::new, |t| {
+                let trace = model.traces()[*t].clone();
+                model.places()[trace].iter().map(|p| p.x).collect()
+            });
+            space.free_profiles(profiles, chosen, &law.covariance(&x));
+        }
+        space.project_profiles(&mut whitened);
+        space.absorbed = orthonormal(&whitened, &sizes);
+        space.rank += space.absorbed.ncols();
+        space
+    }
+
+    fn free_profiles(&mut self, profiles: &Profiles, chosen: &[usize], covariance: &DMatrix<f64>) {
+        let patterns = profiles.patterns.select_rows(chosen);
+        let sizes: Vec<f64> = patterns.column_iter().map(|c| c.norm()).collect();
+        let basis = orthonormal(&patterns, &sizes);
+        let length = self.traces.first().map_or(0, Range::len);
+        let mut returned = DMatrix::zeros(self.readings, 0);
+        for (function, profile) in &profiles.withheld {
+            // The part of this function's pattern that no other function has.
+            let others: Vec<usize> = (0..patterns.ncols()).filter(|k| k != function).collect();
+            let rest = patterns.select_columns(&others);
+            let rest_sizes: Vec<f64> = rest.column_iter().map(|c| c.norm()).collect();
+            let span = orthonormal(&rest, &rest_sizes);
+            let own = patterns.column(*function) - &span * span.tr_mul(&patterns.column(*function));
+            if own.norm() < 1e-6 * patterns.column(*function).norm() {
+                continue;
+            }
+            // The span of {L⁻¹ f : fᵀ profile = 0} has the normal Lᵀ profile = L⁻¹ V profile.
+            let Some(whitening) = self.whitening.first() else {
+                continue;
+            };
+            let mut normal = covariance * profile;
+            whitening.whiten(normal.as_mut_slice());
+            let mut column = DVector::zeros(self.readings);
+            for (t, trace) in self.traces.iter().enumerate() {
+                column
+                    .rows_mut(trace.start, length)
+                    .copy_from(&(&normal * own[t]));
+            }
+            let size = column.norm();
+            let at = returned.ncols();
+            returned = returned.insert_column(at, 0.0);
+            returned.column_mut(at).copy_from(&(column / size));
+        }
+        self.rank += basis.ncols() * length - returned.ncols();
+        self.patterns = Some(basis);
+        self.returned = returned;
+    }
+
+    /// Number of readings.
+    pub fn readings(&self) -> usize {
+        self.readings
+    }
+
+    /// Readings less what the fit absorbs.
+    pub fn degrees_of_freedom(&self) -> usize {
+        self.readings.saturating_sub(self.rank)
+    }
+
+    /// L⁻¹ of each column, in place.
+    pub fn whiten(&self, columns: &mut DMatrix<f64>) {
+        let n = self.readings.max(1);
+        for column in columns.as_mut_slice().chunks_mut(n) {
+            for (trace, whitening) in self.traces.iter().zip(&self.whitening) {
+                whitening.whiten(&mut column[trace.clone()]);
+            }
+            if let Some(root) = &self.scatter {
+                root.apply(column);
+            }
+        }
+    }
+
+    fn project_profiles(&self, columns: &mut DMatrix<f64>) {
+        let Some(patterns) = &self.patterns else {
+            return;
+        };
+        let given_back = self.returned.tr_mul(columns);
+        let length = self.traces.first().map_or(0, Range::len);
+        let functions = patterns.ncols();
+        let count = columns.ncols();
+        for k in 0..functions {
+            let mut sum = DMatrix::zeros(length, count);
+            for (t, trace) in self.traces.iter().enumerate() {
+                let weight = patterns[(t, k)];
+                if weight != 0.0 {
+                    sum += columns.rows(trace.start, length) * weight;
+                }
+            }
+            for (t, trace) in self.traces.iter().enumerate() {
+                let weight = patterns[(t, k)];
+                if weight != 0.0 {
+                    let mut rows = columns.rows_mut(trace.start, length);
+                    rows -= &sum * weight;
+                }
+            }
+        }
+        columns.gemm(1.0, &self.returned, &given_back, 1.0);
+    }
+
+    fn project(&self, columns: &mut DMatrix<f64>) {
+        self.project_profiles(columns);
+        if self.absorbed.ncols() > 0 {
+            let along = self.absorbed.tr_mul(columns);
+            columns.gemm(-1.0, &self.absorbed, &along, 1.0);
+        }
+    }
+
+    /// P L⁻¹ of each column; also the whitened lengths before the projection.
+    pub fn forward(&self, mut columns: DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
+        self.whiten(&mut columns);
+        let sizes = columns.column_iter().map(|c| c.norm()).collect();
+        self.project(&mut columns);
+        (columns, sizes)
+    }
+
+    /// P L⁻¹ of one vector.
+    pub fn forward_vector(&self, vector: &DVector<f64>) -> DVector<f64> {
+        let matrix = DMatrix::from_column_slice(vector.len(), 1, vector.as_slice());
+        self.forward(matrix).0.column(0).clone_owned()
+    }
+
+    /// P L⁻¹ of signatures.
+    pub fn forward_columns(&self, columns: &[Column]) -> (DMatrix<f64>, Vec<f64>) {
+        let mut dense = DMatrix::zeros(self.readings, columns.len());
+        for (k, column) in columns.iter().enumerate() {
+            for (&row, &value) in column.rows.iter().zip(&column.values) {
+                dense[(row, k)] += value;
+            }
+        }
+        self.forward(dense)
+    }
+
+    /// L⁻ᵀ P of each column: what a signature is multiplied with to get its score.
+    pub fn adjoint(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
+        self.project(&mut columns);
+        let n = self.readings.max(1);
+        for column in columns.as_mut_slice().chunks_mut(n) {
+            if let Some(root) = &self.scatter {
+                root.apply_transposed(column);
+            }
+            for (trace, whitening) in self.traces.iter().zip(&self.whitening) {
+                whitening.adjoint(&mut column[trace.clone()]);
+            }
+        }
+        columns
+    }
+
+    /// EᵀPE of sparse signatures without ever making P L⁻¹E: the cost is that of the traces in
+    /// which a signature is.
+    pub fn gram(&self, columns: &[Column]) -> Gram {
+        let parts: Vec<Part> = columns.iter().map(|c| self.part(c)).collect();
+        let gram = DMatrix::from_fn(parts.len(), parts.len(), |i, j| {
+            if j < i {
+                0.0
+            } else {
+                parts[i].product(&parts[j], self)
+            }
+        });
+        Gram {
+            whole: parts.iter().map(|p| p.square).sum(),
+            matrix: DMatrix::from_fn(parts.len(), parts.len(), |i, j| gram[(i.min(j), i.max(j))]),
+        }
+    }
+
+    fn part(&self, column: &Column) -> Part {
+        let mut whitened = DVector::zeros(self.readings);
+        let mut seen = vec![false; self.traces.len()];
+        for (&row, &value) in column.rows.iter().zip(&column.values) {
+            whitened[row] += value;
+            seen[self.trace_of[row] as usize] = true;
+        }
+        let mut touched: Vec<usize> = (0..seen.len()).filter(|t| seen[*t]).collect();
+        // Many signatures are one profile times a sign in each trace: such a profile is whitened
+        // once.
+        let mut model: Option<(usize, Vec<f64>)> = None;
+        for &t in &touched {
+            let trace = self.traces[t].clone();
+            let values = &whitened.as_slice()[trace.clone()];
+            let same = |sign: f64, raw: &[f64]| {
+                raw.len() == values.len() && raw.iter().zip(values).all(|(a, b)| *a == sign * b)
+            };
+            let known = model.as_ref().and_then(|(from, raw)| {
+                if !Arc::ptr_eq(&self.whitening[*from], &self.whitening[t]) {
+                    None
+                } else if same(1.0, raw) {
+                    Some((*from, 1.0))
+                } else {
+                    same(-1.0, raw).then_some((*from, -1.0))
+                }
+            });
+            if let Some((from, sign)) = known {
+                let from = self.traces[from].start;
+                for k in 0..trace.len() {
+                    whitened[trace.start + k] = sign * whitened[from + k];
+                }
+            } else {
+                model = Some((t, values.to_vec()));
+                self.whitening[t].whiten(&mut whitened.as_mut_slice()[trace]);
+            }
+        }
+        if let Some(root) = &self.scatter {
+            // It joins readings of different traces.
+            root.apply(whitened.as_mut_slice());
+            touched = (0..self.traces.len()).collect();
+        }
+        let sums = self.patterns.as_ref().map_or_else(
+            || DMatrix::zeros(0, 0),
+            |patterns| {
+                let length = self.traces.first().map_or(0, Range::len);
+                let mut sums = DMatrix::zeros(length, patterns.ncols());
+                for &t in &touched {
+                    let values = whitened.rows(self.traces[t].start, length);
+                    for k in 0..patterns.ncols() {
+                        if patterns[(t, k)] != 0.0 {
+                            sums.column_mut(k).axpy(patterns[(t, k)], &values, 1.0);
+                        }
+                    }
+                }
+                sums
+            },
+        );
+        let along = |basis: &DMatrix<f64>| {
+            DVector::from_iterator(
+                basis.ncols(),
+                basis.column_iter().map(|direction| {
+                    touched
+                        .iter()
+                        .map(|&t| {
+                            let trace = &self.traces[t];
+                            direction
+                                .rows(trace.start, trace.len())
+                                .dot(&whitened.rows(trace.start, trace.len()))
+                        })
+                        .sum()
+                }),
+            )
+        };
+        Part {
+            returned: along(&self.returned),
+            absorbed: along(&self.absorbed),
+            square: whitened.norm_squared(),
+            sums,
+            touched,
+            whitened,
+        }
+    }
+}
+
+/// EᵀPE of a signature and what goes with it.
+pub(in crate::diagnosis) struct Gram {
+    /// EᵀPE.
+    pub matrix: DMatrix<f64>,
+    /// Σ |L⁻¹E|².
+    pub whole: f64,
+}
+
+/// A whitened column and what the fit absorbs of it.
+struct Part {
+    whitened: DVector<f64>,
+    touched: Vec<usize>,
+    sums: DMatrix<f64>,
+    returned: DVector<f64>,
+    absorbed: DVector<f64>,
+    square: f64,
+}
+
+impl Part {
+    /// Eᵢᵀ L⁻ᵀ P L⁻¹ Eⱼ.
+    fn product(&self, other: &Self, space: &Space) -> f64 {
+        let whole: f64 = if std::ptr::eq(self, other) {
+            self.square
+        } else {
+            self.touched
+                .iter()
+                .map(|&t| {
+                    let (from, length) = (space.traces[t].start, space.traces[t].len());
+                    self.whitened
+                        .rows(from, length)
+                        .dot(&other.whitened.rows(from, length))
+                })
+                .sum()
+        };
+        whole - self.sums.dot(&other.sums) + self.returned.dot(&other.returned)
+            - self.absorbed.dot(&other.absorbed)
+    }
+}
+
+/// An orthonormal basis of the columns that are longer than rounding compared with `sizes`.
+pub(in crate::diagnosis) fn orthonormal(columns: &DMatrix<f64>, sizes: &[f64]) -> DMatrix<f64> {
+    let mut kept: Vec<DVector<f64>> = Vec::new();
+    for (column, size) in columns.column_iter().zip(sizes) {
+        let mut vector = column.clone_owned();
+        for _ in 0..2 {
+            for other in &kept {
+                let along = other.dot(&vector);
+                vector.axpy(-along, other, 1.0);
+            }
+        }
+        let length = vector.norm();
+        if length > DEPENDENT * size && length > 0.0 {
+            kept.push(vector / length);
+        }
+    }
+    if kept.is_empty() {
+        DMatrix::zeros(columns.nrows(), 0)
+    } else {
+        DMatrix::from_columns(&kept)
+    }
+}

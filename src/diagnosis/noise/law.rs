@@ -1,0 +1,397 @@
+//! Noise first: the covariance of the readings from repeats alone.
+//!
+//! One reading = white noise + a part correlated along its trace (Ornstein–Uhlenbeck: variance
+//! o, correlation exp(−|Δx|/ℓ)) + a shift of the whole trace. Repeats of a trace differ by noise,
+//! but also by whatever drifts steadily between them; contrasts orthogonal to {1, t} hold neither
+//! the model nor the drift, so their likelihood estimates the noise alone.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use errsep_models::model::FittedModel;
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{ChiSquared, Distribution, StandardNormal, StudentT};
+
+use crate::diagnosis::detection::space::Space;
+use crate::diagnosis::noise::contrasts::Contrasts;
+use crate::diagnosis::noise::posterior::possible_laws;
+use crate::diagnosis::noise::spikes::{Spikes, Tails};
+use crate::diagnosis::noise::steps::levelled;
+
+/// Seed of the laws drawn from the repeats: an estimate must not depend on the user's seed.
+const SEED: u64 = 0x6c61_7773;
+
+/// Contrasts of repeats from which noise can be estimated.
+const FEWEST: usize = 8;
+/// Draws behind what neighbours tell of the noise.
+const NEIGHBOUR_DRAWS: usize = 64;
+/// Noise below this part of the greatest reading is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// How far the noise is known from the readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoiseSource {
+    /// From repeats.
+    Repeats,
+    /// Stated in the set-up.
+    Stated,
+    /// From differences of neighbouring readings: effects rougher than the spacing count as noise.
+    Neighbours,
+}
+
+/// The parts of the noise of one reading; variances in the square of the reading's unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Components {
+    /// Variance of the white part.
+    pub white: f64,
+    /// Variance of the part correlated along a trace.
+    pub correlated: f64,
+    /// Its correlation length, in the unit of the positions.
+    pub length: f64,
+    /// Variance of the shift of a whole trace.
+    pub shift: f64,
+}
+
+impl Components {
+    /// Variance of one reading.
+    fn whole(&self) -> f64 {
+        self.white + self.correlated + self.shift
+    }
+
+    /// Noise of all readings of a model.
+    pub(in crate::diagnosis) fn draw_all<M: FittedModel>(
+        &self,
+        model: &M,
+        random: &mut ChaCha8Rng,
+    ) -> DVector<f64> {
+        let mut noise = DVector::zeros(model.places().len());
+        for trace in model.traces() {
+            let x: Vec<f64> = model.places()[trace.clone()].iter().map(|p| p.x).collect();
+            self.draw(&x, random, &mut noise.as_mut_slice()[trace.clone()]);
+        }
+        noise
+    }
+
+    /// Noise of one trace.
+    pub(in crate::diagnosis) fn draw(
+        &self,
+        positions: &[f64],
+        random: &mut ChaCha8Rng,
+        noise: &mut [f64],
+    ) {
+        let mut normal = || -> f64 { StandardNormal.sample(random) };
+        let white = self.white.sqrt();
+        let shift = if self.shift > 0.0 {
+            self.shift.sqrt() * normal()
+        } else {
+            0.0
+        };
+        if self.correlated <= 0.0 {
+            noise.iter_mut().for_each(|v| *v = shift + white * normal());
+            return;
+        }
+        let mut state = self.correlated.sqrt() * normal();
+        for (k, value) in noise.iter_mut().enumerate() {
+            if k > 0 {
+                let decay = (-(positions[k] - positions[k - 1]).abs() / self.length).exp();
+                state = decay * state + (self.correlated * (1.0 - decay * decay)).sqrt() * normal();
+            }
+            *value = shift + state + white * normal();
+        }
+    }
+}
+
+/// The law of the noise; variances in the square of the reading's unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseLaw {
+    /// Variance of the white part.
+    pub white: f64,
+    /// Variance of the part correlated along a trace.
+    pub correlated: f64,
+    /// Its correlation length, in the unit of the positions.
+    pub length: f64,
+    /// Variance of the shift of a whole trace.
+    pub shift: f64,
+    /// Degrees of freedom behind the variance of one reading.
+    pub freedom: f64,
+    /// Where it comes from.
+    pub source: NoiseSource,
+    /// Laws drawn from what the repeats allow; empty where only the white variance is in doubt.
+    possible: Arc<Vec<Components>>,
+    /// Heavy tails of the single readings.
+    tails: Option<Tails>,
+}
+
+impl NoiseLaw {
+    /// White noise of a known standard deviation.
+    pub fn white(sigma: f64, freedom: f64, source: NoiseSource) -> Self {
+        Self {
+            white: sigma * sigma,
+            correlated: 0.0,
+            length: 1.0,
+            shift: 0.0,
+            freedom,
+            source,
+            possible: Arc::new(Vec::new()),
+            tails: None,
+        }
+    }
+
+    /// A law of given parts.
+    #[cfg(test)]
+    pub(in crate::diagnosis) fn of(white: f64, correlated: f64, length: f64, shift: f64) -> Self {
+        Self {
+            white,
+            correlated,
+            length,
+            shift,
+            ..Self::white(1.0, f64::INFINITY, NoiseSource::Stated)
+        }
+    }
+
+    /// The mean of laws drawn from what the repeats allow.
+    fn mean_of(laws: Vec<Components>) -> Self {
+        let count = laws.len().max(1) as f64;
+        let mean = |value: fn(&Components) -> f64| laws.iter().map(value).sum::<f64>() / count;
+        let whole = mean(Components::whole);
+        let variance = laws
+            .iter()
+            .map(|l| (l.whole() - whole).powi(2))
+            .sum::<f64>()
+            / (count - 1.0).max(1.0);
+        let correlated = mean(|l| l.correlated);
+        let length = if correlated > 0.0 {
+            (mean(|l| l.correlated * l.length.ln()) / correlated).exp()
+        } else {
+            1.0
+        };
+        Self {
+            white: mean(|l| l.white),
+            correlated,
+            length,
+            shift: mean(|l| l.shift),
+            freedom: (2.0 * whole * whole / variance.max(f64::MIN_POSITIVE)).clamp(1.0, 1e9),
+            source: NoiseSource::Repeats,
+            possible: Arc::new(laws),
+            tails: None,
+        }
+    }
+
+    /// The law with heavy tails of the single readings.
+    pub(in crate::diagnosis) fn with_tails(mut self, tails: Option<Tails>) -> Self {
+        self.tails = tails;
+        self
+    }
+
+    /// The parts.
+    pub fn components(&self) -> Components {
+        Components {
+            white: self.white,
+            correlated: self.correlated,
+            length: self.length,
+            shift: self.shift,
+        }
+    }
+
+    /// Noise of all readings of a model.
+    pub(in crate::diagnosis) fn draw<M: FittedModel>(
+        &self,
+        model: &M,
+        random: &mut ChaCha8Rng,
+    ) -> DVector<f64> {
+        self.components().draw_all(model, random)
+    }
+
+    /// Noise of all readings for a draw of the null law: by a law that the readings allow, with
+    /// the tails of the readings, its spikes pulled in.
+    pub(in crate::diagnosis) fn draw_possible<M: FittedModel>(
+        &self,
+        model: &M,
+        spikes: &Spikes,
+        draw: usize,
+        random: &mut ChaCha8Rng,
+    ) -> DVector<f64> {
+        let law = match self.possible.get(draw % self.possible.len().max(1)) {
+            Some(law) => *law,
+            None => self.rescaled(random),
+        };
+        let Some((tails, student)) = self
+            .tails
+            .and_then(|t| Some((t, StudentT::new(t.freedom).ok()?)))
+        else {
+            return law.draw_all(model, random);
+        };
+        let scale = (law.white / tails.variance).sqrt();
+        let mut noise = Components { white: 0.0, ..law }.draw_all(model, random);
+        for value in noise.iter_mut() {
+            *value += scale * student.sample(random);
+        }
+        spikes.pull_in(&mut noise);
+        noise
+    }
+
+    /// The white variance drawn from what its degrees of freedom allow.
+    fn rescaled(&self, random: &mut ChaCha8Rng) -> Components {
+        let mut law = self.components();
+        if let (true, Ok(chi)) = (self.freedom < 1e6, ChiSquared::new(self.freedom)) {
+            law.white *= self.freedom / chi.sample(random);
+        }
+        law
+    }
+
+    /// Standard deviation of one reading.
+    pub fn sigma(&self) -> f64 {
+        self.components().whole().sqrt()
+    }
+
+    /// Covariance of the readings of one trace.
+    pub fn covariance(&self, positions: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_fn(positions.len(), positions.len(), |i, j| {
+            let apart = (positions[i] - positions[j]).abs();
+            let same = if i == j { self.white } else { 0.0 };
+            same + self.correlated * (-apart / self.length).exp() + self.shift
+        })
+    }
+
+    /// The law that is stated, or that the repeats of a model's readings follow, or what stands in
+    /// for it.
+    pub fn estimate<M: FittedModel>(model: &M, readings: &DVector<f64>) -> Self {
+        if let Some(sigma) = model.stated_noise() {
+            return Self::white(sigma, f64::INFINITY, NoiseSource::Stated);
+        }
+        let floor = (ROUNDING * model.observed().amax()).max(f64::MIN_POSITIVE.sqrt());
+        let level = levelled(model, readings);
+        let contrasts = Contrasts::new(model.places(), model.traces(), &level);
+        if contrasts.count() < FEWEST {
+            return neighbours(model, readings, floor);
+        }
+        let (variance, freedom) = contrasts.scatter();
+        if variance > floor * floor && model.correlated_noise() {
+            let laws = possible_laws(&contrasts, SEED);
+            if !laws.is_empty() {
+                return Self::mean_of(laws);
+            }
+        }
+        Self::white(variance.sqrt().max(floor), freedom, NoiseSource::Repeats)
+    }
+}
+
+/// A draw of the scatter that the model expects beside the noise.
+pub(in crate::diagnosis) fn draw_scatter<M: FittedModel>(
+    model: &M,
+    random: &mut ChaCha8Rng,
+) -> DVector<f64> {
+    let mut scatter = DVector::zeros(model.places().len());
+    for column in model.expected_scatter() {
+        let size: f64 = StandardNormal.sample(random);
+        for (&row, value) in column.rows.iter().zip(&column.values) {
+            scatter[row] += size * value;
+        }
+    }
+    scatter
+}
+
+/// What the repeats say of a single reading's noise where it is stated: standard deviation and
+/// degrees of freedom.
+pub(in crate::diagnosis) fn of_repeats<M: FittedModel>(
+    model: &M,
+    readings: &DVector<f64>,
+) -> Option<(f64, f64)> {
+    let contrasts = Contrasts::new(model.places(), model.traces(), readings);
+    (contrasts.count() >= FEWEST).then(|| {
+        let (variance, freedom) = contrasts.scatter();
+        (variance.sqrt(), freedom)
+    })
+}
+
+/// White noise from second differences of the residuals, (e₋ − 2e₀ + e₊)/√6, by their median. What
+/// the fit leaves of white noise in them, and how well they tell it, is drawn.
+fn neighbours<M: FittedModel>(model: &M, readings: &DVector<f64>, floor: f64) -> NoiseLaw {
+    let space = Space::new(
+        model,
+        &NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated),
+    );
+    let seen =
+        |values: &DVector<f64>| second_differences(model.traces(), &space.forward_vector(values)).0;
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let squares: Vec<f64> = (0..NEIGHBOUR_DRAWS)
+        .map(|_| {
+            let noise = (0..readings.len()).map(|_| StandardNormal.sample(&mut random));
+            seen(&DVector::from_iterator(readings.len(), noise)).powi(2)
+        })
+        .collect();
+    let count = squares.len() as f64;
+    let kept = squares.iter().sum::<f64>() / count;
+    let variance = squares.iter().map(|s| (s - kept).powi(2)).sum::<f64>() / (count - 1.0);
+    let freedom = 2.0 * kept * kept / variance.max(f64::MIN_POSITIVE);
+    let sigma = if kept > 0.0 {
+        seen(readings) / kept.sqrt()
+    } else {
+        0.0
+    };
+    NoiseLaw::white(sigma.max(floor), freedom.max(1.0), NoiseSource::Neighbours)
+}
+
+/// Standard deviation of the residuals as neighbours tell it, and its degrees of freedom.
+fn second_differences(traces: &[Range<usize>], residual: &DVector<f64>) -> (f64, f64) {
+    let mut differences: Vec<f64> = traces
+        .iter()
+        .flat_map(|trace| {
+            let e = residual.rows(trace.start, trace.len());
+            (2..trace.len()).map(move |k| (e[k - 2] - 2.0 * e[k - 1] + e[k]).abs() / 6f64.sqrt())
+        })
+        .collect();
+    differences.sort_by(f64::total_cmp);
+    let median = differences
+        .get(differences.len() / 2)
+        .copied()
+        .unwrap_or(0.0);
+    // 0.6745: the median of the absolute value of a standard normal number. The median uses 37 %
+    // of the information of overlapping differences, which hold 35/18 times that of one reading.
+    let freedom = 0.37 * differences.len() as f64 * 18.0 / 35.0;
+    (median / 0.6745, freedom.max(1.0))
+}
+
+/// The scatter of neighbouring readings against what the repeats say of it.
+pub(in crate::diagnosis) struct Scatter {
+    pub seen: f64,
+    pub expected: f64,
+    /// Of their ratio.
+    pub relative_std: f64,
+}
+
+/// The scatter of neighbours in readings free of causes, where there are enough of them.
+pub(in crate::diagnosis) fn neighbour_scatter<M: FittedModel>(
+    model: &M,
+    law: &NoiseLaw,
+    clean: &DVector<f64>,
+) -> Option<Scatter> {
+    let unit = NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated);
+    let space = Space::new(model, &unit);
+    let residual = space.forward_vector(clean);
+    let (seen, freedom) = second_differences(model.traces(), &residual);
+    let gaps: Vec<f64> = model
+        .traces()
+        .iter()
+        .flat_map(|t| {
+            model.places()[t.clone()]
+                .windows(2)
+                .map(|w| (w[1].x - w[0].x).abs())
+        })
+        .collect();
+    if freedom < 20.0 || gaps.is_empty() {
+        return None;
+    }
+    let spacing = gaps.iter().sum::<f64>() / gaps.len() as f64;
+    let along = (-spacing / law.length).exp();
+    // Variance of (e₋ − 2e₀ + e₊)/√6 under the law; the fit has taken its part of the white noise.
+    let correlated = law.correlated * (6.0 - 8.0 * along + 2.0 * along * along) / 6.0;
+    let kept = space.degrees_of_freedom() as f64 / space.readings().max(1) as f64;
+    Some(Scatter {
+        seen,
+        expected: (kept * (law.white + correlated)).sqrt(),
+        relative_std: (0.5 / freedom + 0.5 / law.freedom.max(1.0)).sqrt(),
+    })
+}

@@ -1,0 +1,9 @@
+//! The noise of the readings, before anything is said of a gap: its law from what differs between
+//! repeats, with jumps and spikes told apart from it, and the whitening by that law.
+
+pub(super) mod contrasts;
+pub(super) mod law;
+pub(super) mod posterior;
+pub(super) mod spikes;
+pub(super) mod steps;
+pub(super) mod whitening;

@@ -1,0 +1,174 @@
+//! The diagnosability certificate: what a plan of measurement can show, before any data.
+//!
+//! With Ê the projected, whitened signature: an effect of amplitude a has the signal-to-noise
+//! ratio a|Ê|. It is seen with 80 % probability from (√T + 0.84)/|Ê|, T the threshold of its
+//! family; it is told from another whose signature makes an angle θ with its own, with 99 %
+//! probability, from 2.33/(|Ê| sin θ/2) (difference of two chi-squared statistics as a product of
+//! two normal variables).
+
+use std::sync::Arc;
+
+use errsep_models::model::{Effect, FittedModel};
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use crate::diagnosis::Options;
+use crate::diagnosis::detection::dictionary::{Dictionary, Meaning, Places, statistic};
+use crate::diagnosis::detection::null::NullLaw;
+use crate::diagnosis::detection::space::Space;
+use crate::diagnosis::noise::law::NoiseLaw;
+use crate::diagnosis::verdict::types::INVISIBLE;
+
+/// Normal quantile of 80 % power.
+const POWER: f64 = 0.8416;
+/// Normal quantile of 99 %.
+const TELL: f64 = 2.3263;
+/// A plan promises nothing of an effect of which less than this part is visible: the model of the
+/// plan is not that exact.
+const PLANNED: f64 = 0.01;
+
+/// What a plan shows of one effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosability {
+    /// The effect.
+    pub effect: String,
+    /// Part of it that the fit cannot absorb.
+    pub visible: f64,
+    /// Smallest amplitude seen with 80 % probability, if any that is plausible is.
+    pub detectable: Option<f64>,
+    /// Smallest amplitude told from every other effect with 99 % probability, if any that is
+    /// plausible is.
+    pub identifiable: Option<f64>,
+    /// Unit of the amplitudes.
+    pub unit: String,
+    /// The effect it is most easily taken for.
+    pub confused_with: Option<String>,
+    /// Cosine of the angle between the two signatures.
+    pub cosine: f64,
+    /// Root mean square of the detectable effect in the readings.
+    pub visible_rms: Option<f64>,
+    /// Bias of each quantity per unit of amplitude, with its unit.
+    pub harm: Vec<(String, f64, String)>,
+    /// Bias of each quantity per unit of the root mean square that the effect leaves visible in the
+    /// readings, where it leaves any.
+    pub harm_per_visible: Vec<(String, f64, String)>,
+}
+
+/// The certificate of a plan.
+pub fn certificate<M: FittedModel>(
+    model: &M,
+    catalogue: &[Box<dyn Effect<M>>],
+    law: &NoiseLaw,
+    options: &Options,
+) -> Vec<Diagnosability> {
+    let space = Space::expecting(model, law);
+    let places = Arc::new(Places::new(model));
+    let dictionary = Dictionary::new(model, catalogue, places, &space);
+    let null = NullLaw::simulate(model, &dictionary, &space, law, options.draws, options.seed);
+    let quantities = model.quantities();
+    let level = null.level(options.false_alarm);
+    let n = space.readings();
+    let mut rows = Vec::new();
+    for effect in catalogue {
+        let Some(family) = dictionary
+            .families
+            .iter()
+            .position(|f| f.is_effect && f.name == effect.name())
+        else {
+            continue;
+        };
+        let visible = dictionary.families[family].visible;
+        let first = effect
+            .grid(model)
+            .into_iter()
+            .next()
+            .map(|shape| effect.columns(model, &shape))
+            .unwrap_or_default();
+        let harm = first.first().map_or_else(Vec::new, |column| {
+            let full = column.dense(n);
+            quantities
+                .iter()
+                .map(|q| (q.name.clone(), q.weights.dot(&full), q.unit.to_owned()))
+                .collect()
+        });
+        let mut row = Diagnosability {
+            effect: effect.name().to_owned(),
+            visible,
+            detectable: None,
+            identifiable: None,
+            unit: effect
+                .amplitudes()
+                .first()
+                .map_or(String::new(), |p| p.unit.to_owned()),
+            confused_with: None,
+            cosine: 0.0,
+            visible_rms: None,
+            harm,
+            harm_per_visible: Vec::new(),
+        };
+        let entries = &dictionary.entries[dictionary.families[family].entries.clone()];
+        if visible >= PLANNED && !entries.is_empty() {
+            // The middle of the grid stands for the family.
+            let entry = &entries[entries.len() / 2];
+            let (projected, _) = space.forward_columns(&dictionary.columns(entry));
+            let length = projected.column(0).norm();
+            let unit = projected.column(0) / length.max(f64::MIN_POSITIVE);
+            let adjoint = space
+                .adjoint(DMatrix::from_column_slice(n, 1, unit.as_slice()))
+                .column(0)
+                .clone_owned();
+            let adjoint = dictionary.places.sums(&adjoint);
+            let seen = null.threshold(family, level).sqrt() + POWER;
+            for other in catalogue.iter().filter(|o| o.name() != effect.name()) {
+                let Some(rival) = dictionary
+                    .families
+                    .iter()
+                    .find(|f| f.is_effect && f.name == other.name() && f.visible >= INVISIBLE)
+                else {
+                    continue;
+                };
+                for candidate in &dictionary.entries[rival.entries.clone()] {
+                    let score = candidate.products(&adjoint);
+                    let cosine = statistic(&candidate.gram, &score, false)
+                        .clamp(0.0, 1.0)
+                        .sqrt();
+                    // What it takes to imitate the smallest size that is seen must be plausible.
+                    let needed = seen * cosine / candidate.gram[(0, 0)].sqrt();
+                    if cosine > row.cosine
+                        && needed <= greatest_plausible(other.as_ref())
+                        && matches!(candidate.meaning, Meaning::Effect(_))
+                    {
+                        row.cosine = cosine;
+                        row.confused_with = Some(other.name().to_owned());
+                    }
+                }
+            }
+            let plausible = |size: &f64| *size <= greatest_plausible(effect.as_ref());
+            let smallest = seen / length;
+            row.detectable = Some(smallest).filter(plausible);
+            let per_unit = length * law.sigma() / (n as f64).sqrt();
+            // The harm is that of the first shape of the grid, so its own visible part counts.
+            let first = space.gram(&first).matrix[(0, 0)].sqrt() / length;
+            row.harm_per_visible = row
+                .harm
+                .iter()
+                .map(|(name, bias, unit)| (name.clone(), bias / (first * per_unit), unit.clone()))
+                .collect();
+            row.visible_rms = Some(smallest * length * law.sigma() / (n as f64).sqrt());
+            let half_angle = 0.5 * row.cosine.acos();
+            row.identifiable = (half_angle.sin() > 1e-3)
+                .then(|| (TELL / (length * half_angle.sin())).max(smallest))
+                .filter(plausible);
+        }
+        rows.push(row);
+    }
+    rows
+}
+
+/// The greatest plausible size of an effect.
+pub(in crate::diagnosis) fn greatest_plausible<M>(effect: &dyn Effect<M>) -> f64 {
+    effect
+        .amplitudes()
+        .first()
+        .map_or(f64::INFINITY, |p| p.low.abs().max(p.high.abs()))
+}

@@ -1,0 +1,81 @@
+//! What is concluded: verdict and gap decided together, so that neither can contradict the other.
+//!
+//! Whether there is a gap at all is decided once, by the test of detection, which looks at every
+//! effect, every place and the misfit as a whole. The verdict is `none` if and only if that test
+//! does not reject, and a size of zero is then in the interval of the gap: an interval is the set of
+//! sizes that are not rejected, and the test speaks for zero, the misfit's own spread for the rest.
+//! The sentence, the text, the page and the JSON are all made from this.
+
+use crate::diagnosis::attribution::confidence::Answer;
+use crate::diagnosis::verdict::shrink::shrink;
+use crate::diagnosis::verdict::types::{Gap, HeldOut, Kind, Size};
+
+/// Part of the predicted shrinking that a named cause must reach.
+const PROMISE: f64 = 0.5;
+
+/// What the gap was measured to be, before anything is concluded from it.
+pub(in crate::diagnosis) struct Measured {
+    /// Unit of the readings.
+    pub unit: &'static str,
+    /// Standard deviation of one reading.
+    pub noise: f64,
+    /// Without the causes.
+    pub before: Size,
+    /// With them.
+    pub after: Size,
+    /// The shrinking that the score promised.
+    pub predicted_shrink: f64,
+    /// On held-out repeats.
+    pub held_out: Option<HeldOut>,
+}
+
+/// Kind of the verdict and the gap that goes with it.
+pub(in crate::diagnosis) struct Conclusion {
+    pub kind: Kind,
+    pub gap: Gap,
+}
+
+impl Conclusion {
+    /// Concludes from the test's probability, the causes found and the gap measured.
+    pub fn of(alarmed: bool, found: Option<&Answer>, measured: Measured) -> Self {
+        let Measured {
+            unit,
+            noise,
+            before,
+            after,
+            predicted_shrink,
+            held_out,
+        } = measured;
+        let shrunk = shrink(before.rms, after.rms);
+        // A gap that stands clear and does not shrink as its score promised has another cause.
+        let kept_promise = !before.is_clear() || shrunk > PROMISE * predicted_shrink;
+        let kind = match found {
+            _ if !alarmed => Kind::None,
+            Some(answer) if answer.complete && kept_promise => Kind::Effect,
+            _ => Kind::Unknown,
+        };
+        let with_zero = |size: Size| Size {
+            ci95: [0.0, size.ci95[1]],
+            ..size
+        };
+        let told = |size| {
+            if kind == Kind::None {
+                with_zero(size)
+            } else {
+                size
+            }
+        };
+        Self {
+            kind,
+            gap: Gap {
+                unit,
+                noise,
+                before: told(before),
+                after: told(after),
+                shrink: shrunk,
+                predicted_shrink,
+                held_out,
+            },
+        }
+    }
+}

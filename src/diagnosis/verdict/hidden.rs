@@ -1,0 +1,82 @@
+//! What could hide in these readings.
+
+use errsep_models::model::FittedModel;
+
+use crate::diagnosis::Options;
+use crate::diagnosis::attribution::bias::weighted_std;
+use crate::diagnosis::attribution::context::Context;
+use crate::diagnosis::planning::certificate::greatest_plausible;
+use crate::diagnosis::verdict::types::{Harm, Hidden, INVISIBLE};
+
+/// Normal quantile of 80 % power.
+const POWER: f64 = 0.8416;
+
+/// Harms whose ratio is below this are equal.
+const EQUAL: f64 = 1.0 + 1e-6;
+
+/// What these readings would not have shown, for every effect that is not named.
+pub(in crate::diagnosis) fn hidden<M: FittedModel>(
+    context: &Context<'_, M>,
+    named: &[String],
+    options: &Options,
+) -> Vec<Hidden> {
+    let quantities: Vec<_> = context
+        .model
+        .quantities()
+        .into_iter()
+        .map(|q| {
+            let std = weighted_std(context.model, &context.law, &q.weights);
+            (q, std)
+        })
+        .collect();
+    let level = context.null.level(options.false_alarm);
+    let mut list = Vec::new();
+    for (effect, description) in context.catalogue.iter().enumerate() {
+        if named.iter().any(|n| n == description.name()) {
+            continue;
+        }
+        let Some(family) = context.family_of(effect) else {
+            continue;
+        };
+        let visible = context.dictionary.families[family].visible;
+        let entries =
+            &context.dictionary.entries[context.dictionary.families[family].entries.clone()];
+        let gram = entries.iter().map(|e| e.gram[(0, 0)]).fold(0.0, f64::max);
+        let threshold = context.null.threshold(family, level);
+        let most = greatest_plausible(description.as_ref());
+        let detectable = (visible >= INVISIBLE && gram > 0.0)
+            .then(|| (threshold.sqrt() + POWER) / gram.sqrt())
+            .filter(|size| *size <= most);
+        let shape = description.grid(context.model).into_iter().next();
+        let column = shape
+            .and_then(|s| description.columns(context.model, &s).into_iter().next())
+            .map(|c| c.dense(context.space.readings()));
+        let harm = column.and_then(|column| {
+            quantities
+                .iter()
+                .map(|(q, std)| {
+                    let bias = q.weights.dot(&column);
+                    (q, bias, bias.abs() / *std)
+                })
+                // Of equal harms that to the quantity named first.
+                .reduce(|most, next| if next.2 > EQUAL * most.2 { next } else { most })
+                .map(|(q, per_unit, _)| Harm {
+                    quantity: q.name.clone(),
+                    per_unit,
+                    unit: q.unit.to_owned(),
+                })
+        });
+        list.push(Hidden {
+            effect: description.name().to_owned(),
+            visible,
+            detectable,
+            unit: description
+                .amplitudes()
+                .first()
+                .map_or(String::new(), |p| p.unit.to_owned()),
+            harm,
+        });
+    }
+    list.sort_by(|a, b| a.visible.total_cmp(&b.visible));
+    list
+}

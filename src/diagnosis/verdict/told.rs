@@ -1,0 +1,107 @@
+//! Numbers and units as people read them: the same in the sentence, the text and the page.
+
+use crate::diagnosis::verdict::types::{Gap, ParameterOut, Size};
+use crate::report::number::{measured, plain};
+
+/// Digits of a gap.
+const DIGITS: usize = 3;
+
+/// A value with its standard uncertainty in the unit it is shown in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Told {
+    /// Name.
+    pub name: String,
+    /// Value.
+    pub value: f64,
+    /// Standard uncertainty.
+    pub std: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+impl Told {
+    /// `name value ± std unit`.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let value = measured(self.value, Some(self.std));
+        format!("{} {value} {}", self.name, self.unit)
+            .trim_end()
+            .to_owned()
+    }
+}
+
+impl ParameterOut {
+    /// The parameter as it is shown: no logarithm, angles in µrad.
+    #[must_use]
+    pub fn told(&self) -> Told {
+        let (name, value, std, unit) = match &self.linear {
+            Some(linear) => (&linear.name, linear.value, linear.std, &linear.unit),
+            None => (&self.name, self.value, self.std, &self.unit),
+        };
+        let (scale, unit) = scaled(unit);
+        Told {
+            name: name.clone(),
+            value: scale * value,
+            std: scale * std,
+            unit: unit.to_owned(),
+        }
+    }
+}
+
+impl Size {
+    /// Whether its interval excludes zero.
+    #[must_use]
+    pub fn is_clear(&self) -> bool {
+        self.ci95[0] > 0.0
+    }
+
+    /// The number, or the bound that takes its place where the noise leaves no more to be said.
+    #[must_use]
+    pub fn in_words(&self, unit: &str) -> String {
+        let unit = for_people(unit);
+        if self.rms > 0.0 {
+            format!("{} {unit} RMS", plain(self.rms, DIGITS))
+        } else {
+            format!("less than {} {unit} RMS", plain(self.ci95[1], DIGITS))
+        }
+    }
+
+    /// Value and interval, without a unit.
+    #[must_use]
+    pub fn figures(&self) -> String {
+        format!(
+            "{} [{}, {}]",
+            plain(self.rms, DIGITS),
+            plain(self.ci95[0], DIGITS),
+            plain(self.ci95[1], DIGITS)
+        )
+    }
+}
+
+impl Gap {
+    /// The noise of one reading, without a unit.
+    #[must_use]
+    pub fn noise_figure(&self) -> String {
+        plain(self.noise, DIGITS)
+    }
+}
+
+/// A unit as people write it.
+pub fn for_people(unit: &str) -> &str {
+    match unit {
+        "um" => "µm",
+        "um/mm" => "µm/mm",
+        "1" => "",
+        unit => unit,
+    }
+}
+
+/// By what a value is multiplied to be shown, and the unit it is shown in: angles in µrad.
+#[must_use]
+pub fn scaled(unit: &str) -> (f64, &str) {
+    match unit {
+        "rad" => (1e6, "µrad"),
+        "rad/mm" => (1e6, "µrad/mm"),
+        unit => (1.0, for_people(unit)),
+    }
+}

@@ -61,7 +61,6 @@ fn effects_as_machines_have_them_are_named() {
         ("hysteresis", 2),
         ("lateral-backlash", 1),
         ("ambient-cycle", 1),
-        ("stick-slip", 2),
         ("off-crest", 0),
     ];
     let told: Vec<String> = cases

@@ -2,8 +2,8 @@
 //!
 //! It lags behind its command by a sawtooth of the way run, the same in every trace of a direction,
 //! and what is seen comes with it. What both directions have in common passes for form; with a half
-//! or a whole slip at mid travel the rest is a constant lag, `axis-backlash`. Free: the lag just before it slips, the way from slip to slip,
-//! told by the slips over the travel, and the state at mid travel.
+//! or a whole slip at mid travel the rest is a constant lag, `axis-backlash`. Free: the lag just before
+//! it slips, the way from slip to slip, told by the slips over the travel, the state at mid travel.
 
 use super::{FirstOrder, part_of_travel};
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Place, Shape};

@@ -37,6 +37,9 @@ impl Sorted {
         }
         let n = shared.len();
         let timed = observations.readings.iter().all(|r| r.time.is_some());
+        // Clocks may count from anywhere.
+        let began = observations.readings.iter().filter_map(|r| r.time);
+        let began = began.fold(f64::INFINITY, f64::min);
         let order = assumed_order(traces.keys());
         let present: Vec<Channel> = observations.channels();
         let mut sorted = Self {
@@ -63,7 +66,7 @@ impl Sorted {
                     channel: channel_index,
                     x,
                     time: if timed {
-                        time.unwrap_or(assumed)
+                        time.map_or(assumed, |time| time - began)
                     } else {
                         assumed
                     },

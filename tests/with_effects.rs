@@ -295,3 +295,33 @@ fn effects_in_time_say_what_they_take_for_it() {
     // The order that is assumed is the one in which these were taken. k·u.
     assert!((value - 0.5).abs() < 5.0 * std, "{jump}");
 }
+
+/// The fit is diagnosed in the same run, by itself: what is named is what `errsep diagnose` names, with the
+/// command that fits it along.
+#[test]
+fn the_fit_is_diagnosed_in_the_same_run() {
+    let folder = folder(&[Fault::Taper(5e-6)]);
+    let both = json(&folder, &["--diagnose"]);
+    let arguments = ["diagnose", "data.csv", "--setup", "setup.toml"];
+    let alone = run(&folder, &[&arguments[..], &["--format", "json"]].concat());
+    assert_eq!(alone.status, 0, "{}", alone.stderr);
+    let alone: Value = serde_json::from_str(&alone.stdout).unwrap();
+    assert_eq!(both["schema"], "errsep.reversal/1");
+    assert_eq!(both["diagnosis"]["verdict"], alone["verdict"]);
+    assert_eq!(both["diagnosis"]["verdict"]["effects"][0], "taper");
+    assert_eq!(
+        alone["fit_with"],
+        "errsep reversal data.csv --setup setup.toml --simultaneous --with taper"
+    );
+    let text = with(&folder, &["--diagnose"]).stdout;
+    assert!(
+        text.contains("Where and why model and readings disagree"),
+        "{text}"
+    );
+    assert!(
+        !text.contains("to see where they disagree"),
+        "points to what it has done: {text}"
+    );
+    let refused = with(&folder, &["--diagnose", "--with", "taper"]);
+    assert_eq!(refused.status, 2);
+}

@@ -70,6 +70,15 @@ impl Page {
         self
     }
 
+    /// The sections of another page behind those of this one, under a heading with its sentence.
+    #[must_use]
+    pub fn followed_by(mut self, heading: impl Into<String>, other: Self) -> Self {
+        self.sections
+            .push(Section::new(heading).paragraph(other.summary));
+        self.sections.extend(other.sections);
+        self
+    }
+
     /// Sets what the page was made from.
     #[must_use]
     pub fn provenance(mut self, provenance: Provenance) -> Self {

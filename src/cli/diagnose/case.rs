@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use errsep_models::model::{Effect, FittedModel, Place};
 
-use super::{Args, page, within_reach, words};
+use super::{Args, page, within_reach_of, words};
 use crate::cli::{Answer, progress};
 use crate::diagnosis::{Diagnosis, Options, TabulatedEffects, Trials, diagnose_with, prove};
 use crate::io::{CsvTable, Message, SetupFile, Status};
@@ -25,12 +25,7 @@ pub(super) struct Case<M> {
 impl<M: FittedModel> Case<M> {
     /// Diagnoses the case.
     pub(super) fn answer(self, args: &Args) -> Result<Answer, Message> {
-        for (reading, place) in self.model.observed().iter().zip(self.model.places()) {
-            let at = format!("{} = {:e}", self.along, place.x);
-            within_reach("a reading", *reading, &at, args)?;
-            within_reach("a position", place.x, &at, args)?;
-            within_reach("a time", place.time, &at, args)?;
-        }
+        within_reach_of(&self.model, self.along, &args.data)?;
         let catalogue = catalogue(args, &self.model)?;
         let known: Vec<String> = catalogue.iter().map(|e| e.name().to_owned()).collect();
         if let Some(name) = args.without.iter().find(|n| !known.contains(n)) {

@@ -9,13 +9,15 @@ mod circle;
 mod four_sensor;
 mod fourier;
 mod machine;
-mod page;
+pub(super) mod page;
 mod recognise;
-mod reversal;
+pub(super) mod reversal;
 mod step_diagonal;
-mod words;
+pub(super) mod words;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use errsep_models::model::FittedModel;
 
 use super::{Answer, CommonArgs};
 use crate::io::Message;
@@ -127,13 +129,32 @@ const GREATEST: f64 = 1e60;
 
 /// Refuses a number whose squares and products no longer fit into a double.
 fn within_reach(what: &str, value: f64, at: &str, args: &Args) -> Result<(), Message> {
+    within_reach_in(what, value, at, &args.data)
+}
+
+/// The same for every reading, position and time of a model; `along`: name of the positions.
+pub(super) fn within_reach_of<M: FittedModel>(
+    model: &M,
+    along: &str,
+    file: &Path,
+) -> Result<(), Message> {
+    for (reading, place) in model.observed().iter().zip(model.places()) {
+        let at = format!("{along} = {:e}", place.x);
+        within_reach_in("a reading", *reading, &at, file)?;
+        within_reach_in("a position", place.x, &at, file)?;
+        within_reach_in("a time", place.time, &at, file)?;
+    }
+    Ok(())
+}
+
+fn within_reach_in(what: &str, value: f64, at: &str, file: &Path) -> Result<(), Message> {
     if value.abs() <= GREATEST {
         return Ok(());
     }
     Err(Message::bad_input(format!(
         "{what} of {value:e} (at {at}) cannot be diagnosed: its square overflows"
     ))
-    .in_file(&args.data)
+    .in_file(file)
     .remedy(format!(
         "correct it: readings, positions and times stay below {GREATEST:e}"
     )))

@@ -6,7 +6,7 @@ use super::words::{harm_in_words, moved, shown};
 use crate::diagnosis::{Diagnosis, Kind, for_people};
 use crate::report::diagnosis as sheet;
 
-pub(super) fn view<M: FittedModel>(
+pub fn view<M: FittedModel>(
     data: String,
     model: &M,
     along: &str,

@@ -2,6 +2,8 @@
 
 use errsep_models::model::FittedModel;
 use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder, NotDiagnosable};
+use errsep_models::reversal::simultaneous::effects::CATALOGUE;
+use serde_json::Value;
 
 use super::Args;
 use super::case::Case;
@@ -19,13 +21,63 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         setup.columns = columns.clone();
     }
     let data = read(&args.data, &setup.columns)?;
-    let assumptions = Assumptions {
+    let model = FirstOrder::new(&data.observations, assumptions(&setup))
+        .map_err(|why| refusal(&why).in_file(&args.data))?;
+    let notes = notes(&model);
+    let mut answer = Case {
+        model,
+        readings: data.in_words(),
+        along: ALONG,
+        notes,
+        inputs: Vec::new(),
+    }
+    .answer(args)?;
+    if let Some(command) = with_command(args, &answer.json["verdict"]["effects"]) {
+        answer.text += &format!("\nTo fit it along with tilts and forms: {command}\n");
+        if let Value::Object(object) = &mut answer.json {
+            object.insert("fit_with".to_owned(), command.into());
+        }
+    }
+    Ok(answer)
+}
+
+/// Name of the positions.
+pub const ALONG: &str = "slide position";
+
+/// What a set-up says of the measurement.
+pub fn assumptions(setup: &ReversalSetup) -> Assumptions {
+    Assumptions {
         convention: setup.convention,
         thickness: setup.thickness,
         noise: setup.noise,
-    };
-    let model = FirstOrder::new(&data.observations, assumptions)
-        .map_err(|why| refusal(&why).in_file(&args.data))?;
+    }
+}
+
+/// The command that fits the effects that were named along with tilts and forms, where all of them can
+/// be.
+fn with_command(args: &Args, effects: &Value) -> Option<String> {
+    let names: Vec<&str> = effects
+        .as_array()?
+        .iter()
+        .filter_map(Value::as_str)
+        .collect();
+    let known = |name: &&str| CATALOGUE.iter().any(|effect| effect.name == *name);
+    if names.is_empty() || !names.iter().all(known) {
+        return None;
+    }
+    let mut command = format!("errsep reversal {}", args.data.display());
+    if let Some(setup) = &args.setup {
+        command += &format!(" --setup {}", setup.display());
+    }
+    command += &format!(" --simultaneous --with {}", names.join(","));
+    if args.columns.is_some() {
+        command += ", with the same --columns";
+    }
+    Some(command)
+}
+
+/// What people should know of readings as they are diagnosed.
+pub fn notes(model: &FirstOrder) -> Vec<String> {
     let mut notes = Vec::new();
     if !model.timed {
         notes.push("No times are given: the readings are taken to follow each other evenly, first spindle position first, each repeat forward and then backward.".to_owned());
@@ -41,7 +93,11 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     if let Some(gathered) = &model.gathered {
         notes.push(format!(
             "The traces have {}: their readings were carried to {} common places by the simultaneous fit, {} readings to each; noise is that of their mean.",
-            if gathered.readings_per_cell > 1.5 { "many positions" } else { "positions of their own" },
+            if gathered.readings_per_cell > 1.5 {
+                "many positions"
+            } else {
+                "positions of their own"
+            },
             gathered.cells,
             number::plain(gathered.readings_per_cell, 2)
         ));
@@ -52,17 +108,11 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
             model.left_out
         ));
     }
-    Case {
-        model,
-        readings: data.in_words(),
-        along: "slide position",
-        notes,
-        inputs: Vec::new(),
-    }
-    .answer(args)
+    notes
 }
 
-fn refusal(why: &NotDiagnosable) -> Message {
+/// Why readings cannot be diagnosed, and what to do.
+pub fn refusal(why: &NotDiagnosable) -> Message {
     match why {
         NotDiagnosable::NoFit(_) => Message::not_solved(why.to_string())
             .remedy("`errsep reversal --simultaneous` with the same readings says more"),

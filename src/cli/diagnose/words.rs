@@ -24,7 +24,7 @@ pub(super) fn harm_in_words(harm: &Harm, hidden: &Hidden) -> String {
     format!("{value} {unit} in {} per {per}", harm.quantity)
 }
 
-pub(super) fn in_words(diagnosis: &Diagnosis) -> String {
+pub fn in_words(diagnosis: &Diagnosis) -> String {
     let gap = &diagnosis.gap;
     let taken_out = !diagnosis.verdict.taken_out().is_empty();
     let mut text = format!("{}\n\n", diagnosis.verdict.statement);

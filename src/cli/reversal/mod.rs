@@ -1,5 +1,6 @@
 //! `errsep reversal`: from the readings of a reversal to tilts and forms with their uncertainty.
 
+mod diagnosed;
 mod effects;
 mod json;
 mod outcome;
@@ -15,6 +16,7 @@ use std::time::Instant;
 
 use clap::ValueEnum;
 use errsep_models::reversal::Channel;
+use errsep_models::reversal::simultaneous::Simultaneous;
 use errsep_models::reversal::staged::Removal;
 use serde_json::Value;
 
@@ -22,6 +24,7 @@ use super::{Answer, CommonArgs, Format};
 use crate::io::reversal::{ColumnMap, ReversalData, ReversalSetup, read};
 use crate::io::{Message, OutFile, Status};
 use crate::report::Page;
+use diagnosed::Diagnosed;
 use outcome::Outcome;
 
 /// Reversal: the tilt between slide and spindle, the form of the slide and of the artefact.
@@ -35,6 +38,7 @@ left out: the answer says what the rest determines.
 Examples:
     errsep reversal data.csv
     errsep reversal data.csv --setup setup.toml --simultaneous --out report
+    errsep reversal data.csv --simultaneous --diagnose
     errsep reversal data.csv --simultaneous --with thermal-drift,zero-jump --corrected clean.csv
     errsep reversal cad.csv --columns x=z_mm:mm,1A=I_0_0:mm,2B=I_0_180:mm")]
 pub struct Args {
@@ -63,6 +67,9 @@ pub struct Args {
     /// Write the readings without what these effects change in them into this file.
     #[arg(long, value_name = "FILE", requires = "with")]
     corrected: Option<PathBuf>,
+    /// Say as well where and why model and readings disagree, as `errsep diagnose` does, by this fit.
+    #[arg(long, requires = "simultaneous", conflicts_with = "with")]
+    diagnose: bool,
     /// Names and units of the columns, as role=column:unit,...
     #[arg(long, value_name = "ROLE=COLUMN:UNIT,...")]
     columns: Option<ColumnMap>,
@@ -100,9 +107,21 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let progress = super::progress("reading", None);
     let data = read(&args.data, &setup.columns)?;
     progress.set_message("solving");
-    let mut outcome = solve(args, &data, &setup)?;
+    let (mut outcome, fit) = solve(args, &data, &setup)?;
     outcome.warnings.extend(still(&data));
-    outcome.warnings.extend(pointer(args, &outcome));
+    let diagnosed = match fit.filter(|_| args.diagnose) {
+        Some(fit) => Some(Diagnosed::of(
+            &args.data,
+            &data,
+            &setup,
+            &fit,
+            args.common.seed,
+        )?),
+        None => {
+            outcome.warnings.extend(pointer(args, &outcome));
+            None
+        }
+    };
     if let Some(file) = corrected {
         effects::write_corrected(&args.data, &setup, &data, &outcome, file)?;
     }
@@ -119,7 +138,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     } else {
         (Page::new("Reversal", String::new()), Vec::new())
     };
-    Ok(Answer {
+    let answer = Answer {
         text: text::text(&args.data, &data, &outcome),
         json: if folder || args.common.format == Format::Json {
             json::json(&data, &outcome)?
@@ -132,7 +151,11 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         setup: None,
         seed: None,
         status: Status::Done,
-    })
+    };
+    match diagnosed {
+        Some(diagnosed) => diagnosed.beside(answer, args.common.seed),
+        None => Ok(answer),
+    }
 }
 
 /// Channels whose readings are all equal.
@@ -178,9 +201,15 @@ fn pointer(args: &Args, o: &Outcome) -> Option<String> {
     Some(format!("to see where they disagree and why: {command}"))
 }
 
-fn solve(args: &Args, data: &ReversalData, setup: &ReversalSetup) -> Result<Outcome, Message> {
+/// The outcome, and the fit where it is a simultaneous one.
+fn solve(
+    args: &Args,
+    data: &ReversalData,
+    setup: &ReversalSetup,
+) -> Result<(Outcome, Option<Simultaneous>), Message> {
     if args.simultaneous {
-        return simultaneous::solve(&args.data, data, setup, &args.with);
+        let (outcome, fit) = simultaneous::solve(&args.data, data, setup, &args.with)?;
+        return Ok((outcome, Some(fit)));
     }
     let begin = Instant::now();
     let removal = match args.method {
@@ -190,5 +219,5 @@ fn solve(args: &Args, data: &ReversalData, setup: &ReversalSetup) -> Result<Outc
     };
     let mut outcome = staged::solve(&args.data, data, setup, removal)?;
     outcome.convergence.seconds = begin.elapsed().as_secs_f64();
-    Ok(outcome)
+    Ok((outcome, None))
 }

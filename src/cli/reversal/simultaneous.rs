@@ -25,7 +25,7 @@ pub fn solve(
     data: &ReversalData,
     setup: &ReversalSetup,
     with: &[String],
-) -> Result<Outcome, Message> {
+) -> Result<(Outcome, Simultaneous), Message> {
     let options = Options {
         convention: setup.convention,
         thickness: match setup.thickness {
@@ -40,7 +40,8 @@ pub fn solve(
     };
     let fit =
         simultaneous::fit(&data.observations, &options).map_err(|why| refusal(&why, file, data))?;
-    Ok(outcome(&fit, &data.observations, setup))
+    let outcome = outcome(&fit, &data.observations, setup);
+    Ok((outcome, fit))
 }
 
 fn refusal(why: &ReversalError, file: &Path, data: &ReversalData) -> Message {

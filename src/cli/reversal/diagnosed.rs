@@ -1,0 +1,66 @@
+//! The diagnosis of the fit beside its answer: both in one run, by one fit.
+
+use std::path::Path;
+
+use errsep_models::reversal::diagnosable::FirstOrder;
+use errsep_models::reversal::simultaneous::Simultaneous;
+use serde_json::Value;
+
+use crate::cli::Answer;
+use crate::cli::diagnose::{page, reversal, within_reach_of, words};
+use crate::diagnosis::{Diagnosis, Options, diagnose};
+use crate::io::Message;
+use crate::io::reversal::{ReversalData, ReversalSetup};
+use crate::report::diagnosis as sheet;
+
+/// Heading of what the diagnosis adds.
+const HEADING: &str = "Where and why model and readings disagree";
+
+/// A diagnosis with the model that it is of.
+pub struct Diagnosed {
+    model: FirstOrder,
+    diagnosis: Diagnosis,
+    data: String,
+}
+
+impl Diagnosed {
+    /// The diagnosis of a fit.
+    pub fn of(
+        file: &Path,
+        data: &ReversalData,
+        setup: &ReversalSetup,
+        fit: &Simultaneous,
+        seed: u64,
+    ) -> Result<Self, Message> {
+        let model = FirstOrder::of_fit(&data.observations, fit, reversal::assumptions(setup))
+            .map_err(|why| reversal::refusal(&why).in_file(file))?;
+        within_reach_of(&model, reversal::ALONG, file)?;
+        let options = Options {
+            seed,
+            ..Options::default()
+        };
+        let mut diagnosis = diagnose(&model, &options);
+        diagnosis.notes.extend(reversal::notes(&model));
+        Ok(Self {
+            model,
+            diagnosis,
+            data: file.display().to_string(),
+        })
+    }
+
+    /// The answer with the diagnosis behind it: in the text, as `diagnosis` in the JSON, as sections of
+    /// the page.
+    pub fn beside(self, mut answer: Answer, seed: u64) -> Result<Answer, Message> {
+        answer.text += &format!("\n{HEADING}\n\n{}", words::in_words(&self.diagnosis));
+        if let Value::Object(object) = &mut answer.json {
+            let own = serde_json::to_value(&self.diagnosis).map_err(|e| {
+                Message::bad_input(format!("the diagnosis cannot be written as JSON: {e}"))
+            })?;
+            object.insert("diagnosis".to_owned(), own);
+        }
+        let view = page::view(self.data, &self.model, reversal::ALONG, &self.diagnosis);
+        answer.page = answer.page.followed_by(HEADING, sheet::page(&view));
+        answer.seed = Some(seed);
+        Ok(answer)
+    }
+}

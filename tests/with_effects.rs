@@ -300,7 +300,7 @@ fn effects_in_time_say_what_they_take_for_it() {
 /// command that fits it along.
 #[test]
 fn the_fit_is_diagnosed_in_the_same_run() {
-    let folder = folder(&[Fault::Taper(5e-6)]);
+    let folder = folder(&[Fault::Cone(5e-6)]);
     let both = json(&folder, &["--diagnose"]);
     let arguments = ["diagnose", "data.csv", "--setup", "setup.toml"];
     let alone = run(&folder, &[&arguments[..], &["--format", "json"]].concat());

@@ -117,12 +117,12 @@ fn what_stands_elsewhere_is_found_with_the_tilts() {
     );
 }
 
-/// Small tilts leave no trace of it; large ones move the artefact's knots off those of the truth, and finer
-/// ones follow.
+/// It shows where the two channels of a side are tilted differently, by α or β; large tilts move the
+/// artefact's knots off those of the truth, and finer ones follow.
 #[test]
 fn a_thickness_left_out_is_found_where_the_tilt_is_large() {
     let machine = Machine {
-        tilts: [40e-6, -15e-6, 30e-3],
+        tilts: [30e-3, -15e-6, -150e-6],
         ..machine()
     };
     let mut options = options(&["thickness-shift"]);

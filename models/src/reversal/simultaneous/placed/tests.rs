@@ -147,12 +147,11 @@ fn rows_are_those_of_finite_differences() {
                     pairs.map(|(u, d)| (u - d) / (2.0 * step)).collect()
                 };
                 let of_effect = j.checked_sub(n + unknowns.effect(0));
-                let step = match of_effect.map(|k| effect.unknowns()[k].kind) {
-                    // Shapes change by their own measure.
-                    Some(Kind::Shape) => 1e-3 * at.border[j - n].abs().max(0.1),
-                    // About 10 nm in the readings.
-                    _ => 1e-2 / norm.max(1e-2),
-                };
+                // About 10 nm in the readings; shapes change by their own measure.
+                let mut step = 1e-2 / norm.max(1e-2);
+                if of_effect.map(|k| effect.unknowns()[k].kind) == Some(Kind::Shape) {
+                    step = step.min(1e-3 * at.border[j - n].abs().max(0.1));
+                }
                 // Richardson's extrapolation.
                 let (whole, half) = (slope(step), slope(0.5 * step));
                 let pairs = whole.iter().zip(&half);

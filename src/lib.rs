@@ -4,4 +4,5 @@
 pub mod cli;
 pub mod diagnosis;
 pub mod io;
+pub mod number;
 pub mod report;

@@ -8,51 +8,29 @@ mod attribution;
 mod catalogue;
 mod detection;
 mod noise;
+mod options;
 mod planning;
 mod search;
 mod verdict;
 
 use errsep_models::model::{Effect, FittedModel};
-use nalgebra::DVector;
 
-use attribution::attribute::{attribute, roughly};
-use attribution::confidence::Answer;
-use attribution::context::{Context, Remainder};
+use attribution::context::Context;
+use attribution::examined::examined;
+pub use attribution::reported::{Bias, Candidate, Elsewhere, Linear, ParameterOut};
+pub use attribution::shrink::{HeldOut, Size};
 pub use catalogue::formula::{Circumstances, Formula};
 pub use catalogue::tabulated::{Tabulated, TabulatedEffects};
+use detection::estimate::estimate;
 pub use noise::law::{NoiseLaw, NoiseSource};
 use noise::spikes::Spikes;
+pub use options::Options;
 pub use planning::certificate::{Diagnosability, certificate};
 pub use planning::prove::{Trials, prove};
 pub use verdict::told::{Told, for_people, scaled};
 pub use verdict::types::{
-    Bias, Candidate, Detail, Diagnosis, Elsewhere, Fingerprint, Gap, Harm, HeldOut, Hidden, Kind,
-    Linear, Nearest, NoiseOut, ParameterOut, Size, Verdict, Where,
+    Detail, Diagnosis, Fingerprint, Gap, Harm, Hidden, Kind, Nearest, NoiseOut, Verdict, Where,
 };
-
-/// How a diagnosis is made.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Options {
-    /// Probability of naming anything where nothing is there.
-    pub false_alarm: f64,
-    /// Draws behind every tail probability.
-    pub draws: usize,
-    /// Seed of the draws.
-    pub seed: u64,
-    /// Effects to leave out of the catalogue.
-    pub without: Vec<String>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            false_alarm: 0.01,
-            draws: 1000,
-            seed: 1,
-            without: Vec::new(),
-        }
-    }
-}
 
 /// Diagnoses the gap of a fitted model with its own catalogue.
 pub fn diagnose<M: FittedModel>(model: &M, options: &Options) -> Diagnosis {
@@ -79,71 +57,9 @@ pub fn diagnose_with<M: FittedModel>(
     } else {
         (model, readings)
     };
-    let law = NoiseLaw::estimate(model, &readings).with_tails(calm.tails);
+    let law = estimate(model, &readings).with_tails(calm.tails);
     let context = Context::new(model, &catalogue, law, options.draws, options.seed);
     examined(&context, &readings, options.false_alarm, |examined| {
         verdict::compose::compose(&examined, &calm, options)
-    })
-}
-
-/// What a diagnosis has come to before it is put in words.
-struct Examined<'a, M: FittedModel> {
-    context: &'a Context<'a, M>,
-    readings: &'a DVector<f64>,
-    first: &'a Remainder,
-    /// Probability of as much standing out with nothing there.
-    detected: f64,
-    found: Option<Answer>,
-}
-
-/// Causes bend the fitted state and swell the noise; both are found again without them, and the
-/// diagnosis is made once more from there.
-fn examined<M: FittedModel, R>(
-    context: &Context<'_, M>,
-    readings: &DVector<f64>,
-    false_alarm: f64,
-    then: impl FnOnce(Examined<'_, M>) -> R,
-) -> R {
-    let first = context.remainder(readings, &[]);
-    let detected = context.detection(&first);
-    if detected > false_alarm {
-        return then(Examined {
-            context,
-            readings,
-            first: &first,
-            detected,
-            found: None,
-        });
-    }
-    let found = roughly(context, readings, &first);
-    let none = || {
-        (
-            DVector::zeros(readings.len()),
-            context.model.refit(context.model.observed().clone()),
-        )
-    };
-    let (change, state) = context
-        .changes(readings, &found)
-        .map(|changes| {
-            let clean = context.without(context.model.observed(), &found, &changes);
-            (changes.column_sum(), context.model.refit(clean))
-        })
-        .unwrap_or_else(none);
-    // The readings themselves keep what an effect had hidden of the state.
-    let clean = context
-        .model
-        .refit(context.model.observed() - &change)
-        .linearised();
-    let law = NoiseLaw::estimate(&state, &clean);
-    let context = context.moved(&state, law);
-    let readings = clean + change;
-    let first = context.remainder(&readings, &[]);
-    let found = attribute(&context, &readings, &first);
-    then(Examined {
-        context: &context,
-        readings: &readings,
-        first: &first,
-        detected,
-        found,
     })
 }

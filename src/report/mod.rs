@@ -40,7 +40,7 @@ pub mod circle;
 pub mod diagnosis;
 pub mod fourier;
 mod html;
-pub mod number;
+pub use crate::number;
 mod page;
 pub mod plot;
 pub mod reversal;

@@ -15,9 +15,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::context::{Cause, Context, raw_signatures};
+use crate::diagnosis::attribution::reported::Bias;
 use crate::diagnosis::attribution::sizes::{Sizes, Unknown, beside, first_amplitude};
 use crate::diagnosis::noise::law::NoiseLaw;
-use crate::diagnosis::verdict::types::Bias;
 
 /// A quantity that moves by less than this part of its uncertainty does not move: that is rounding.
 const ROUNDING: f64 = 1e-9;

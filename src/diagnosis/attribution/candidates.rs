@@ -7,9 +7,9 @@ use nalgebra::DVector;
 
 use crate::diagnosis::attribution::confidence::{Alternative, possible, without};
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
+use crate::diagnosis::attribution::reported::{Candidate, Elsewhere};
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::detection::dictionary::statistic;
-use crate::diagnosis::verdict::types::{Candidate, Elsewhere};
 
 /// Variants of a cause whose misfits are above the best by less are as likely: χ² of two unknowns,
 /// 95 %.

@@ -8,10 +8,10 @@ use errsep_models::model::{FittedModel, Shape};
 use nalgebra::DVector;
 
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder, adequate, raw_signatures};
+use crate::diagnosis::attribution::shrink::held_out_square;
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::detection::space::{Space, orthonormal};
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
-use crate::diagnosis::verdict::shrink::held_out_square;
 
 /// A further cause must stand out beside the others at this level.
 pub(in crate::diagnosis) const EARNED: f64 = 0.002;

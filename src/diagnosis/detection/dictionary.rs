@@ -14,7 +14,7 @@ use crate::diagnosis::detection::localise::{Item, scan_items};
 use crate::diagnosis::detection::space::Space;
 
 /// A signature of which less than this part is visible is not looked for.
-const INVISIBLE: f64 = 1e-4;
+pub(in crate::diagnosis) const INVISIBLE: f64 = 1e-4;
 
 /// What a signature stands for.
 #[derive(Debug, Clone)]

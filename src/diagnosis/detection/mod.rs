@@ -3,6 +3,7 @@
 //! stand out with nothing there.
 
 pub(super) mod dictionary;
+pub(super) mod estimate;
 pub(super) mod folding;
 pub(super) mod localise;
 pub(super) mod null;

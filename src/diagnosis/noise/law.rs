@@ -5,30 +5,21 @@
 //! but also by whatever drifts steadily between them; contrasts orthogonal to {1, t} hold neither
 //! the model nor the drift, so their likelihood estimates the noise alone.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use errsep_models::model::FittedModel;
 use nalgebra::{DMatrix, DVector};
-use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal, StudentT};
 
-use crate::diagnosis::detection::space::Space;
 use crate::diagnosis::noise::contrasts::Contrasts;
-use crate::diagnosis::noise::posterior::possible_laws;
 use crate::diagnosis::noise::spikes::{Spikes, Tails};
-use crate::diagnosis::noise::steps::levelled;
 
 /// Seed of the laws drawn from the repeats: an estimate must not depend on the user's seed.
-const SEED: u64 = 0x6c61_7773;
+pub(in crate::diagnosis) const SEED: u64 = 0x6c61_7773;
 
 /// Contrasts of repeats from which noise can be estimated.
-const FEWEST: usize = 8;
-/// Draws behind what neighbours tell of the noise.
-const NEIGHBOUR_DRAWS: usize = 64;
-/// Noise below this part of the greatest reading is rounding.
-const ROUNDING: f64 = 1e-12;
+pub(in crate::diagnosis) const FEWEST: usize = 8;
 
 /// How far the noise is known from the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -152,7 +143,7 @@ impl NoiseLaw {
     }
 
     /// The mean of laws drawn from what the repeats allow.
-    fn mean_of(laws: Vec<Components>) -> Self {
+    pub(in crate::diagnosis) fn mean_of(laws: Vec<Components>) -> Self {
         let count = laws.len().max(1) as f64;
         let mean = |value: fn(&Components) -> f64| laws.iter().map(value).sum::<f64>() / count;
         let whole = mean(Components::whole);
@@ -254,28 +245,6 @@ impl NoiseLaw {
             same + self.correlated * (-apart / self.length).exp() + self.shift
         })
     }
-
-    /// The law that is stated, or that the repeats of a model's readings follow, or what stands in
-    /// for it.
-    pub fn estimate<M: FittedModel>(model: &M, readings: &DVector<f64>) -> Self {
-        if let Some(sigma) = model.stated_noise() {
-            return Self::white(sigma, f64::INFINITY, NoiseSource::Stated);
-        }
-        let floor = (ROUNDING * model.observed().amax()).max(f64::MIN_POSITIVE.sqrt());
-        let level = levelled(model, readings);
-        let contrasts = Contrasts::new(model.places(), model.traces(), &level);
-        if contrasts.count() < FEWEST {
-            return neighbours(model, readings, floor);
-        }
-        let (variance, freedom) = contrasts.scatter();
-        if variance > floor * floor && model.correlated_noise() {
-            let laws = possible_laws(&contrasts, SEED);
-            if !laws.is_empty() {
-                return Self::mean_of(laws);
-            }
-        }
-        Self::white(variance.sqrt().max(floor), freedom, NoiseSource::Repeats)
-    }
 }
 
 /// A draw of the scatter that the model expects beside the noise.
@@ -303,95 +272,5 @@ pub(in crate::diagnosis) fn of_repeats<M: FittedModel>(
     (contrasts.count() >= FEWEST).then(|| {
         let (variance, freedom) = contrasts.scatter();
         (variance.sqrt(), freedom)
-    })
-}
-
-/// White noise from second differences of the residuals, (e₋ − 2e₀ + e₊)/√6, by their median. What
-/// the fit leaves of white noise in them, and how well they tell it, is drawn.
-fn neighbours<M: FittedModel>(model: &M, readings: &DVector<f64>, floor: f64) -> NoiseLaw {
-    let space = Space::new(
-        model,
-        &NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated),
-    );
-    let seen =
-        |values: &DVector<f64>| second_differences(model.traces(), &space.forward_vector(values)).0;
-    let mut random = ChaCha8Rng::seed_from_u64(SEED);
-    let squares: Vec<f64> = (0..NEIGHBOUR_DRAWS)
-        .map(|_| {
-            let noise = (0..readings.len()).map(|_| StandardNormal.sample(&mut random));
-            seen(&DVector::from_iterator(readings.len(), noise)).powi(2)
-        })
-        .collect();
-    let count = squares.len() as f64;
-    let kept = squares.iter().sum::<f64>() / count;
-    let variance = squares.iter().map(|s| (s - kept).powi(2)).sum::<f64>() / (count - 1.0);
-    let freedom = 2.0 * kept * kept / variance.max(f64::MIN_POSITIVE);
-    let sigma = if kept > 0.0 {
-        seen(readings) / kept.sqrt()
-    } else {
-        0.0
-    };
-    NoiseLaw::white(sigma.max(floor), freedom.max(1.0), NoiseSource::Neighbours)
-}
-
-/// Standard deviation of the residuals as neighbours tell it, and its degrees of freedom.
-fn second_differences(traces: &[Range<usize>], residual: &DVector<f64>) -> (f64, f64) {
-    let mut differences: Vec<f64> = traces
-        .iter()
-        .flat_map(|trace| {
-            let e = residual.rows(trace.start, trace.len());
-            (2..trace.len()).map(move |k| (e[k - 2] - 2.0 * e[k - 1] + e[k]).abs() / 6f64.sqrt())
-        })
-        .collect();
-    differences.sort_by(f64::total_cmp);
-    let median = differences
-        .get(differences.len() / 2)
-        .copied()
-        .unwrap_or(0.0);
-    // 0.6745: the median of the absolute value of a standard normal number. The median uses 37 %
-    // of the information of overlapping differences, which hold 35/18 times that of one reading.
-    let freedom = 0.37 * differences.len() as f64 * 18.0 / 35.0;
-    (median / 0.6745, freedom.max(1.0))
-}
-
-/// The scatter of neighbouring readings against what the repeats say of it.
-pub(in crate::diagnosis) struct Scatter {
-    pub seen: f64,
-    pub expected: f64,
-    /// Of their ratio.
-    pub relative_std: f64,
-}
-
-/// The scatter of neighbours in readings free of causes, where there are enough of them.
-pub(in crate::diagnosis) fn neighbour_scatter<M: FittedModel>(
-    model: &M,
-    law: &NoiseLaw,
-    clean: &DVector<f64>,
-) -> Option<Scatter> {
-    let unit = NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated);
-    let space = Space::new(model, &unit);
-    let residual = space.forward_vector(clean);
-    let (seen, freedom) = second_differences(model.traces(), &residual);
-    let gaps: Vec<f64> = model
-        .traces()
-        .iter()
-        .flat_map(|t| {
-            model.places()[t.clone()]
-                .windows(2)
-                .map(|w| (w[1].x - w[0].x).abs())
-        })
-        .collect();
-    if freedom < 20.0 || gaps.is_empty() {
-        return None;
-    }
-    let spacing = gaps.iter().sum::<f64>() / gaps.len() as f64;
-    let along = (-spacing / law.length).exp();
-    // Variance of (e₋ − 2e₀ + e₊)/√6 under the law; the fit has taken its part of the white noise.
-    let correlated = law.correlated * (6.0 - 8.0 * along + 2.0 * along * along) / 6.0;
-    let kept = space.degrees_of_freedom() as f64 / space.readings().max(1) as f64;
-    Some(Scatter {
-        seen,
-        expected: (kept * (law.white + correlated)).sqrt(),
-        relative_std: (0.5 / freedom + 0.5 / law.freedom.max(1.0)).sqrt(),
     })
 }

@@ -12,12 +12,12 @@ use errsep_models::model::{Effect, FittedModel};
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use crate::diagnosis::Options;
+use crate::diagnosis::detection::dictionary::INVISIBLE;
 use crate::diagnosis::detection::dictionary::{Dictionary, Meaning, Places, statistic};
 use crate::diagnosis::detection::null::NullLaw;
 use crate::diagnosis::detection::space::Space;
 use crate::diagnosis::noise::law::NoiseLaw;
-use crate::diagnosis::verdict::types::INVISIBLE;
+use crate::diagnosis::options::Options;
 
 /// Normal quantile of 80 % power.
 const POWER: f64 = 0.8416;

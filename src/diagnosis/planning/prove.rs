@@ -16,10 +16,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::diagnosis::attribution::context::Context;
+use crate::diagnosis::attribution::examined::{Examined, examined};
 use crate::diagnosis::detection::space::Space;
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
 use crate::diagnosis::noise::spikes::Spikes;
-use crate::diagnosis::{Examined, Options, examined};
+use crate::diagnosis::options::Options;
 
 /// Effects of which less than this part is visible are not put in.
 const SHOWN: f64 = 0.01;
@@ -59,7 +60,7 @@ pub fn prove<M: FittedModel>(
     let context = Context::new(
         model,
         catalogue,
-        NoiseLaw::estimate(model, &readings).with_tails(tails),
+        estimate(model, &readings).with_tails(tails),
         options.draws,
         options.seed,
     );
@@ -198,7 +199,7 @@ fn answer<M: FittedModel>(
     let shift = context.model.observed() - context.model.linearised();
     let model = context.model.refit(sealed + shift);
     let readings = model.linearised();
-    let law = NoiseLaw::estimate(&model, &readings);
+    let law = estimate(&model, &readings);
     let context = context.moved(&model, law);
     examined(&context, &readings, options.false_alarm, |examined| {
         said(&examined, options)

@@ -7,19 +7,22 @@ use crate::diagnosis::attribution::bias::biases;
 use crate::diagnosis::attribution::candidates::candidates;
 use crate::diagnosis::attribution::confidence::Alternative;
 use crate::diagnosis::attribution::context::{Cause, Context, raw_signatures};
-use crate::diagnosis::noise::law::{NoiseSource, neighbour_scatter, of_repeats};
+use crate::diagnosis::attribution::examined::Examined;
+use crate::diagnosis::attribution::reported::Candidate;
+use crate::diagnosis::attribution::shrink::GapMeter;
+use crate::diagnosis::detection::estimate::neighbour_scatter;
+use crate::diagnosis::noise::law::{NoiseSource, of_repeats};
 use crate::diagnosis::noise::spikes::Calmed;
+use crate::diagnosis::options::Options;
 use crate::diagnosis::planning::splitting::splits;
 use crate::diagnosis::verdict::conclusion::{Conclusion, Measured};
 use crate::diagnosis::verdict::hidden::hidden;
 use crate::diagnosis::verdict::places::places;
 use crate::diagnosis::verdict::shape::fingerprint;
-use crate::diagnosis::verdict::shrink::GapMeter;
 use crate::diagnosis::verdict::statement::{separating, statement};
 use crate::diagnosis::verdict::told::for_people;
-use crate::diagnosis::verdict::types::{Candidate, Detail, Diagnosis, Kind, NoiseOut, Verdict};
-use crate::diagnosis::{Examined, Options};
-use crate::report::number::plain;
+use crate::diagnosis::verdict::types::{Detail, Diagnosis, Kind, NoiseOut, Verdict};
+use crate::number::plain;
 
 pub(in crate::diagnosis) fn compose<M: FittedModel>(
     examined: &Examined<'_, M>,

@@ -7,8 +7,9 @@
 //! The sentence, the text, the page and the JSON are all made from this.
 
 use crate::diagnosis::attribution::confidence::Answer;
-use crate::diagnosis::verdict::shrink::shrink;
-use crate::diagnosis::verdict::types::{Gap, HeldOut, Kind, Size};
+use crate::diagnosis::attribution::shrink::shrink;
+use crate::diagnosis::attribution::shrink::{HeldOut, Size};
+use crate::diagnosis::verdict::types::{Gap, Kind};
 
 /// Part of the predicted shrinking that a named cause must reach.
 const PROMISE: f64 = 0.5;

@@ -2,11 +2,12 @@
 
 use errsep_models::model::FittedModel;
 
-use crate::diagnosis::Options;
 use crate::diagnosis::attribution::bias::weighted_std;
 use crate::diagnosis::attribution::context::Context;
+use crate::diagnosis::detection::dictionary::INVISIBLE;
+use crate::diagnosis::options::Options;
 use crate::diagnosis::planning::certificate::greatest_plausible;
-use crate::diagnosis::verdict::types::{Harm, Hidden, INVISIBLE};
+use crate::diagnosis::verdict::types::{Harm, Hidden};
 
 /// Normal quantile of 80 % power.
 const POWER: f64 = 0.8416;

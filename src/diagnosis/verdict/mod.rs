@@ -5,7 +5,6 @@ pub(super) mod conclusion;
 pub(super) mod hidden;
 pub(super) mod places;
 pub(super) mod shape;
-pub(super) mod shrink;
 pub(super) mod statement;
 pub(super) mod told;
 pub(super) mod types;

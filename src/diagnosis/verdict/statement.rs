@@ -1,11 +1,10 @@
 //! The verdict in a sentence that a person can act on.
 
+use crate::diagnosis::attribution::reported::{Candidate, ParameterOut};
 use crate::diagnosis::planning::splitting::Split;
 use crate::diagnosis::verdict::told::for_people;
-use crate::diagnosis::verdict::types::{
-    Candidate, Fingerprint, Gap, Hidden, Kind, ParameterOut, Verdict, Where,
-};
-use crate::report::number::{percent, plain, probability};
+use crate::diagnosis::verdict::types::{Fingerprint, Gap, Hidden, Kind, Verdict, Where};
+use crate::number::{percent, plain, probability};
 
 /// The sentence.
 pub(in crate::diagnosis) fn statement(

@@ -1,7 +1,9 @@
 //! Numbers and units as people read them: the same in the sentence, the text and the page.
 
-use crate::diagnosis::verdict::types::{Gap, ParameterOut, Size};
-use crate::report::number::{measured, plain};
+use crate::diagnosis::attribution::reported::ParameterOut;
+use crate::diagnosis::attribution::shrink::Size;
+use crate::diagnosis::verdict::types::Gap;
+use crate::number::{measured, plain};
 
 /// Digits of a gap.
 const DIGITS: usize = 3;

@@ -6,11 +6,33 @@ use errsep_models::model::FittedModel;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 
 use crate::diagnosis::detection::space::Space;
 use crate::diagnosis::noise::contrasts::Contrasts;
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource, draw_scatter};
-use crate::diagnosis::verdict::types::{HeldOut, Size};
+
+/// A root mean square with its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Size {
+    /// The value.
+    pub rms: f64,
+    /// Its 95 % interval.
+    pub ci95: [f64; 2],
+}
+
+/// Held-out repeats: found and fitted on some, the gap measured on the others.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// Before the effects are added.
+    pub before: f64,
+    /// After.
+    pub after: f64,
+    /// 1 − after / before.
+    pub shrink: f64,
+    /// What a perfect model would still show, fitted on that many readings.
+    pub floor: f64,
+}
 
 /// Draws of the noise for its expected part in a sum of squares.
 const DRAWS: usize = 48;

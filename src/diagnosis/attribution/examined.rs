@@ -1,0 +1,71 @@
+//! Detection and attribution in their order, and what they come to before it is put in words.
+
+use errsep_models::model::FittedModel;
+use nalgebra::DVector;
+
+use crate::diagnosis::attribution::attribute::{attribute, roughly};
+use crate::diagnosis::attribution::confidence::Answer;
+use crate::diagnosis::attribution::context::{Context, Remainder};
+use crate::diagnosis::detection::estimate::estimate;
+
+/// What a diagnosis has come to before it is put in words.
+pub(in crate::diagnosis) struct Examined<'a, M: FittedModel> {
+    pub context: &'a Context<'a, M>,
+    pub readings: &'a DVector<f64>,
+    pub first: &'a Remainder,
+    /// Probability of as much standing out with nothing there.
+    pub detected: f64,
+    pub found: Option<Answer>,
+}
+
+/// Causes bend the fitted state and swell the noise; both are found again without them, and the
+/// diagnosis is made once more from there.
+pub(in crate::diagnosis) fn examined<M: FittedModel, R>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    false_alarm: f64,
+    then: impl FnOnce(Examined<'_, M>) -> R,
+) -> R {
+    let first = context.remainder(readings, &[]);
+    let detected = context.detection(&first);
+    if detected > false_alarm {
+        return then(Examined {
+            context,
+            readings,
+            first: &first,
+            detected,
+            found: None,
+        });
+    }
+    let found = roughly(context, readings, &first);
+    let none = || {
+        (
+            DVector::zeros(readings.len()),
+            context.model.refit(context.model.observed().clone()),
+        )
+    };
+    let (change, state) = context
+        .changes(readings, &found)
+        .map(|changes| {
+            let clean = context.without(context.model.observed(), &found, &changes);
+            (changes.column_sum(), context.model.refit(clean))
+        })
+        .unwrap_or_else(none);
+    // The readings themselves keep what an effect had hidden of the state.
+    let clean = context
+        .model
+        .refit(context.model.observed() - &change)
+        .linearised();
+    let law = estimate(&state, &clean);
+    let context = context.moved(&state, law);
+    let readings = clean + change;
+    let first = context.remainder(&readings, &[]);
+    let found = attribute(&context, &readings, &first);
+    then(Examined {
+        context: &context,
+        readings: &readings,
+        first: &first,
+        detected,
+        found,
+    })
+}

@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::attribution::examined::{Examined, examined};
+use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::space::Space;
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
 use crate::diagnosis::noise::spikes::Spikes;

@@ -35,7 +35,7 @@ fn wrong_setups() {
             "\"sead\"",
             [
                 "setup.toml:8:14: unknown value `sead`",
-                "did you mean `seed`? Write seed or rigid",
+                "did you mean `seed`? Write seed, rigid or untapered",
             ],
         ),
         (
@@ -43,7 +43,7 @@ fn wrong_setups() {
             "\"rigit\"",
             [
                 "setup.toml:8:14: unknown value `rigit`",
-                "did you mean `rigid`? Write rigid or seed",
+                "did you mean `rigid`? Write rigid, seed or untapered",
             ],
         ),
         (

@@ -293,7 +293,7 @@ fn the_order_of_the_readings_does_not_matter() {
 }
 
 /// Readings off a CAD model whose author states α = −0.4°, set-up −0.1° and a half cone of 0.05°:
-/// the seed's convention has no cone, so the diagnosis must find one of that size.
+/// the untapered convention has no cone, so the diagnosis must find one of that size.
 #[test]
 fn a_cone_in_a_cad_model_is_found() {
     let folder = std::env::var("ERRSEP_DATA").map_or_else(

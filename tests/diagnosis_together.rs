@@ -113,7 +113,12 @@ fn a_group_comes_with_the_measurement_that_splits_it() {
             cubic: false,
         });
         let verdict = diagnosed(&further.measured(seed + 100), &[]).verdict;
-        assert_eq!(verdict.effects, ["indicator-nonlinearity"], "{seed}");
+        assert_eq!(
+            verdict.effects,
+            ["indicator-nonlinearity"],
+            "{seed}: {}",
+            verdict.statement
+        );
         assert!(verdict.indistinguishable.is_empty(), "{seed}");
     }
     assert!(groups >= 2, "{groups}");

@@ -233,6 +233,12 @@ pub trait FittedModel: Clone + Send + Sync {
         true
     }
 
+    /// Whether a zero that jumps between two traces and stays is an effect of the catalogue, and no
+    /// shift of a trace by its noise.
+    fn zero_may_jump(&self) -> bool {
+        false
+    }
+
     /// Whether a single wrong reading is an effect of the catalogue, and not to be calmed as noise.
     fn names_single_readings(&self) -> bool {
         false

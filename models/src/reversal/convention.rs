@@ -9,8 +9,9 @@ use super::Channel;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Convention {
-    /// α, β, γ with the signs `i`, `p`, `i·p`; the contrast + + + + is held to be zero.
+    /// Untapered: α, β, γ with the signs `i`, `p`, `i·p`; the contrast + + + + is held to be zero.
     #[default]
+    #[serde(alias = "untapered")]
     Seed,
     /// α, set-up tilt, cone; the contrast + + − − closes to zero on any rigid artefact.
     Rigid,
@@ -30,7 +31,7 @@ pub enum Contrast {
 }
 
 impl Contrast {
-    /// All four, in the order α, β, γ, τ of the seed convention.
+    /// All four, in the order α, β, γ, τ of the untapered convention.
     pub const ALL: [Self; 4] = [Self::Alpha, Self::Spindle, Self::Side, Self::Mean];
 
     /// The sign with which a channel enters.
@@ -70,13 +71,13 @@ impl Contrast {
         match (self, convention) {
             (Self::Alpha, _) => "tilt between slide and spindle axis",
             (Self::Spindle, Convention::Seed) => {
-                "the seed's set-up tilt; zero for rigid parts, a value means drift between the spindle positions or an imperfect reversal"
+                "set-up tilt; zero for rigid parts, a value means drift between the spindle positions or an imperfect reversal"
             }
             (Self::Side, Convention::Seed) => {
-                "the seed's artefact tilt; set-up tilt of the artefact and obliqueness of its sides together"
+                "tilt of the artefact: its set-up and obliqueness of its sides together"
             }
             (Self::Mean, Convention::Seed) => {
-                "zero in the seed's model; a value means a tapered artefact"
+                "zero for an untapered artefact; a value means a taper"
             }
             (Self::Spindle, Convention::Rigid) => {
                 "zero for rigid parts; a value means drift between the spindle positions or an imperfect reversal"

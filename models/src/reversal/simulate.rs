@@ -155,7 +155,7 @@ pub struct Plan {
     pub beta_rad: f64,
     /// γ, rad.
     pub gamma_rad: f64,
-    /// Fourth contrast of the slopes, + + + + (a taper), rad; zero in the seed's model.
+    /// Fourth contrast of the slopes, + + + + (a taper), rad; zero for an untapered artefact.
     pub tau_rad: f64,
     /// Thickness of the artefact, mm.
     pub thickness_mm: f64,

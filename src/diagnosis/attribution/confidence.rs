@@ -25,8 +25,9 @@ const WEIGHTY: f64 = 0.02;
 const TIED: f64 = 9.2;
 /// A relative of a cause that explains less than this part of what it does cannot stand for it.
 const NEAR: f64 = 0.7;
-/// A size counts from this many of its standard uncertainties on.
-const STANDS: f64 = 2.0;
+/// A size counts from this many of its standard uncertainties on: that of the only cause, and those of
+/// several, which may imitate what another leaves.
+const STANDS: [f64; 2] = [1.0, 2.0];
 /// Evidence that differs by less is equal: of exact aliases the one of more usual size goes first.
 const EQUAL: f64 = 1e-3;
 
@@ -107,8 +108,9 @@ pub(in crate::diagnosis) fn confidence_set<M: FittedModel>(
     }
 }
 
-/// Whether of every cause one size at least is beyond twice its standard uncertainty, that of the
-/// state included: what may as well be nothing stands for something that it only imitates.
+/// Whether of every cause one size at least is beyond its standard uncertainty, of several causes
+/// beyond twice that, the state's included: what may as well be nothing stands for something that it
+/// only imitates.
 fn sized<M: FittedModel>(
     context: &Context<'_, M>,
     readings: &DVector<f64>,
@@ -120,7 +122,7 @@ fn sized<M: FittedModel>(
         && Sizes::fitted_with_state(context, readings, causes).is_some_and(all)
 }
 
-/// Whether one of the sizes that are told of a cause is beyond twice its standard uncertainty.
+/// Whether one of the sizes that are told of a cause is known to better than itself.
 fn stands<M: FittedModel>(
     context: &Context<'_, M>,
     causes: &[Cause],
@@ -129,9 +131,10 @@ fn stands<M: FittedModel>(
 ) -> bool {
     let shapes = context.catalogue[causes[which].effect].shape_parameters();
     let own = sizes.of(context, causes, which);
+    let least = STANDS[usize::from(causes.len() > 1)];
     own.iter()
         .filter(|estimate| shapes.iter().all(|p| p.name != estimate.name))
-        .any(|estimate| estimate.value.abs() > STANDS * estimate.std)
+        .any(|estimate| estimate.value.abs() > least * estimate.std)
 }
 
 /// Whether each of several causes, beside the others, changes the readings by more than may be left

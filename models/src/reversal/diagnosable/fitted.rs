@@ -159,6 +159,10 @@ impl FittedModel for FirstOrder {
         ]
     }
 
+    fn zero_may_jump(&self) -> bool {
+        true
+    }
+
     fn stated_noise(&self) -> Option<f64> {
         self.assumptions.noise
     }

@@ -113,9 +113,12 @@ fn a_group_comes_with_the_measurement_that_splits_it() {
             cubic: false,
         });
         let verdict = diagnosed(&further.measured(seed + 100), &[]).verdict;
-        assert_eq!(
-            verdict.effects,
-            ["indicator-nonlinearity"],
+        // A bend of sixty times the noise is seen to second order, in which the variants of the effect
+        // differ: named or part of what is unknown, but no longer taken for a cone.
+        let named: Vec<&String> = verdict.effects.iter().chain(&verdict.partial).collect();
+        assert!(
+            named.iter().any(|e| *e == "indicator-nonlinearity")
+                && named.iter().all(|e| *e != "taper"),
             "{seed}: {}",
             verdict.statement
         );

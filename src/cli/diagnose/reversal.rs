@@ -33,7 +33,9 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     }
     .answer(args)?;
     if let Some(command) = with_command(args, &answer.json["verdict"]["effects"]) {
-        answer.text += &format!("\nTo fit it along with tilts and forms: {command}\n");
+        answer.text += &format!(
+            "\nFor the answer with it, and its uncertainty, fit it along with tilts and forms: {command}\n"
+        );
         if let Value::Object(object) = &mut answer.json {
             object.insert("fit_with".to_owned(), command.into());
         }

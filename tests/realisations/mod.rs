@@ -101,7 +101,7 @@ impl World {
             forms,
             lines: [0.0; 3],
             span: 1.0,
-            alternating: seed % 2 == 0,
+            alternating: seed.is_multiple_of(2),
             white,
             correlated: if seed % 4 < 2 { 0.0 } else { 0.7 * white },
         };

@@ -11,8 +11,11 @@ use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 /// + 0 for all repeats, or + the place of the repeat.
 pub(super) struct LocalContamination;
 
+/// Height of a bump of one over the distance from its middle in widths, and what it is called.
+type Section = (fn(f64) -> f64, &'static str);
+
 /// Sections of unit height, by the distance from the middle in widths, and their names.
-const SECTIONS: [(fn(f64) -> f64, &str); 3] = [
+const SECTIONS: [Section; 3] = [
     (|away| (-0.5 * away * away).exp(), "Gaussian"),
     (|away| (-0.5 * away.powi(8)).exp(), "flat-topped"),
     (|away| (1.0 - 0.45 * away.abs()).max(0.0), "triangular"),

@@ -203,3 +203,44 @@ fn a_fault_of_the_setup_has_a_remedy_of_its_own() {
         bad_input(&folder, &["plan", "p.toml"], &[told, "p.toml:"]);
     }
 }
+
+/// A machine whose prediction overflows when it is squared is refused before it is diagnosed: the
+/// probabilities ended the program, or it had no end.
+#[test]
+fn a_prediction_out_of_reach_is_not_diagnosed() {
+    let mut parts = "part,point,axis,replicate,value\n".to_owned();
+    for part in 1..4 {
+        for point in 1..4 {
+            for axis in ["x", "y"] {
+                for replicate in 1..3 {
+                    let value = 0.3 * f64::from(part * point + replicate);
+                    parts += &format!("{part},{point},{axis},{replicate},{value}\n");
+                }
+            }
+        }
+    }
+    let points = "point,x,y,z\n1,10,10,0\n2,28,10,0\n3,60,30,5\n";
+    for huge in ["-1e308", "1e200"] {
+        let machine = format!(
+            "chain = \"XYFZ\"\n[errors.EXX]\npolynomial = [0.1, -0.02]\nstd = 1.0\n[errors.EYX]\nvalue = {huge}\nstd = 1.2\n"
+        );
+        let files = [
+            ("m.toml", machine.as_str()),
+            ("parts.csv", parts.as_str()),
+            ("p.csv", points),
+        ];
+        let folder = Folder::with(&files);
+        bad_input(
+            &folder,
+            &[
+                "diagnose",
+                "parts.csv",
+                "--setup",
+                "m.toml",
+                "--points",
+                "p.csv",
+            ],
+            &["parts.csv", "less what the model makes of it", "help: "],
+        );
+    }
+}

@@ -138,9 +138,17 @@ pub(super) fn within_reach_of<M: FittedModel>(
     along: &str,
     file: &Path,
 ) -> Result<(), Message> {
-    for (reading, place) in model.observed().iter().zip(model.places()) {
+    let left = model.linearised();
+    let readings = model.observed().iter().zip(left.iter());
+    for ((reading, left), place) in readings.zip(model.places()) {
         let at = format!("{along} = {:e}", place.x);
         within_reach_in("a reading", *reading, &at, file)?;
+        within_reach_in(
+            "a reading less what the model makes of it",
+            *left,
+            &at,
+            file,
+        )?;
         within_reach_in("a position", place.x, &at, file)?;
         within_reach_in("a time", place.time, &at, file)?;
     }

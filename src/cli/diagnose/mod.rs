@@ -17,7 +17,7 @@ pub(super) mod words;
 
 use std::path::{Path, PathBuf};
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{FittedModel, Place};
 
 use super::{Answer, CommonArgs};
 use crate::io::Message;
@@ -138,19 +138,15 @@ pub(super) fn within_reach_of<M: FittedModel>(
     along: &str,
     file: &Path,
 ) -> Result<(), Message> {
-    let left = model.linearised();
-    let readings = model.observed().iter().zip(left.iter());
-    for ((reading, left), place) in readings.zip(model.places()) {
-        let at = format!("{along} = {:e}", place.x);
-        within_reach_in("a reading", *reading, &at, file)?;
-        within_reach_in(
-            "a reading less what the model makes of it",
-            *left,
-            &at,
-            file,
-        )?;
-        within_reach_in("a position", place.x, &at, file)?;
-        within_reach_in("a time", place.time, &at, file)?;
+    let at = |place: &Place| format!("{along} = {:e}", place.x);
+    for (reading, place) in model.observed().iter().zip(model.places()) {
+        within_reach_in("a reading", *reading, &at(place), file)?;
+        within_reach_in("a position", place.x, &at(place), file)?;
+        within_reach_in("a time", place.time, &at(place), file)?;
+    }
+    for (left, place) in model.linearised().iter().zip(model.places()) {
+        let what = "a reading less what the model makes of it";
+        within_reach_in(what, *left, &at(place), file)?;
     }
     Ok(())
 }

@@ -142,7 +142,7 @@ impl Planned {
 }
 
 /// Most readings of a plan.
-const MOST_READINGS: usize = 100_000;
+const MOST_READINGS: usize = 20_000;
 
 /// Biases below this, rad, are rounding.
 const NO_BIAS: f64 = 1e-12;

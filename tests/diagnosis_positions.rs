@@ -184,6 +184,32 @@ fn a_taper_and_a_jump_are_named_on_any_positions() {
     }
 }
 
+/// A noise that is stated is that of one reading, and gathered readings have less: a cone that shows only
+/// in the means of a hundred readings is named.
+#[test]
+fn stated_noise_is_that_of_one_reading() {
+    let readings = campaign(long, Put::Taper(2e-8), 15);
+    let stated = Assumptions {
+        noise: Some(NOISE),
+        ..Assumptions::default()
+    };
+    let model = FirstOrder::new(&readings, stated).unwrap();
+    let each = model.gathered.as_ref().unwrap().readings_per_cell;
+    assert!(each > 10.0, "{each}");
+    let diagnosis = diagnose(&model, &Options::default());
+    // Rounding of the square root.
+    assert!((diagnosis.noise.white * each.sqrt() / NOISE - 1.0).abs() < 1e-12);
+    assert!(
+        diagnosis
+            .verdict
+            .causes()
+            .iter()
+            .any(|group| group.contains(&"taper")),
+        "{}",
+        diagnosis.verdict.statement
+    );
+}
+
 /// A trace that covers a corner of the travel only is left out where others of its channel remain;
 /// where none does, the message says so.
 #[test]

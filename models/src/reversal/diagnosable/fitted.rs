@@ -164,7 +164,9 @@ impl FittedModel for FirstOrder {
     }
 
     fn stated_noise(&self) -> Option<f64> {
-        self.assumptions.noise
+        // That of one reading: what is gathered is a mean of so many.
+        let readings = self.gathered.as_ref().map_or(1.0, |g| g.readings_per_cell);
+        self.assumptions.noise.map(|noise| noise / readings.sqrt())
     }
 
     fn refit(&self, observed: DVector<f64>) -> Self {

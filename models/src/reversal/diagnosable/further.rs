@@ -1,6 +1,6 @@
 //! Measurements that could be made beside the present one.
 
-use super::FirstOrder;
+use super::{FirstOrder, Gathered};
 use crate::reversal::{Direction, Observations, Reading};
 
 /// Further tilt of the artefact, µm/mm.
@@ -27,7 +27,10 @@ impl FirstOrder {
             });
             change(k, &mut readings);
         }
-        Self::new(&Observations { readings }, self.assumptions).ok()
+        let mut model = Self::new(&Observations { readings }, self.assumptions).ok()?;
+        // Each of its readings is the mean of as many; the moments of these are not planned.
+        model.gathered = self.gathered.clone().map(Gathered::planned);
+        Some(model)
     }
 
     /// Further measurements that a shop can make, in words and as the model fitted to each.

@@ -36,6 +36,16 @@ pub struct Gathered {
     pub(super) spans: Vec<f64>,
 }
 
+impl Gathered {
+    /// The same of a measurement that is not made yet.
+    pub(super) fn planned(self) -> Self {
+        Self {
+            spans: Vec::new(),
+            ..self
+        }
+    }
+}
+
 /// Traces of readings: indices in the order of the file.
 pub(super) type Traces = BTreeMap<TraceKey, Vec<usize>>;
 
@@ -166,10 +176,15 @@ fn drop_short(traces: &mut Traces, readings: &[Reading]) {
         .map(|(_, key)| key)
         .filter(|key| longest.get(&key.0) != Some(key))
         .collect();
+    // Which is dropped first; the longest never are.
+    let turn: BTreeMap<&TraceKey, usize> = spare.iter().zip(0..).collect();
+    let turned: Vec<(usize, &Vec<usize>)> = traces
+        .iter()
+        .map(|(key, rows)| (turn.get(key).copied().unwrap_or(usize::MAX), rows))
+        .collect();
     let kept = |dropped: usize| -> usize {
-        let stays = |key: &TraceKey| !spare[..dropped].contains(key);
-        let others = || traces.iter().filter(|(key, _)| stays(key));
-        let (low, high) = common(others().map(|(_, rows)| rows), readings);
+        let others = || turned.iter().filter(|(turn, _)| *turn >= dropped);
+        let (low, high) = common(others().map(|(_, rows)| *rows), readings);
         others()
             .map(|(_, rows)| within(rows, readings, low, high).len())
             .sum()

@@ -62,6 +62,11 @@ fn effects_as_machines_have_them_are_named() {
         ("lateral-backlash", 1),
         ("ambient-cycle", 1),
         ("off-crest", 0),
+        ("indicator-nonlinearity", 4),
+        ("lateral-backlash", 4),
+        ("lateral-backlash", 5),
+        ("off-crest", 4),
+        ("axis-backlash", 1),
     ];
     let told: Vec<String> = cases
         .par_iter()

@@ -4,7 +4,7 @@ use std::path::Path;
 
 /// In the order in which they work; what is on one level may not know each other either.
 const ORDER: [&[&str]; 6] = [
-    &["search", "options"],
+    &["search", "options", "levels"],
     &["noise"],
     &["detection"],
     &["attribution"],

@@ -65,6 +65,14 @@ const CASES: &[Case] = &[
         let channel = Channel::ALL[r.random_range(0..4)];
         Fault::Bump(signed(r, 0.3, 0.8), place, width, channel, r.random())
     }),
+    ("off-crest", |_, r| {
+        // The product of both obliquities is what shows: 0.1 to 0.5 µm at the ends of the travel.
+        let (radius, slide) = (
+            10.0 + 30.0 * r.random::<f64>(),
+            0.05 + 0.2 * r.random::<f64>(),
+        );
+        Fault::Askew(radius, slide, 1e-3 * signed(r, 0.1, 0.5) * radius / slide)
+    }),
     ("thickness-shift", |_, r| {
         Fault::Thicker(signed(r, 10.0, 40.0).abs())
     }),
@@ -233,5 +241,11 @@ fn truths(
         }
         Fault::Shift(shift) => vec![("shift", shift)],
         Fault::Thicker(more) => vec![("thickness", more)],
+        Fault::Askew(radius, slide, bar) => {
+            vec![
+                ("loss", 1e3 * slide * bar / radius),
+                ("loss-along-line", 0.0),
+            ]
+        }
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
-use super::common::Format;
+use super::common::{CommonArgs, Format};
 use crate::io::provenance::Provenance;
 use crate::io::{CsvTable, Message, OutFolder, Status, printable};
 use crate::report::{self, Page};
@@ -35,12 +35,13 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Writes the folder, if one was asked for, then prints.
+    /// Writes the folder, if one was asked for, then prints, unless told to be quiet.
     pub(super) fn deliver(
         self,
-        format: Format,
+        common: &CommonArgs,
         folder: Option<OutFolder>,
     ) -> Result<Status, Message> {
+        let format = common.format;
         let Self {
             text,
             mut json,
@@ -96,6 +97,7 @@ impl Answer {
             folder.finish(&inputs)?;
         }
         match format {
+            _ if common.quiet => {}
             Format::Text => print(&printable::lines(&(text + &written)))?,
             Format::Json => print(&result)?,
         }
@@ -112,7 +114,7 @@ fn unwritable(error: serde_json::Error) -> Message {
 }
 
 /// Prints to standard output. A reader that has heard enough and closed it is no error.
-fn print(text: &str) -> Result<(), Message> {
+pub(super) fn print(text: &str) -> Result<(), Message> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Message::bad_input(format!(

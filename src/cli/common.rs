@@ -28,6 +28,9 @@ pub struct CommonArgs {
     /// Let --out replace files that errsep did not write, or that it has just read.
     #[arg(long, requires = "out")]
     pub force: bool,
+    /// Print nothing: the folder and the exit status are the answer. Errors are told all the same.
+    #[arg(long, short, requires = "out")]
+    pub quiet: bool,
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,

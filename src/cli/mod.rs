@@ -4,10 +4,12 @@ pub mod anova;
 mod answer;
 pub mod circle;
 mod common;
+pub mod completions;
 pub mod diagnose;
 pub mod four_sensor;
 pub mod fourier;
 pub mod machine;
+pub mod man;
 pub mod plan;
 mod quantity;
 pub mod reversal;
@@ -41,10 +43,12 @@ pub struct Cli {
 enum Command {
     Anova(anova::Args),
     Circle(circle::Args),
+    Completions(completions::Args),
     Diagnose(diagnose::Args),
     FourSensor(four_sensor::Args),
     Fourier(fourier::Args),
     Machine(machine::Args),
+    Man(man::Args),
     Plan(plan::Args),
     Reversal(reversal::Args),
     Simulate(simulate::Args),
@@ -79,10 +83,12 @@ impl Cli {
         let outcome = match &self.command {
             Command::Anova(args) => answered(&args.common, || anova::run(args)),
             Command::Circle(args) => answered(&args.common, || circle::run(args)),
+            Command::Completions(args) => completions::run(args),
             Command::Diagnose(args) => answered(&args.common, || diagnose::run(args)),
             Command::FourSensor(args) => answered(&args.common, || four_sensor::run(args)),
             Command::Fourier(args) => answered(&args.common, || fourier::run(args)),
             Command::Machine(args) => answered(args.common(), || machine::run(args)),
+            Command::Man(args) => man::run(args),
             Command::Plan(args) => answered(&args.common, || plan::run(args)),
             Command::Reversal(args) => answered(&args.common, || reversal::run(args)),
             Command::Simulate(args) => answered(args.common(), || simulate::run(args)),
@@ -109,5 +115,5 @@ fn answered(
         .map(|place| OutFolder::reserve(place, common.force))
         .transpose()?;
     begin_record(folder.is_some() || common.format == Format::Json);
-    work()?.deliver(common.format, folder)
+    work()?.deliver(common, folder)
 }

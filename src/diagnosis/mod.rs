@@ -7,6 +7,7 @@
 mod attribution;
 mod catalogue;
 mod detection;
+mod levels;
 mod noise;
 mod options;
 mod planning;

@@ -13,18 +13,18 @@ use rand_distr::{Distribution, StandardNormal};
 /// The ways in which each effect is made.
 pub const REALISATIONS: &[(&str, usize)] = &[
     ("thermal-drift", 4),
-    ("indicator-nonlinearity", 4),
+    ("indicator-nonlinearity", 5),
     ("zero-jump", 4),
     ("cyclic-error", 5),
     ("local-contamination", 5),
     ("hysteresis", 4),
-    ("lateral-backlash", 4),
+    ("lateral-backlash", 6),
     ("ambient-cycle", 4),
     ("stick-slip", 4),
-    ("off-crest", 4),
+    ("off-crest", 5),
     ("taper", 1),
     ("gain-mismatch", 2),
-    ("axis-backlash", 1),
+    ("axis-backlash", 2),
     ("reversal-shift", 1),
 ];
 
@@ -247,6 +247,7 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
                     0 if own => 1e-2 * seen * seen,
                     1 if own => 1e-3 * seen.powi(3),
                     2 => 1e-2 * seen * seen * if own { 1.0 } else { -0.4 },
+                    4 if own => 1e-2 * seen * seen + 1.5e-3 * seen.powi(3),
                     // A lever turning about its pin: reading = r sin, arc against chord.
                     3 if own => 1.5e-3 * (500.0 * (seen / 50.0).sin() - 10.0 * seen),
                     _ => 0.0,
@@ -341,10 +342,20 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
             })
         }
         ("lateral-backlash", _) => {
-            let yaw = [0.0, 0.5, -1.0, 0.0][way];
-            let level = [1.0, 1.0, 0.3, -1.0][way];
+            let yaw = [0.0, 0.5, -1.0, 0.0, 0.3, 0.0][way];
+            let level = [1.0, 1.0, 0.3, -1.0, 0.4, 1.0][way];
+            let (bend, phase) = (uniform(2.0, 5.0), uniform(0.0, TAU));
+            let way_to_lean = uniform(0.1, 0.3);
             Box::new(move |w, n| {
-                plain(w, n) + 0.5 * size * n.towards() * n.direction * (level + yaw * n.part)
+                let own = match way {
+                    // Both lines have forms of their own.
+                    4 => (bend * n.part + phase).sin(),
+                    // The slide leans over after it has turned round.
+                    5 => -2.0 * (-(1.0 + n.direction * n.part) / way_to_lean).exp(),
+                    _ => 0.0,
+                };
+                let lines = level + yaw * n.part + own;
+                plain(w, n) + 0.5 * size * n.towards() * n.direction * lines
             })
         }
         ("ambient-cycle", _) => {
@@ -377,9 +388,12 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
         }
         // The stylus leaves the crest sideways as slide and bar are askew: what it loses is a circle's.
         ("off-crest", _) => {
-            let (slide, bar) = ([0.3, 0.5, -0.4, 0.6][way], [0.5, 0.3, 0.4, -0.3][way]);
+            let slide = [0.3, 0.5, -0.4, 0.6, 0.5][way];
+            let bar = [0.5, 0.3, 0.4, -0.3, 0.6][way];
+            // The indicators stand beside the crest at mid travel too.
+            let beside = [[0.0, 0.0], [0.8, -0.3]][usize::from(way == 4)];
             Box::new(move |w, n| {
-                let sideways = n.part * (slide + n.spindle * bar);
+                let sideways = beside[n.indicator] + n.part * (slide + n.spindle * bar);
                 // mm, over a radius of 20 mm.
                 let lost = 20.0 - (400.0 - sideways * sideways).sqrt();
                 plain(w, n) - size * 1e3 * lost
@@ -401,7 +415,9 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
             }
         }),
         ("axis-backlash", _) => Box::new(move |w, n| {
-            let at = n.x - 50.0 * size * n.direction;
+            // A screw that is worn at one end loses more there.
+            let worn = if way == 1 { 1.0 + 0.7 * n.part } else { 1.0 };
+            let at = n.x - 50.0 * size * worn * n.direction;
             w.seen(n, at, at)
         }),
         ("reversal-shift", _) => Box::new(move |w, n| {

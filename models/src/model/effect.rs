@@ -232,22 +232,30 @@ pub trait Effect<M>: Send + Sync {
         amplitudes: &[f64],
         covariance: &DMatrix<f64>,
     ) -> Vec<Estimate> {
+        let parameters = self.amplitudes_at(shape).into_iter();
         let values = amplitudes.iter().chain(&shape.values);
-        let names = self
-            .amplitudes_at(shape)
-            .into_iter()
-            .chain(self.shape_parameters());
-        values
-            .zip(names)
-            .enumerate()
-            .map(|(k, (&value, parameter))| Estimate {
-                name: parameter.name.to_owned(),
-                value,
-                std: covariance
-                    .get((k, k))
-                    .map_or(f64::NAN, |v| v.clamp(0.0, f64::INFINITY).sqrt()),
-                unit: parameter.unit.to_owned(),
-            })
-            .collect()
+        each(
+            parameters.chain(self.shape_parameters()),
+            values,
+            covariance,
+        )
     }
+}
+
+/// Parameters as they stand, each with its standard uncertainty.
+pub(crate) fn each<'v>(
+    parameters: impl Iterator<Item = Parameter>,
+    values: impl Iterator<Item = &'v f64>,
+    covariance: &DMatrix<f64>,
+) -> Vec<Estimate> {
+    let variance = |k: usize| covariance.get((k, k)).copied().unwrap_or(f64::NAN);
+    let named = parameters.zip(values).enumerate();
+    named
+        .map(|(k, (parameter, &value))| Estimate {
+            name: parameter.name.to_owned(),
+            value,
+            std: variance(k).clamp(0.0, f64::INFINITY).sqrt(),
+            unit: parameter.unit.to_owned(),
+        })
+        .collect()
 }

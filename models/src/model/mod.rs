@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+pub(crate) use effect::each;
 pub use effect::{About, Effect, Estimate, Link, Parameter, Shape};
 
 /// The circumstances of one reading.

@@ -95,6 +95,8 @@ pub enum Fault {
     Shift(f64),
     /// Thickness beyond what is known, mm.
     Thicker(f64),
+    /// A round bar: radius, mm; obliquity of slide and bar across the plane, mm over half the travel.
+    Askew(f64, f64, f64),
 }
 
 /// A machine, an artefact and a plan of measurement.
@@ -189,7 +191,21 @@ impl Machine {
                 })
                 .sum()
         };
-        let surface = |u: f64| (side.at(u - axial) + dirt(u)) / 1000.0;
+        // What is lost beside the crest of a round bar, less what both spindle positions lose.
+        let lost = |u: f64| -> f64 {
+            let of = |fault: &Fault| match *fault {
+                Fault::Askew(radius, slide, bar) => {
+                    let depth = |turned: f64| {
+                        let beside = (slide + turned * bar) * (u - 150.0) / 150.0;
+                        radius - (radius * radius - beside * beside).sqrt()
+                    };
+                    1000.0 * (depth(first) - (depth(1.0) + depth(-1.0)) / 2.0)
+                }
+                _ => 0.0,
+            };
+            faults.iter().map(of).sum()
+        };
+        let surface = |u: f64| (side.at(u - axial) + dirt(u) - lost(u)) / 1000.0;
         // The point of the artefact's axis below the stylus, by iteration: it contracts by the form's slope
         // times the tilt.
         let mut u = slide;

@@ -115,6 +115,12 @@ fn what_stands_elsewhere_is_found_with_the_tilts() {
         "reversal-shift",
         &[("shift", 3.0)],
     );
+    is_right(
+        &machine,
+        &[Fault::Askew(20.0, 0.15, 0.04)],
+        "off-crest",
+        &[("loss", 0.3), ("loss-along-line", 0.0)],
+    );
 }
 
 /// It shows where the two channels of a side are tilted differently, by α or β; large tilts move the

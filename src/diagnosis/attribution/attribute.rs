@@ -5,18 +5,13 @@
 
 use errsep_models::model::FittedModel;
 use nalgebra::DVector;
+use rayon::prelude::*;
 
-use crate::diagnosis::attribution::confidence::{
-    Answer, EARNED, HOPELESS, confidence_set, possible, without,
+use crate::diagnosis::attribution::confidence::{Answer, confidence_set, possible, without};
+use crate::diagnosis::attribution::context::{Cause, Context, Remainder, finer};
+use crate::diagnosis::levels::{
+    BETTER, EARNED, HOPELESS, MOST_CAUSES, PAIR_REACH, PAIRS, POLISHED, REFINED,
 };
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder, adequate, finer};
-
-/// A swap must raise the statistic by more than what searches leave open.
-const BETTER: f64 = 0.01;
-/// Number of pairs that are fitted with everything else free.
-const PAIRS: usize = 3;
-/// Greatest number of effects in one verdict.
-const MOST: usize = 3;
 
 /// Seeks the causes of what stands out in readings.
 pub(in crate::diagnosis) fn attribute<M: FittedModel>(
@@ -26,7 +21,7 @@ pub(in crate::diagnosis) fn attribute<M: FittedModel>(
 ) -> Option<Answer> {
     let mut causes: Vec<Cause> = Vec::new();
     let mut partial: Option<Answer> = None;
-    for size in 1..=MOST {
+    for size in 1..=MOST_CAUSES {
         let here = partial.as_ref().map_or(first, |answer| &answer.remainder);
         let Some(next) = strongest(context, readings, here, &causes) else {
             break;
@@ -68,7 +63,7 @@ pub(in crate::diagnosis) fn roughly<M: FittedModel>(
 ) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     let mut left: Option<Remainder> = None;
-    for _ in 0..MOST {
+    for _ in 0..MOST_CAUSES {
         let here = left.as_ref().unwrap_or(first);
         let Some(next) = strongest(context, readings, here, &causes) else {
             break;
@@ -79,7 +74,7 @@ pub(in crate::diagnosis) fn roughly<M: FittedModel>(
         }
         causes = context.relinearised(readings, &causes, f64::INFINITY);
         let remainder = context.judged(readings, &causes);
-        if adequate(&causes, &remainder) {
+        if context.adequate(&causes, &remainder) {
             break;
         }
         left = Some(remainder);
@@ -94,10 +89,10 @@ fn pairs<M: FittedModel>(
     readings: &DVector<f64>,
     first: &Remainder,
 ) -> Vec<Vec<Cause>> {
-    let mut found: Vec<(f64, Vec<Cause>)> = Vec::new();
-    for effect in 0..context.catalogue.len() {
+    let beside_each = |effect: usize| {
+        let mut found: Vec<(f64, Vec<Cause>)> = Vec::new();
         let Some(start) = context.start(first, effect) else {
-            continue;
+            return found;
         };
         let one = vec![context.cause(context.model, effect, start.clone())];
         let beside = context.remainder(readings, &one);
@@ -112,13 +107,16 @@ fn pairs<M: FittedModel>(
             let pair = vec![one[0].clone(), second];
             found.push((context.misfit(readings, &pair), pair));
         }
-    }
+        found
+    };
+    let effects = (0..context.catalogue.len()).into_par_iter();
+    let mut found: Vec<(f64, Vec<Cause>)> = effects.flat_map_iter(beside_each).collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     // Coarse fits further above the best than this cannot become the best by refining.
-    let reach = found.first().map_or(0.0, |(least, _)| 1.3 * least);
+    let reach = found.first().map_or(0.0, |(least, _)| PAIR_REACH * least);
     found.retain(|(misfit, _)| *misfit <= reach);
     found.truncate(PAIRS);
-    let polished = found.into_iter().map(|(_, mut pair)| {
+    let polished = found.into_par_iter().map(|(_, mut pair)| {
         polish(context, readings, &mut pair);
         pair
     });
@@ -137,18 +135,20 @@ fn strongest<M: FittedModel>(
         .filter(|effect| context.p_value(remainder, *effect) < EARNED)
         .filter_map(|effect| {
             let family = context.family_of(effect)?;
-            Some((remainder.best[family].0, effect))
+            Some((context.best(remainder, family).0, effect))
         })
         .collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranked.truncate(REFINED);
     ranked
-        .into_iter()
-        .take(5)
+        .into_par_iter()
         .filter_map(|(_, effect)| {
             let start = context.start(remainder, effect)?;
             let (cause, t) = context.refine(context.model, readings, effect, start, causes);
             possible(context, readings, causes, &cause).then_some((cause, t))
         })
+        .collect::<Vec<_>>()
+        .into_iter()
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(cause, _)| cause)
 }
@@ -156,7 +156,7 @@ fn strongest<M: FittedModel>(
 /// Refines each cause beside the others, and swaps it for any effect that explains more, itself
 /// begun elsewhere among them.
 fn polish<M: FittedModel>(context: &Context<'_, M>, readings: &DVector<f64>, causes: &mut [Cause]) {
-    for _ in 0..3 {
+    for _ in 0..POLISHED {
         let mut changed = false;
         for k in 0..causes.len() {
             let others = without(causes, k);

@@ -10,10 +10,7 @@ use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
 use crate::diagnosis::attribution::reported::{Candidate, Elsewhere};
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::detection::dictionary::statistic;
-
-/// Variants of a cause whose misfits are above the best by less are as likely: χ² of two unknowns,
-/// 95 %.
-const AS_LIKELY: f64 = 5.99;
+use crate::diagnosis::levels::chi_squared_of_two;
 
 /// What each effect explains, by that. `groups` are those of the causes, where they are named.
 pub(in crate::diagnosis) fn candidates<M: FittedModel>(
@@ -135,7 +132,7 @@ fn elsewhere<M: FittedModel>(
         }
         let mut trial = others.clone();
         trial.push(other);
-        if context.misfit(readings, &trial) > least + AS_LIKELY {
+        if context.misfit(readings, &trial) > least + chi_squared_of_two(0.95) {
             return None;
         }
         let sizes = Sizes::fitted_with_state(context, readings, &trial)?;

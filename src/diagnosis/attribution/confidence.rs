@@ -6,30 +6,17 @@
 
 use errsep_models::model::{FittedModel, Shape};
 use nalgebra::DVector;
+use rayon::prelude::*;
 
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder, adequate, raw_signatures};
+use crate::diagnosis::attribution::context::{Cause, Context, Remainder, raw_signatures};
 use crate::diagnosis::attribution::shrink::held_out_square;
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::detection::space::{Space, orthonormal};
+use crate::diagnosis::levels::{
+    EARNED, EQUAL_EVIDENCE, HOPELESS, HOPELESS_PART, NEAR, OUTDONE, STANDS, WEIGHTY,
+    chi_squared_of_two,
+};
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
-
-/// A further cause must stand out beside the others at this level.
-pub(in crate::diagnosis) const EARNED: f64 = 0.002;
-/// A cause whose statistic is this much below the best cannot be adequate.
-pub(in crate::diagnosis) const HOPELESS: f64 = 80.0;
-/// Part of the strongest cause's change, squared, that a further one must reach. What is less may be
-/// the remainder of a cause taken for another whose signature is off by a seventh of its size.
-const WEIGHTY: f64 = 0.02;
-/// Causes whose misfits differ by less fit equally well: beside others the one of more usual size is
-/// kept.
-const TIED: f64 = 9.2;
-/// A relative of a cause that explains less than this part of what it does cannot stand for it.
-const NEAR: f64 = 0.7;
-/// A size counts from this many of its standard uncertainties on: that of the only cause, and those of
-/// several, which may imitate what another leaves.
-const STANDS: [f64; 2] = [1.0, 2.0];
-/// Evidence that differs by less is equal: of exact aliases the one of more usual size goes first.
-const EQUAL: f64 = 1e-3;
 
 /// An effect that explains the gap in the place of one of the causes.
 pub(in crate::diagnosis) struct Alternative {
@@ -101,7 +88,7 @@ pub(in crate::diagnosis) fn confidence_set<M: FittedModel>(
             })
             && predicts(context, readings, &best);
     Answer {
-        complete: needed && adequate(&best, &remainder) && sized(context, readings, &best),
+        complete: needed && context.adequate(&best, &remainder) && sized(context, readings, &best),
         causes: best,
         groups,
         remainder,
@@ -198,11 +185,10 @@ fn alternatives<M: FittedModel>(
         remainder.residual.norm_squared() - context.misfit(readings, &all)
     };
     let own = strength(&best[k]);
-    let least = context.misfit(readings, best) + HOPELESS + 0.1 * own;
-    let mut members = Vec::new();
-    for effect in 0..context.catalogue.len() {
+    let least = context.misfit(readings, best) + HOPELESS + HOPELESS_PART * own;
+    let best_of = |effect: usize| -> Option<Member> {
         if others.iter().any(|c| c.effect == effect) {
-            continue;
+            return None;
         }
         let trials = if effect == best[k].effect {
             // Relatives that a state bent by the first may hide.
@@ -218,7 +204,7 @@ fn alternatives<M: FittedModel>(
             own
         } else {
             if context.p_value(&remainder, effect) > EARNED {
-                continue;
+                return None;
             }
             let start = context.start(&remainder, effect);
             vec![start.map(|start| {
@@ -228,7 +214,7 @@ fn alternatives<M: FittedModel>(
             })]
         };
         let judged = trials.into_iter().flatten().filter_map(|cause| {
-            if strength(&cause) < own - HOPELESS - 0.1 * own
+            if strength(&cause) < own - HOPELESS - HOPELESS_PART * own
                 || !possible(context, readings, &others, &cause)
             {
                 return None;
@@ -243,7 +229,7 @@ fn alternatives<M: FittedModel>(
             };
             let left = context.judged(readings, &trial);
             let misfit = left.residual.norm_squared();
-            let passes = adequate(&trial, &left)
+            let passes = context.adequate(&trial, &left)
                 && Sizes::fitted(context, readings, &trial)
                     .is_some_and(|sizes| stands(context, &trial, &sizes, k));
             passes.then(|| Member {
@@ -254,14 +240,29 @@ fn alternatives<M: FittedModel>(
                 left,
             })
         });
-        members.extend(judged.max_by(|a, b| a.evidence.total_cmp(&b.evidence)));
+        judged.max_by(|a, b| a.evidence.total_cmp(&b.evidence))
+    };
+    let effects = (0..context.catalogue.len()).into_par_iter();
+    let mut members: Vec<Member> = effects.filter_map(best_of).collect();
+    let known = |m: &Member| (m.evidence, m.causes[k].unknowns());
+    let leader = members.iter().map(known);
+    if let Some((most, fewest)) = leader.max_by(|a, b| a.0.total_cmp(&b.0)) {
+        // What a search of relatives has freed beyond the dictionary must pay for it.
+        let freed = |m: &Member| {
+            let order = context
+                .family_of(m.causes[k].effect)
+                .map(|f| context.order_of(f));
+            order.is_some_and(|order| m.causes[k].columns.len() > order)
+        };
+        members.retain(|m| known(m).1 <= fewest || !freed(m) || m.evidence > most - OUTDONE);
     }
     let least = members
         .iter()
         .map(|m| m.misfit)
         .fold(f64::INFINITY, f64::min);
     members.sort_by(|a, b| {
-        let behind = |m: &Member| m.misfit > least + TIED;
+        // Of those that fit equally well beside others the one of more usual size is kept.
+        let behind = |m: &Member| m.misfit > least + chi_squared_of_two(0.99);
         let by_fit = a.misfit.total_cmp(&b.misfit);
         let by_size = a.size.total_cmp(&b.size);
         behind(a).cmp(&behind(b)).then(if behind(a) {
@@ -283,7 +284,7 @@ fn led_by_evidence<M: FittedModel>(
     remainder: &mut Remainder,
 ) {
     for group in groups.iter_mut() {
-        let rounded = |a: &Alternative| (a.evidence / EQUAL).round();
+        let rounded = |a: &Alternative| (a.evidence / EQUAL_EVIDENCE).round();
         group.sort_by(|a, b| rounded(b).total_cmp(&rounded(a)));
     }
     let leaders: Vec<Cause> = best
@@ -303,7 +304,7 @@ fn led_by_evidence<M: FittedModel>(
     if distinct {
         let trial = context.relinearised(readings, &leaders, f64::INFINITY);
         let left = context.judged(readings, &trial);
-        if adequate(&trial, &left) && context.amplitudes(readings, &trial).is_some() {
+        if context.adequate(&trial, &left) && context.amplitudes(readings, &trial).is_some() {
             (*best, *remainder) = (trial, left);
             return;
         }

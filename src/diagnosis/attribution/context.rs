@@ -1,6 +1,6 @@
 //! The workbench of one pass: state of the model, noise, space, dictionary and their null law.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use errsep_models::model::{Column, Effect, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector};
@@ -14,20 +14,11 @@ use crate::diagnosis::detection::dictionary::{
 use crate::diagnosis::detection::folding::Sums;
 use crate::diagnosis::detection::null::NullLaw;
 use crate::diagnosis::detection::space::{Space, orthonormal};
+use crate::diagnosis::levels::{ADEQUATE, FAR, SEPARABLE, SLACK};
 use crate::diagnosis::noise::law::NoiseLaw;
 
-/// Beside other causes a signature must keep this part of its visible length to be told apart.
-const SEPARABLE: f64 = 0.02;
-
-/// A set of one, two, three causes whose remainder is less probable than this is not adequate:
-/// three imitate freely what none of them is.
-const ADEQUATE: [f64; 3] = [0.001, 0.001, 0.01];
-
-/// Standard deviations of chi-squared beyond which no doubt about the state excuses a remainder.
-const FAR: f64 = 6.0;
-
-/// Part of a plausible range by which an uncertain size may lie outside it.
-const SLACK: f64 = 0.1;
+/// Vectors that signatures are multiplied with at once.
+const WIDTH: usize = 8;
 
 /// Everything that is fixed while causes are sought.
 pub(in crate::diagnosis) struct Context<'a, M: FittedModel> {
@@ -58,10 +49,12 @@ impl Cause {
 /// What remains beside some causes.
 pub(in crate::diagnosis) struct Remainder {
     pub residual: DVector<f64>,
-    /// Greatest score of each family and the entry where it is.
-    pub best: Vec<(f64, Option<usize>)>,
-    /// Probability that any family stands out as much.
-    pub global: f64,
+    /// The residual as it is trusted, then the directions that are not looked along, as signatures see
+    /// them.
+    seen: Vec<Sums<f64, WIDTH>>,
+    directions: usize,
+    /// Greatest score of each family and the entry where it is, once it has been asked for.
+    best: Vec<OnceLock<(f64, Option<usize>)>>,
 }
 
 impl<'a, M: FittedModel> Context<'a, M> {
@@ -142,7 +135,7 @@ impl<'a, M: FittedModel> Context<'a, M> {
         let plain = self.remainder(readings, causes);
         let freedom = self.space.degrees_of_freedom() as f64;
         let far = plain.residual.norm_squared() > freedom + FAR * (2.0 * freedom).sqrt();
-        if causes.is_empty() || adequate(causes, &plain) || far {
+        if causes.is_empty() || far || self.adequate(causes, &plain) {
             return plain;
         }
         let basis = span(causes, self.space.readings());
@@ -156,9 +149,65 @@ impl<'a, M: FittedModel> Context<'a, M> {
     /// Probability that as much would stand out with nothing there: in any effect, at any place or
     /// in the misfit as a whole.
     pub fn detection(&self, first: &Remainder) -> f64 {
-        let surprises: Vec<f64> = first.best.iter().map(|(s, _)| *s).collect();
         self.null
-            .detection(&surprises, first.residual.norm_squared())
+            .detection(&self.surprises(first), first.residual.norm_squared())
+    }
+
+    /// Probability that any family would stand out as much with nothing else there.
+    pub fn global(&self, remainder: &Remainder) -> f64 {
+        self.null.global(&self.surprises(remainder))
+    }
+
+    /// Whether causes leave nothing that stands out.
+    pub fn adequate(&self, causes: &[Cause], left: &Remainder) -> bool {
+        let least = ADEQUATE[causes.len().clamp(1, ADEQUATE.len()) - 1];
+        let families = 0..self.dictionary.families.len();
+        // The probability of all falls with that of each.
+        families
+            .into_iter()
+            .all(|k| self.null.global_of(k, self.best(left, k).0) > least)
+    }
+
+    /// Greatest score of a family beside what the remainder is beside, and the entry where it is.
+    pub fn best(&self, remainder: &Remainder, family: usize) -> (f64, Option<usize>) {
+        *remainder.best[family].get_or_init(|| self.greatest(remainder, family))
+    }
+
+    fn surprises(&self, remainder: &Remainder) -> Vec<f64> {
+        let families = 0..self.dictionary.families.len();
+        families.map(|k| self.best(remainder, k).0).collect()
+    }
+
+    fn greatest(&self, remainder: &Remainder, family: usize) -> (f64, Option<usize>) {
+        let range = self.dictionary.families[family].entries.clone();
+        let surprise_of = |k: usize| (self.surprise(&self.dictionary.entries[k], remainder), k);
+        range
+            .into_par_iter()
+            .map(surprise_of)
+            .filter(|(surprise, _)| *surprise > 0.0)
+            .max_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+            .map_or((0.0, None), |(surprise, k)| (surprise, Some(k)))
+    }
+
+    fn surprise(&self, entry: &Entry, remainder: &Remainder) -> f64 {
+        let products: Vec<Vec<[f64; WIDTH]>> =
+            remainder.seen.iter().map(|s| entry.products(s)).collect();
+        let product = |k: usize, j: usize| products[j / WIDTH][k][j % WIDTH];
+        let score = DVector::from_fn(entry.order(), |k, _| product(k, 0));
+        if remainder.directions == 0 {
+            return surprise(
+                statistic(&entry.gram, &score, entry.positive),
+                entry.order(),
+            );
+        }
+        let overlap = DMatrix::from_fn(entry.order(), remainder.directions, |k, j| {
+            product(k, j + 1)
+        });
+        let left = &entry.gram - &overlap * overlap.transpose();
+        if left.trace() < SEPARABLE * entry.gram.trace() {
+            return 0.0;
+        }
+        surprise(statistic(&left, &score, entry.positive), entry.order())
     }
 
     fn scores(&self, readings: &DVector<f64>, basis: &DMatrix<f64>, doubt: &Doubt) -> Remainder {
@@ -172,55 +221,21 @@ impl<'a, M: FittedModel> Context<'a, M> {
         // A part w of a product is taken away by √w of the direction.
         let halves = doubt.directions.iter().zip(&doubt.weights);
         spans.extend(halves.map(|(direction, weight)| direction * weight.sqrt()));
-        let sums = |c: DVector<f64>| self.dictionary.places.sums(&c);
-        let adjoint = sums(column(self.space.adjoint(as_matrix(&trusted))));
-        let directions: Vec<Sums> = if spans.is_empty() {
-            Vec::new()
-        } else {
-            self.space
-                .adjoint(DMatrix::from_columns(&spans))
-                .column_iter()
-                .map(|c| sums(c.clone_owned()))
-                .collect()
-        };
-        let surprise_of = |entry: &Entry| -> f64 {
-            let score = entry.products(&adjoint);
-            let t = if directions.is_empty() {
-                statistic(&entry.gram, &score, entry.positive)
-            } else {
-                let overlap = overlaps(entry, &directions);
-                let left = &entry.gram - &overlap * overlap.transpose();
-                if left.trace() < SEPARABLE * entry.gram.trace() {
-                    return 0.0;
-                }
-                statistic(&left, &score, entry.positive)
-            };
-            surprise(t, entry.order())
-        };
-        let surprises: Vec<f64> = self
-            .dictionary
-            .entries
-            .par_iter()
-            .map(surprise_of)
-            .collect();
-        let best: Vec<(f64, Option<usize>)> = self
-            .dictionary
-            .families
-            .iter()
-            .map(|family| {
-                family
-                    .entries
-                    .clone()
-                    .filter(|k| surprises[*k] > 0.0)
-                    .max_by(|a, b| surprises[*a].total_cmp(&surprises[*b]))
-                    .map_or((0.0, None), |k| (surprises[k], Some(k)))
-            })
-            .collect();
-        let surprises: Vec<f64> = best.iter().map(|(s, _)| *s).collect();
+        let directions = spans.len();
+        spans.insert(0, trusted);
+        let adjoint = self.space.adjoint(DMatrix::from_columns(&spans));
+        let batches = (0..adjoint.ncols()).step_by(WIDTH);
+        let seen = batches.map(|from| {
+            let width = WIDTH.min(adjoint.ncols() - from);
+            self.dictionary
+                .places
+                .sums(adjoint.columns(from, width).as_view())
+        });
         Remainder {
             residual,
-            global: self.null.global(&surprises),
-            best,
+            seen: seen.collect(),
+            directions,
+            best: vec![OnceLock::new(); self.dictionary.families.len()],
         }
     }
 
@@ -234,7 +249,7 @@ impl<'a, M: FittedModel> Context<'a, M> {
     /// The start of an effect's search beside other causes: the best entry of its family.
     pub fn start(&self, remainder: &Remainder, effect: usize) -> Option<&Shape> {
         let family = self.family_of(effect)?;
-        let entry = remainder.best[family].1?;
+        let entry = self.best(remainder, family).1?;
         match &self.dictionary.entries[entry].meaning {
             Meaning::Effect(shape) => Some(shape),
             Meaning::Place(_) => None,
@@ -250,10 +265,17 @@ impl<'a, M: FittedModel> Context<'a, M> {
             .position(|f| f.is_effect && f.name == name)
     }
 
+    /// Most columns of a family's entries.
+    pub fn order_of(&self, family: usize) -> usize {
+        let range = self.dictionary.families[family].entries.clone();
+        let orders = self.dictionary.entries[range].iter().map(Entry::order);
+        orders.max().unwrap_or(0)
+    }
+
     /// Tail probability of an effect's greatest score.
     pub fn p_value(&self, remainder: &Remainder, effect: usize) -> f64 {
         self.family_of(effect)
-            .map_or(1.0, |f| self.null.family(f, remainder.best[f].0))
+            .map_or(1.0, |f| self.null.family(f, self.best(remainder, f).0))
     }
 
     /// Amplitudes of causes fitted together, with their covariance.
@@ -310,20 +332,6 @@ impl<'a, M: FittedModel> Context<'a, M> {
                 .zip(&shape.values)
                 .all(|(p, v)| *v >= p.low && *v <= p.high)
     }
-}
-
-fn overlaps(entry: &Entry, directions: &[Sums]) -> DMatrix<f64> {
-    let mut overlap = DMatrix::zeros(entry.order(), directions.len());
-    for (j, direction) in directions.iter().enumerate() {
-        overlap.set_column(j, &entry.products(direction));
-    }
-    overlap
-}
-
-/// Whether causes leave nothing that stands out.
-pub(in crate::diagnosis) fn adequate(causes: &[Cause], left: &Remainder) -> bool {
-    let least = ADEQUATE[causes.len().clamp(1, ADEQUATE.len()) - 1];
-    left.global > least
 }
 
 /// The same shape with the steps of a finer search.

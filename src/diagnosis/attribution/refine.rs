@@ -5,13 +5,11 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::attribution::context::{Cause, Context, as_matrix, column, span};
 use crate::diagnosis::detection::dictionary::{is_positive, products, statistic};
+use crate::diagnosis::levels::UNSEARCHED;
 use crate::diagnosis::search::coordinate_search;
 
 /// Part of a shape's first step that its search settles to.
 const PRECISION: f64 = 1e-2;
-
-/// Part of a statistic that searching may add to that of a relative where it stands.
-const UNSEARCHED: f64 = 0.2;
 
 impl<M: FittedModel> Context<'_, M> {
     /// The best shape of an effect beside other causes, from a start, and the statistic there; its

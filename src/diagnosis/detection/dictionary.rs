@@ -6,15 +6,13 @@
 use std::sync::Arc;
 
 use errsep_models::model::{Column, Effect, FittedModel, Shape};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector, RealField};
 use rayon::prelude::*;
 
-use crate::diagnosis::detection::folding::{BatchSums, Folded, Folding, Sums};
+use crate::diagnosis::detection::folding::{Folded, Folding, Sums};
 use crate::diagnosis::detection::localise::{Item, scan_items};
 use crate::diagnosis::detection::space::Space;
-
-/// A signature of which less than this part is visible is not looked for.
-pub(in crate::diagnosis) const INVISIBLE: f64 = 1e-4;
+use crate::diagnosis::levels::INVISIBLE;
 
 /// What a signature stands for.
 #[derive(Debug, Clone)]
@@ -59,20 +57,18 @@ impl Entry {
         self.columns.len()
     }
 
-    /// Eᵀ a.
-    pub fn products(&self, adjoint: &Sums) -> DVector<f64> {
-        DVector::from_iterator(
-            self.columns.len(),
-            self.columns.iter().map(|c| c.dot(adjoint)),
-        )
+    /// Eᵀ a for several a, one row a column.
+    pub fn products<T: RealField + Copy, const BATCH: usize>(
+        &self,
+        adjoint: &Sums<T, BATCH>,
+    ) -> Vec<[T; BATCH]> {
+        self.columns.iter().map(|c| c.dot(adjoint)).collect()
     }
 
-    /// Eᵀ a for several a.
-    pub fn batch_products<const BATCH: usize>(
-        &self,
-        adjoint: &BatchSums<BATCH>,
-    ) -> Vec<[f32; BATCH]> {
-        self.columns.iter().map(|c| c.batch_dot(adjoint)).collect()
+    /// Eᵀ a for one a.
+    pub fn score(&self, adjoint: &Sums<f64, 1>) -> DVector<f64> {
+        let own = self.columns.iter().map(|c| c.dot(adjoint)[0]);
+        DVector::from_iterator(self.order(), own)
     }
 }
 
@@ -105,14 +101,17 @@ impl Places {
         Self { folding, axes }
     }
 
-    /// A vector with its sums, for [`Entry::products`].
-    pub fn sums(&self, vector: &DVector<f64>) -> Sums {
-        self.folding.sums(vector)
+    /// The columns of a matrix, at most `BATCH`, with their sums, for [`Entry::products`].
+    pub fn sums<T: RealField + Copy, const BATCH: usize>(
+        &self,
+        columns: DMatrixView<'_, f64>,
+    ) -> Sums<T, BATCH> {
+        self.folding.sums(columns)
     }
 
-    /// The columns of a matrix with their sums, for [`Entry::batch_products`].
-    pub fn batch_sums<const BATCH: usize>(&self, columns: &DMatrix<f64>) -> BatchSums<BATCH> {
-        self.folding.batch_sums(columns)
+    /// A vector with its sums, for [`Entry::score`].
+    pub fn sums_of(&self, vector: &DVector<f64>) -> Sums<f64, 1> {
+        self.folding.sums(vector.as_view())
     }
 }
 

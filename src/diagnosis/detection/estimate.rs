@@ -9,8 +9,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::diagnosis::detection::space::Space;
+use crate::diagnosis::levels::FEWEST_CONTRASTS;
 use crate::diagnosis::noise::contrasts::Contrasts;
-use crate::diagnosis::noise::law::{FEWEST, NoiseLaw, NoiseSource, SEED};
+use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource, SEED};
 use crate::diagnosis::noise::posterior::possible_laws;
 use crate::diagnosis::noise::steps::levelled;
 
@@ -31,7 +32,7 @@ pub(in crate::diagnosis) fn estimate<M: FittedModel>(
     let floor = (ROUNDING * model.observed().amax()).max(f64::MIN_POSITIVE.sqrt());
     let level = levelled(model, readings);
     let contrasts = Contrasts::new(model.places(), model.traces(), &level);
-    if contrasts.count() < FEWEST {
+    if contrasts.count() < FEWEST_CONTRASTS {
         return neighbours(model, readings, floor);
     }
     let (variance, freedom) = contrasts.scatter();

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use errsep_models::model::{Column, Place};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrixView, RealField};
 
 /// How a column repeats itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,18 +33,11 @@ pub(in crate::diagnosis) struct Folding {
     members: Vec<Vec<u32>>,
 }
 
-/// A vector over the readings with its sums over the cells.
-pub(in crate::diagnosis) struct Sums {
-    plain: Vec<f64>,
-    even: Vec<f64>,
-    odd: Vec<f64>,
-}
-
-/// Several vectors over the readings with their sums, one a row of `BATCH` values.
-pub(in crate::diagnosis) struct BatchSums<const BATCH: usize> {
-    plain: Vec<[f32; BATCH]>,
-    even: Vec<[f32; BATCH]>,
-    odd: Vec<[f32; BATCH]>,
+/// Several vectors over the readings with their sums over the cells, one a row of `BATCH` values.
+pub(in crate::diagnosis) struct Sums<T, const BATCH: usize> {
+    plain: Vec<[T; BATCH]>,
+    even: Vec<[T; BATCH]>,
+    odd: Vec<[T; BATCH]>,
 }
 
 impl Folding {
@@ -126,50 +119,35 @@ impl Folding {
         column
     }
 
-    /// A vector with its sums.
-    pub fn sums(&self, vector: &DVector<f64>) -> Sums {
-        let over = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            self.members
-                .iter()
-                .map(|cell| cell.iter().map(|r| value(*r as usize)).sum())
-                .collect()
-        };
-        Sums {
-            even: over(&|r| vector[r]),
-            odd: over(&|r| vector[r] * self.direction[r]),
-            plain: vector.as_slice().to_vec(),
-        }
-    }
-
-    /// The columns of a matrix with their sums. Single precision: what these products are for is a
-    /// law found by drawing, and signatures of which less than 10⁻⁴ is visible are not drawn.
-    pub fn batch_sums<const BATCH: usize>(&self, columns: &DMatrix<f64>) -> BatchSums<BATCH> {
-        let mut plain = vec![[0f32; BATCH]; columns.nrows()];
+    /// The columns of a matrix, at most `BATCH`, with their sums.
+    pub fn sums<T: RealField + Copy, const BATCH: usize>(
+        &self,
+        columns: DMatrixView<'_, f64>,
+    ) -> Sums<T, BATCH> {
+        let mut plain = vec![[T::zero(); BATCH]; columns.nrows()];
         for (k, column) in columns.column_iter().enumerate() {
             for (row, value) in plain.iter_mut().zip(column.iter()) {
-                row[k] = *value as f32;
+                row[k] = nalgebra::convert(*value);
             }
         }
-        let over = |turned: bool| -> Vec<[f32; BATCH]> {
-            self.members
-                .iter()
-                .map(|cell| {
-                    let mut sum = [0f32; BATCH];
-                    for &row in cell {
-                        let sign = if turned {
-                            self.direction[row as usize] as f32
-                        } else {
-                            1.0
-                        };
-                        for (s, v) in sum.iter_mut().zip(&plain[row as usize]) {
-                            *s += sign * v;
-                        }
+        let over = |turned: bool| -> Vec<[T; BATCH]> {
+            let of_cell = |cell: &Vec<u32>| {
+                let mut sum = [T::zero(); BATCH];
+                for &row in cell {
+                    let sign = if turned {
+                        nalgebra::convert(self.direction[row as usize])
+                    } else {
+                        T::one()
+                    };
+                    for (s, v) in sum.iter_mut().zip(&plain[row as usize]) {
+                        *s += sign * *v;
                     }
-                    sum
-                })
-                .collect()
+                }
+                sum
+            };
+            self.members.iter().map(of_cell).collect()
         };
-        BatchSums {
+        Sums {
             even: over(false),
             odd: over(true),
             plain,
@@ -178,31 +156,21 @@ impl Folding {
 }
 
 impl Folded {
-    /// Its product with a vector.
-    pub fn dot(&self, sums: &Sums) -> f64 {
-        let vector = match self.kind {
-            Kind::Plain => &sums.plain,
-            Kind::Even => &sums.even,
-            Kind::Odd => &sums.odd,
-        };
-        let terms = self.rows.iter().zip(&self.values);
-        terms
-            .map(|(row, value)| value * vector[*row as usize])
-            .sum()
-    }
-
     /// Its products with several vectors.
-    pub fn batch_dot<const BATCH: usize>(&self, sums: &BatchSums<BATCH>) -> [f32; BATCH] {
+    pub fn dot<T: RealField + Copy, const BATCH: usize>(
+        &self,
+        sums: &Sums<T, BATCH>,
+    ) -> [T; BATCH] {
         let vectors = match self.kind {
             Kind::Plain => &sums.plain,
             Kind::Even => &sums.even,
             Kind::Odd => &sums.odd,
         };
-        let mut sum = [0f32; BATCH];
+        let mut sum = [T::zero(); BATCH];
         for (&row, &value) in self.rows.iter().zip(&self.values) {
-            let value = value as f32;
+            let value: T = nalgebra::convert(value);
             for (s, v) in sum.iter_mut().zip(&vectors[row as usize]) {
-                *s += value * v;
+                *s += value * *v;
             }
         }
         sum
@@ -212,6 +180,7 @@ impl Folded {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
 
     fn places() -> Vec<Place> {
@@ -248,9 +217,11 @@ mod tests {
             prop_assert_eq!(&back, &column.dense(24));
             // Rounding of 24 terms below 4, in double and in single precision.
             let product = back.dot(&vector);
-            prop_assert!((folded.dot(&folding.sums(&vector)) - product).abs() < 1e-13);
-            let batch = folding.batch_sums::<1>(&DMatrix::from_column_slice(24, 1, vector.as_slice()));
-            prop_assert!((f64::from(folded.batch_dot(&batch)[0]) - product).abs() < 1e-4);
+            let matrix = DMatrix::from_columns(&[-&vector, vector]);
+            let double = folding.sums::<f64, 2>(matrix.as_view());
+            prop_assert!((folded.dot(&double)[1] - product).abs() < 1e-13);
+            let single = folding.sums::<f32, 3>(matrix.as_view());
+            prop_assert!((f64::from(folded.dot(&single)[0]) + product).abs() < 1e-4);
             if kind < 2 {
                 prop_assert!(folded.rows.len() <= 4);
             }

@@ -168,6 +168,12 @@ impl NullLaw {
         self.smallest
             .beyond(-2.0 * self.smallest_of(surprises).ln())
     }
+
+    /// The same where one family stands out and no other does by more.
+    pub fn global_of(&self, family: usize, surprise: f64) -> f64 {
+        let least = self.family(family, surprise).max(f64::MIN_POSITIVE);
+        self.smallest.beyond(-2.0 * least.ln())
+    }
 }
 
 /// The greatest score of each family, and last the misfit, in each draw of one batch.
@@ -188,14 +194,17 @@ fn greatest<M: FittedModel>(
     }
     let (left, _) = space.forward(draws);
     let misfits: Vec<f64> = left.column_iter().map(|c| c.norm_squared()).collect();
-    let adjoint = dictionary.places.batch_sums::<BATCH>(&space.adjoint(left));
+    let adjoint = space.adjoint(left);
+    // Single precision: this is for a law found by drawing, and signatures of which less than 10⁻⁴ is
+    // visible are not drawn.
+    let adjoint = dictionary.places.sums::<f32, BATCH>(adjoint.as_view());
     let mut rows: Vec<Vec<f64>> = vec![vec![0.0; dictionary.families.len()]; BATCH];
     for (place, family) in dictionary.families.iter().enumerate() {
         // Signatures of one, two … columns are weighed each by its own law.
         let mut greatest: BTreeMap<usize, [f64; BATCH]> = BTreeMap::new();
         for entry in &dictionary.entries[family.entries.clone()] {
             let most = greatest.entry(entry.order()).or_insert([0.0; BATCH]);
-            let products = entry.batch_products(&adjoint);
+            let products = entry.products(&adjoint);
             let inverse = inverse(&entry.gram);
             for (draw, most) in most.iter_mut().enumerate() {
                 let score = |k: usize| f64::from(products[k][draw]);

@@ -6,8 +6,7 @@ use std::ops::Range;
 use errsep_models::model::Place;
 use nalgebra::DVector;
 
-/// A trace of this many readings can show what is correlated along it.
-const LONG: usize = 20;
+use crate::diagnosis::levels::LONG_TRACE;
 
 /// Contrasts of the repeats of all traces, each with the covariance of one trace.
 pub(in crate::diagnosis) struct Contrasts {
@@ -84,7 +83,10 @@ impl Contrasts {
 
     /// Mean spacing and length of the traces, where any is long enough to show more than white noise.
     pub fn reach(&self) -> Option<(f64, f64)> {
-        let long = self.groups.iter().filter(|g| g.positions.len() >= LONG);
+        let long = self
+            .groups
+            .iter()
+            .filter(|g| g.positions.len() >= LONG_TRACE);
         let reach = long
             .map(|g| {
                 let n = g.positions.len();

@@ -12,14 +12,12 @@ use nalgebra::{DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal, StudentT};
 
+use crate::diagnosis::levels::FEWEST_CONTRASTS;
 use crate::diagnosis::noise::contrasts::Contrasts;
 use crate::diagnosis::noise::spikes::{Spikes, Tails};
 
 /// Seed of the laws drawn from the repeats: an estimate must not depend on the user's seed.
 pub(in crate::diagnosis) const SEED: u64 = 0x6c61_7773;
-
-/// Contrasts of repeats from which noise can be estimated.
-pub(in crate::diagnosis) const FEWEST: usize = 8;
 
 /// How far the noise is known from the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -269,7 +267,7 @@ pub(in crate::diagnosis) fn of_repeats<M: FittedModel>(
     readings: &DVector<f64>,
 ) -> Option<(f64, f64)> {
     let contrasts = Contrasts::new(model.places(), model.traces(), readings);
-    (contrasts.count() >= FEWEST).then(|| {
+    (contrasts.count() >= FEWEST_CONTRASTS).then(|| {
         let (variance, freedom) = contrasts.scatter();
         (variance.sqrt(), freedom)
     })

@@ -14,18 +14,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StudentT};
 
+use crate::diagnosis::levels::{HEAVY_TAILS, KEPT, SPIKE, SPIKE_REPEATS, SPIKE_TRACE};
 use crate::diagnosis::noise::contrasts::Contrasts;
 
-/// Standard deviations to which a reading is pulled in.
-const EDGE: f64 = 4.0;
-/// Part of the readings beyond three standard deviations (normal noise: 0.003) that makes tails heavy.
-const HEAVY: f64 = 0.01;
-/// Repeats without which a spike cannot be told from a form.
-const REPEATS: usize = 3;
-/// Readings of a trace without which a spike has no neighbours to stand out of.
-const SHORTEST: usize = 5;
-/// A spike has no neighbours: over those of either side alone it keeps this part of its height.
-const ALONE: f64 = 0.6;
 /// Neighbours on one side.
 const SIDE: usize = 7;
 /// Degrees of freedom among which the tails are sought.
@@ -94,7 +85,7 @@ impl Spikes {
         }
         Self {
             groups: groups(model)
-                .filter(|g| g.starts.len() >= REPEATS && g.length >= SHORTEST)
+                .filter(|g| g.starts.len() >= SPIKE_REPEATS && g.length >= SPIKE_TRACE)
                 .collect(),
         }
     }
@@ -105,7 +96,7 @@ impl Spikes {
         let count = self.pull_in(&mut calmed);
         let tails = self
             .weight(readings)
-            .filter(|w| w.beyond > HEAVY)
+            .filter(|w| w.beyond > HEAVY_TAILS)
             .and_then(|weight| {
                 FREEDOMS
                     .iter()
@@ -182,13 +173,13 @@ impl Spikes {
         }
         let middle = sizes.len() / 2;
         let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-        let edge = EDGE * SIGMA * *median;
+        let edge = SPIKE * SIGMA * *median;
         let mut pulled = Vec::new();
         for (group, own, away, near) in found {
             for (k, height) in near.iter().enumerate() {
                 let spike = || {
                     let far = away[k] - around(&away, k, SIDE);
-                    height.abs() > ALONE * far.abs()
+                    height.abs() > KEPT * far.abs()
                         && alone(&away, k, *height)
                         && group.farthest(readings, own, k)
                 };
@@ -255,7 +246,7 @@ fn alone(values: &[f64], k: usize, height: f64) -> bool {
         let mut sorted = [0.0; SIDE];
         let sorted = &mut sorted[..side.len()];
         sorted.copy_from_slice(side);
-        (values[k] - median(sorted)) * height.signum() > ALONE * height.abs()
+        (values[k] - median(sorted)) * height.signum() > KEPT * height.abs()
     };
     [before, after]
         .into_iter()

@@ -7,22 +7,11 @@ use std::ops::Range;
 use errsep_models::model::FittedModel;
 use nalgebra::DVector;
 
+use crate::diagnosis::levels::{KEPT, MOST_STEPS, STAYS, STAYS_FREEDOM, STEP};
 use crate::diagnosis::noise::spikes::{Group, SIGMA, groups, median};
 
-/// Standard deviations of the difference of two neighbours that make a step.
-const EDGE: f64 = 5.0;
-/// Part of the step that must last.
-const LASTS: f64 = 0.6;
 /// Readings on either side that tell its height.
 const SIDE: usize = 8;
-/// Steps of one group of repeats.
-const MOST: usize = 8;
-
-/// Student's t of a step between traces that is no chance, and the fewest degrees of freedom that can
-/// tell: with five, 2 · 7 · 10⁻⁴ for all seven places of one channel. (A steady drift of eight traces
-/// gives t = 4.)
-const STAYS: f64 = 12.0;
-const FEWEST: usize = 5;
 
 /// A part of a trace beyond a step.
 struct Lifted {
@@ -37,7 +26,7 @@ pub(in crate::diagnosis) fn levelled<M: FittedModel>(
 ) -> DVector<f64> {
     let mut level = readings.clone();
     for group in groups(model).filter(|g| g.starts.len() > 1) {
-        for _ in 0..MOST {
+        for _ in 0..MOST_STEPS {
             let Some(Lifted { rows, height }) = greatest(&group, &level) else {
                 break;
             };
@@ -93,7 +82,7 @@ fn later<M: FittedModel>(model: &M, own: &[&Group], readings: &DVector<f64>) -> 
         }
     }
     let freedom = traces.len().checked_sub(own.len() + 1)?;
-    if freedom < FEWEST {
+    if freedom < STAYS_FREEDOM {
         return None;
     }
     traces.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -137,11 +126,11 @@ fn greatest(group: &Group, readings: &DVector<f64>) -> Option<Lifted> {
         .flat_map(|(own, a)| (1..a.len()).map(move |k| (own, k, a[k] - a[k - 1])))
         .collect();
     let mut sizes: Vec<f64> = steps.iter().map(|s| s.2.abs()).collect();
-    let edge = EDGE * SIGMA * median(&mut sizes);
+    let edge = STEP * SIGMA * median(&mut sizes);
     let lasting = |own: usize, k: usize, step: f64| {
         let a = &away[own];
         let height = middle(&a[k..(k + SIDE).min(a.len())]) - middle(&a[k.saturating_sub(SIDE)..k]);
-        (height * step.signum() > LASTS * step.abs()).then_some(height)
+        (height * step.signum() > KEPT * step.abs()).then_some(height)
     };
     let (own, k, height) = steps
         .into_iter()

@@ -12,20 +12,12 @@ use errsep_models::model::{Effect, FittedModel};
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use crate::diagnosis::detection::dictionary::INVISIBLE;
 use crate::diagnosis::detection::dictionary::{Dictionary, Meaning, Places, statistic};
 use crate::diagnosis::detection::null::NullLaw;
 use crate::diagnosis::detection::space::Space;
+use crate::diagnosis::levels::{INVISIBLE, PLANNED, POWER, TELL, normal_quantile};
 use crate::diagnosis::noise::law::NoiseLaw;
 use crate::diagnosis::options::Options;
-
-/// Normal quantile of 80 % power.
-const POWER: f64 = 0.8416;
-/// Normal quantile of 99 %.
-const TELL: f64 = 2.3263;
-/// A plan promises nothing of an effect of which less than this part is visible: the model of the
-/// plan is not that exact.
-const PLANNED: f64 = 0.01;
 
 /// What a plan shows of one effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -117,8 +109,8 @@ pub fn certificate<M: FittedModel>(
                 .adjoint(DMatrix::from_column_slice(n, 1, unit.as_slice()))
                 .column(0)
                 .clone_owned();
-            let adjoint = dictionary.places.sums(&adjoint);
-            let seen = null.threshold(family, level).sqrt() + POWER;
+            let adjoint = dictionary.places.sums_of(&adjoint);
+            let seen = null.threshold(family, level).sqrt() + normal_quantile(POWER);
             for other in catalogue.iter().filter(|o| o.name() != effect.name()) {
                 let Some(rival) = dictionary
                     .families
@@ -128,7 +120,7 @@ pub fn certificate<M: FittedModel>(
                     continue;
                 };
                 for candidate in &dictionary.entries[rival.entries.clone()] {
-                    let score = candidate.products(&adjoint);
+                    let score = candidate.score(&adjoint);
                     let cosine = statistic(&candidate.gram, &score, false)
                         .clamp(0.0, 1.0)
                         .sqrt();
@@ -157,7 +149,7 @@ pub fn certificate<M: FittedModel>(
             row.visible_rms = Some(smallest * length * law.sigma() / (n as f64).sqrt());
             let half_angle = 0.5 * row.cosine.acos();
             row.identifiable = (half_angle.sin() > 1e-3)
-                .then(|| (TELL / (length * half_angle.sin())).max(smallest))
+                .then(|| (normal_quantile(TELL) / (length * half_angle.sin())).max(smallest))
                 .filter(plausible);
         }
         rows.push(row);

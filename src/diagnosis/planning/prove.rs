@@ -19,12 +19,10 @@ use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::attribution::examined::{Examined, examined};
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::space::Space;
+use crate::diagnosis::levels::PLANNED;
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
 use crate::diagnosis::noise::spikes::Spikes;
 use crate::diagnosis::options::Options;
-
-/// Effects of which less than this part is visible are not put in.
-const SHOWN: f64 = 0.01;
 
 /// Most steps towards a size at which amplitude and signature belong together.
 const SCALINGS: usize = 24;
@@ -78,7 +76,7 @@ pub fn prove<M: FittedModel>(
         .filter(|k| {
             context
                 .family_of(*k)
-                .is_some_and(|f| context.dictionary.families[f].visible > SHOWN)
+                .is_some_and(|f| context.dictionary.families[f].visible > PLANNED)
         })
         .collect();
     let outcomes: Vec<(String, String)> = (0..trials as u64)

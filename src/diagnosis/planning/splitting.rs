@@ -11,10 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::diagnosis::attribution::confidence::{Alternative, Answer};
 use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::detection::space::{Space, orthonormal};
-
-/// Standard deviations apart at which the wrong one of two is taken once in a hundred times:
-/// twice the 99 % quantile of the normal law.
-const APART: f64 = 4.65;
+use crate::diagnosis::levels::{TELL, normal_quantile};
 
 /// A further measurement for a group.
 pub(in crate::diagnosis) struct Split {
@@ -29,7 +26,7 @@ pub(in crate::diagnosis) struct Split {
 impl Split {
     /// Whether it suffices.
     pub fn suffices(&self) -> bool {
-        self.then > APART
+        self.then > (2.0 * normal_quantile(TELL))
     }
 }
 

@@ -11,6 +11,7 @@ use crate::diagnosis::attribution::examined::Examined;
 use crate::diagnosis::attribution::reported::Candidate;
 use crate::diagnosis::attribution::shrink::GapMeter;
 use crate::diagnosis::detection::estimate::neighbour_scatter;
+use crate::diagnosis::levels::NOISE_DIFFERS;
 use crate::diagnosis::noise::law::{NoiseSource, of_repeats};
 use crate::diagnosis::noise::spikes::Calmed;
 use crate::diagnosis::options::Options;
@@ -116,7 +117,7 @@ pub(in crate::diagnosis) fn compose<M: FittedModel>(
             .then(|| fingerprint(context, readings, first, excess)),
         statement: String::new(),
         p_value: detected,
-        adequacy: found.map_or(first.global, |a| a.remainder.global),
+        adequacy: context.global(found.map_or(first, |a| &a.remainder)),
     };
     let splits = match (found, kind) {
         (Some(answer), Kind::Effect) => splits(context, readings, answer),
@@ -208,7 +209,7 @@ fn stated<M: FittedModel>(context: &Context<'_, M>, clean: &DVector<f64>) -> Str
     };
     let ratio = seen / context.law.sigma();
     // Three standard deviations of a standard deviation, and by a part that matters.
-    let reach = 0.15 + 3.0 * (0.5 / freedom).sqrt();
+    let reach = NOISE_DIFFERS + 3.0 * (0.5 / freedom).sqrt();
     if (ratio - 1.0).abs() < reach {
         return told.to_owned();
     }
@@ -228,7 +229,7 @@ fn disagreement<M: FittedModel>(context: &Context<'_, M>, clean: &DVector<f64>) 
     let unit = for_people(context.model.reading_unit());
     let (seen, expected) = (plain(scatter.seen, 2), plain(scatter.expected, 2));
     // Beyond three standard deviations of the comparison, and by a part that matters.
-    let reach = 0.15 + 3.0 * scatter.relative_std;
+    let reach = NOISE_DIFFERS + 3.0 * scatter.relative_std;
     let ratio = scatter.seen / scatter.expected;
     if ratio > 1.0 + reach {
         Some(format!(

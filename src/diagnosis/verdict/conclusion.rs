@@ -9,10 +9,8 @@
 use crate::diagnosis::attribution::confidence::Answer;
 use crate::diagnosis::attribution::shrink::shrink;
 use crate::diagnosis::attribution::shrink::{HeldOut, Size};
+use crate::diagnosis::levels::PROMISE;
 use crate::diagnosis::verdict::types::{Gap, Kind};
-
-/// Part of the predicted shrinking that a named cause must reach.
-const PROMISE: f64 = 0.5;
 
 /// What the gap was measured to be, before anything is concluded from it.
 pub(in crate::diagnosis) struct Measured {

@@ -4,13 +4,10 @@ use errsep_models::model::FittedModel;
 
 use crate::diagnosis::attribution::bias::weighted_std;
 use crate::diagnosis::attribution::context::Context;
-use crate::diagnosis::detection::dictionary::INVISIBLE;
+use crate::diagnosis::levels::{INVISIBLE, POWER, normal_quantile};
 use crate::diagnosis::options::Options;
 use crate::diagnosis::planning::certificate::greatest_plausible;
 use crate::diagnosis::verdict::types::{Harm, Hidden};
-
-/// Normal quantile of 80 % power.
-const POWER: f64 = 0.8416;
 
 /// Harms whose ratio is below this are equal.
 const EQUAL: f64 = 1.0 + 1e-6;
@@ -46,7 +43,7 @@ pub(in crate::diagnosis) fn hidden<M: FittedModel>(
         let threshold = context.null.threshold(family, level);
         let most = greatest_plausible(description.as_ref());
         let detectable = (visible >= INVISIBLE && gram > 0.0)
-            .then(|| (threshold.sqrt() + POWER) / gram.sqrt())
+            .then(|| (threshold.sqrt() + normal_quantile(POWER)) / gram.sqrt())
             .filter(|size| *size <= most);
         let shape = description.grid(context.model).into_iter().next();
         let column = shape

@@ -5,10 +5,8 @@ use nalgebra::DMatrix;
 
 use crate::diagnosis::attribution::context::{Context, Remainder};
 use crate::diagnosis::detection::dictionary::{Entry, Meaning, statistic};
+use crate::diagnosis::levels::{EVERYWHERE, PLACE, chi_squared_of_two};
 use crate::diagnosis::verdict::types::Where;
-
-/// Places that are not reported beyond this probability.
-const PLACE_LEVEL: f64 = 0.05;
 
 /// The strongest place on every axis, and the channels' shares.
 pub(in crate::diagnosis) fn places<M: FittedModel>(
@@ -23,24 +21,17 @@ pub(in crate::diagnosis) fn places<M: FittedModel>(
         .enumerate()
         .filter(|(_, family)| !family.is_effect)
         .filter_map(|(k, _)| {
-            let (surprise, entry) = first.best[k];
+            let (surprise, entry) = context.best(first, k);
             let p = context.null.family(k, surprise);
-            (p <= PLACE_LEVEL).then(|| place_of(context, first, entry?, excess, p))?
+            (p <= PLACE).then(|| place_of(context, first, entry?, excess, p))?
         })
         .collect();
     let channels = channel_shares(context, first, excess);
-    places.extend(channels.into_iter().filter(|w| w.p_value < PLACE_LEVEL));
+    places.extend(channels.into_iter().filter(|w| w.p_value < PLACE));
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     places.truncate(6);
     places
 }
-
-/// Places of one kind whose statistics differ by less are equally likely: the 95 % quantile of
-/// chi-squared for middle and width.
-const AS_LIKELY: f64 = 5.99;
-
-/// A range over more than this part of all that was tried says nothing of where.
-const EVERYWHERE: f64 = 0.8;
 
 /// An entry of the dictionary as a place, with the part of the gap that it explains. Where the same
 /// pattern explains as much nearly everywhere, the place is the pattern alone.
@@ -58,8 +49,8 @@ pub(in crate::diagnosis) fn place_of<M: FittedModel>(
     let residual = &remainder.residual;
     let whole = DMatrix::from_column_slice(residual.len(), 1, residual.as_slice());
     let adjoint = context.space.adjoint(whole).column(0).clone_owned();
-    let sums = dictionary.places.sums(&adjoint);
-    let explained = |entry: &Entry| statistic(&entry.gram, &entry.products(&sums), false);
+    let sums = dictionary.places.sums_of(&adjoint);
+    let explained = |entry: &Entry| statistic(&entry.gram, &entry.score(&sums), false);
     let t = explained(&dictionary.entries[entry]);
     let alike = dictionary
         .families
@@ -78,7 +69,7 @@ pub(in crate::diagnosis) fn place_of<M: FittedModel>(
     let (mut tried, mut likely) = (Reach::default(), Reach::default());
     for (from, to, other) in alike {
         tried.take(from, to);
-        if explained(other) > t - AS_LIKELY {
+        if explained(other) > t - chi_squared_of_two(0.95) {
             likely.take(from, to);
         }
     }

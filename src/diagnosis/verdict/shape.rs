@@ -4,14 +4,12 @@ use std::collections::BTreeMap;
 
 use errsep_models::model::FittedModel;
 use nalgebra::DVector;
+use rayon::prelude::*;
 
-use crate::diagnosis::attribution::context::{Context, Remainder};
+use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
+use crate::diagnosis::levels::{ABSENT, PRESENT};
 use crate::diagnosis::verdict::places::{channel_shares, place_of};
 use crate::diagnosis::verdict::types::{Fingerprint, Nearest, Where};
-
-/// A channel holds the gap when it stands out at this level, and is free of it beyond the other.
-const PRESENT: f64 = 0.01;
-const ABSENT: f64 = 0.1;
 
 /// What can be said of a gap without naming it.
 pub(in crate::diagnosis) fn fingerprint<M: FittedModel>(
@@ -46,7 +44,8 @@ fn nearest<M: FittedModel>(
     excess: f64,
 ) -> Option<Nearest> {
     let whole = first.residual.norm_squared();
-    let best = (0..context.catalogue.len())
+    let explained: Vec<(f64, Vec<Cause>)> = (0..context.catalogue.len())
+        .into_par_iter()
         .filter_map(|effect| {
             let start = context.start(first, effect)?;
             let cause = vec![
@@ -57,14 +56,15 @@ fn nearest<M: FittedModel>(
             let explained = whole - context.misfit(readings, &cause);
             Some((explained, cause))
         })
-        .max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let (explained, cause) = best;
+        .collect();
+    let best = explained.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+    let (explained, cause) = best?;
     let beside = context.remainder(readings, &cause);
     // The place that stands out most beside it says why it is not the cause.
     let against = (0..context.dictionary.families.len())
         .filter(|k| !context.dictionary.families[*k].is_effect)
         .filter_map(|k| {
-            let (surprise, entry) = beside.best[k];
+            let (surprise, entry) = context.best(&beside, k);
             Some((context.null.family(k, surprise), entry?))
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
@@ -72,7 +72,7 @@ fn nearest<M: FittedModel>(
     Some(Nearest {
         effect: context.catalogue[cause[0].effect].name().to_owned(),
         cosine: (explained / excess).clamp(0.0, 1.0).sqrt(),
-        p_value: beside.global,
+        p_value: context.global(&beside),
         against,
     })
 }

@@ -1,6 +1,7 @@
 //! The verdict in a sentence that a person can act on.
 
 use crate::diagnosis::attribution::reported::{Candidate, ParameterOut};
+use crate::diagnosis::levels::MOSTLY;
 use crate::diagnosis::planning::splitting::Split;
 use crate::diagnosis::verdict::told::for_people;
 use crate::diagnosis::verdict::types::{Fingerprint, Gap, Hidden, Kind, Verdict, Where};
@@ -206,13 +207,17 @@ fn described(shape: &Fingerprint) -> String {
         ));
     }
     match shape.odd {
-        Some(odd) if odd > 0.8 => parts.push("it turns its sign with the direction".to_owned()),
-        Some(odd) if odd < 0.2 => parts.push("it is the same in both directions".to_owned()),
+        Some(odd) if odd > MOSTLY => parts.push("it turns its sign with the direction".to_owned()),
+        Some(odd) if odd < 1.0 - MOSTLY => {
+            parts.push("it is the same in both directions".to_owned())
+        }
         _ => {}
     }
     match shape.repeated {
-        Some(part) if part > 0.8 => parts.push("it comes back in every repeat".to_owned()),
-        Some(part) if part < 0.2 => parts.push("it changes from repeat to repeat".to_owned()),
+        Some(part) if part > MOSTLY => parts.push("it comes back in every repeat".to_owned()),
+        Some(part) if part < 1.0 - MOSTLY => {
+            parts.push("it changes from repeat to repeat".to_owned())
+        }
         _ => {}
     }
     if let Some(nearest) = &shape.nearest {

@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use crate::diagnosis::attribution::reported::{Bias, Candidate};
 use crate::diagnosis::attribution::shrink::{HeldOut, Size};
-use crate::diagnosis::detection::dictionary::INVISIBLE;
 use crate::diagnosis::detection::localise::Item;
+use crate::diagnosis::levels::INVISIBLE;
 use crate::diagnosis::noise::law::NoiseLaw;
 use crate::diagnosis::verdict::told::for_people;
 use crate::number::plain;

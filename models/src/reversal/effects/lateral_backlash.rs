@@ -1,15 +1,25 @@
 //! The slide runs on another line forward than backward.
 //!
-//! It leans to the other side of its guide when it turns round, and may swing with it: a shift and a
-//! turn that change their sign with the direction of travel, towards the indicator as the slide's
-//! form is (the sign of M). Where the tilts outweigh the slopes of the forms, a play of the
-//! indicators (`hysteresis`) looks the same. Free: the shift at mid travel and the turn.
+//! It leans to the other side of its guide when it turns round: towards the indicator as the slide's
+//! form is (the sign of M), with the sign of the direction of travel. The two lines are parallel, or
+//! askew, or each has a form of its own; or the slide leans over some way after it has turned round.
+//! Where the tilts outweigh the slopes of the forms, a play of the indicators (`hysteresis`) looks the
+//! same. Free: the shift at mid travel and the turn; the form of the difference; the way to lean over.
 
-use super::{FirstOrder, part_of_travel};
-use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
+use nalgebra::DMatrix;
 
-/// See the head of the file.
+use super::{FirstOrder, part_of_travel, spread};
+use crate::model::{About, Column, Effect, Estimate, FittedModel, Link, Parameter, Shape, each};
+
+/// See the head of the file. Variants: askew lines, [`FORMS`], [`LEANING`].
 pub(super) struct LateralBacklash;
+
+/// Terms of the difference of both lines, Legendre polynomials, by variant.
+const TERMS: [usize; 4] = [2, 5, 9, 15];
+/// First and last variant of lines with a form of their own.
+const FORMS: std::ops::RangeInclusive<usize> = 1..=3;
+/// Variant of a slide that leans over some way after it has turned round.
+const LEANING: usize = 4;
 
 impl Effect<FirstOrder> for LateralBacklash {
     fn name(&self) -> &str {
@@ -29,19 +39,113 @@ impl Effect<FirstOrder> for LateralBacklash {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        // The turn is told by what it makes at the ends of the travel.
-        ["step", "step-of-turn"]
-            .map(|name| Parameter::symmetric(name, "um", 100.0))
-            .to_vec()
+        self.amplitudes_at(&Shape::only())
     }
 
-    fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
-        let with = |along: &dyn Fn(f64) -> f64| {
+    fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
+        // The turn is told by what it makes at the ends of the travel.
+        let names: &[&'static str] = match shape.variant {
+            LEANING => &["step", "step-at-turn"],
+            0 => &["step", "step-of-turn"],
+            _ => &["step", "step-of-turn", "step-of-form"],
+        };
+        let name = |k: usize| names[k.min(names.len() - 1)];
+        let size = |k| Parameter::symmetric(name(k), "um", 100.0);
+        (0..terms(shape)).map(size).collect()
+    }
+
+    fn shape_parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::between("log-way", "ln mm", -5.0, 12.0)]
+    }
+
+    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+        let plain = |variant: usize| Shape::variant(variant);
+        let leaning = |part: f64| Shape {
+            variant: LEANING,
+            values: vec![(part * model.travel()).ln()],
+            steps: vec![0.3],
+        };
+        match shape.variant {
+            0 => FORMS.map(plain).chain([0.05, 0.2].map(leaning)).collect(),
+            LEANING => vec![plain(0)],
+            _ => vec![plain(0), leaning(0.1)],
+        }
+    }
+
+    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+        let with = |along: &(dyn Fn(f64, f64) -> f64 + Sync)| {
             Column::from_places(model.places(), |_, place| {
                 let sign = model.channel(place).indicator_sign() * place.direction;
-                0.5 * sign * along(place.x)
+                let part = part_of_travel(model, place.x);
+                0.5 * sign * along(part, place.direction)
             })
         };
-        vec![with(&|_| 1.0), with(&|x| part_of_travel(model, x))]
+        if let (LEANING, Some(log_way)) = (shape.variant, shape.values.first()) {
+            let way = 2.0 * log_way.exp() / model.travel();
+            let since = |part: f64, direction: f64| (1.0 + direction * part).max(0.0);
+            let gone = |part: f64, direction: f64| (-since(part, direction) / way).exp();
+            return vec![with(&|_, _| 1.0), with(&gone)];
+        }
+        (0..terms(shape))
+            .map(|k| with(&|part, _| legendre(k, part)))
+            .collect()
     }
+
+    fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
+        let part = |log_way: &f64| log_way.exp() / model.travel();
+        shape.values.iter().all(|v| (0.01..1.0).contains(&part(v)))
+    }
+
+    /// Of forms their root mean square over the travel in place of each term: ∫ Pₖ² = 1/(2k + 1).
+    fn estimates(
+        &self,
+        shape: &Shape,
+        amplitudes: &[f64],
+        covariance: &DMatrix<f64>,
+    ) -> Vec<Estimate> {
+        let parameters = self.amplitudes_at(shape).into_iter();
+        let values = amplitudes.iter().chain(&shape.values);
+        let mut told = each(
+            parameters.chain(self.shape_parameters()),
+            values,
+            covariance,
+        );
+        if FORMS.contains(&shape.variant) {
+            told.truncate(2);
+            let weight = |k: usize| 1.0 / (2.0 * k as f64 + 1.0);
+            let form = amplitudes.iter().enumerate().skip(2);
+            let square: f64 = form.clone().map(|(k, a)| a * a * weight(k)).sum();
+            let size = square.sqrt().max(f64::MIN_POSITIVE);
+            let along: Vec<(usize, f64)> = form.map(|(k, a)| (k, a * weight(k) / size)).collect();
+            told.push(Estimate {
+                name: "rms-of-form".to_owned(),
+                value: size,
+                std: spread(covariance, &along),
+                unit: "um".to_owned(),
+            });
+        }
+        told
+    }
+
+    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+        match shape.variant {
+            0 => None,
+            LEANING => Some("leaning over after it has turned round".to_owned()),
+            _ => Some("each direction with a form of its own".to_owned()),
+        }
+    }
+}
+
+fn terms(shape: &Shape) -> usize {
+    TERMS.get(shape.variant).copied().unwrap_or(2)
+}
+
+/// Legendre polynomial of a degree, by its recurrence (Abramowitz and Stegun 8.5.3).
+fn legendre(degree: usize, t: f64) -> f64 {
+    let (mut before, mut here) = (0.0, 1.0);
+    for k in 0..degree {
+        let n = k as f64;
+        (before, here) = (here, ((2.0 * n + 1.0) * t * here - n * before) / (n + 1.0));
+    }
+    here
 }

@@ -16,7 +16,7 @@ struct AxisBacklash;
 
 impl JoinedEffect for AxisBacklash {
     fn unknowns(&self) -> Vec<Unknown> {
-        vec![Unknown::size("backlash", "mm", 10.0).between(-0.5, 10.0)]
+        vec![Unknown::size("backlash", "mm", 10.0)]
     }
 
     fn moves(&self, at: &Circumstances) -> Option<Move> {

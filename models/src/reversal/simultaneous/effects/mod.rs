@@ -14,6 +14,7 @@ mod hysteresis;
 mod indicator_nonlinearity;
 mod lateral_backlash;
 mod local_contamination;
+mod off_crest;
 mod reversal_shift;
 mod setting;
 mod taper;
@@ -54,6 +55,7 @@ pub const CATALOGUE: &[Entry] = &[
     indicator_nonlinearity::ENTRY,
     lateral_backlash::ENTRY,
     local_contamination::ENTRY,
+    off_crest::ENTRY,
     reversal_shift::ENTRY,
     taper::ENTRY,
     thermal_drift::ENTRY,

@@ -1,0 +1,138 @@
+//! Every threshold that decides what a diagnosis says, in one table.
+//!
+//! Kinds: a *quantile* follows from a probability; a *tuned* one was chosen on cases that were looked
+//! at (development seeds of `examples/blind_campaign.rs` and `examples/independent_maker`) and then
+//! judged on seeds that no version had seen (`docs/validation/diagnosis.md` says which); a *limit* keeps
+//! work finite and costs power where it binds; a *reckoned* one follows from a model's own arithmetic.
+//! How many draws stand behind a figure is told where they are drawn.
+
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Quantile of the normal law.
+pub(in crate::diagnosis) fn normal_quantile(probability: f64) -> f64 {
+    Normal::standard().inverse_cdf(probability)
+}
+
+/// Quantile of chi-squared with two degrees of freedom: −2 ln (1 − p).
+pub(in crate::diagnosis) fn chi_squared_of_two(probability: f64) -> f64 {
+    -2.0 * (1.0 - probability).ln()
+}
+
+// Noise.
+
+/// *Reckoned.* Contrasts of repeats from which noise can be estimated: with eight a variance is known to
+/// half of itself.
+pub(in crate::diagnosis) const FEWEST_CONTRASTS: usize = 8;
+/// *Reckoned.* A trace of this many readings can show what is correlated along it.
+pub(in crate::diagnosis) const LONG_TRACE: usize = 20;
+/// *Quantile*, 6 · 10⁻⁵ of normal readings: standard deviations to which a single reading is pulled in.
+pub(in crate::diagnosis) const SPIKE: f64 = 4.0;
+/// *Tuned* on normal noise (0.003 expected) and Student's with three degrees of freedom (0.014): part of
+/// the readings beyond three standard deviations that makes tails heavy.
+pub(in crate::diagnosis) const HEAVY_TAILS: f64 = 0.01;
+/// *Reckoned.* Repeats without which a spike cannot be told from a form.
+pub(in crate::diagnosis) const SPIKE_REPEATS: usize = 3;
+/// *Reckoned.* Readings of a trace without which a spike has no neighbours to stand out of.
+pub(in crate::diagnosis) const SPIKE_TRACE: usize = 5;
+/// *Tuned.* Part of its height that a spike keeps over its neighbours of either side alone, and that a
+/// step keeps in what follows it.
+pub(in crate::diagnosis) const KEPT: f64 = 0.6;
+/// *Quantile*, 6 · 10⁻⁷ of normal readings: standard deviations of the difference of two neighbours
+/// that make a step.
+pub(in crate::diagnosis) const STEP: f64 = 5.0;
+/// *Limit.* Steps that are taken out of one group of repeats.
+pub(in crate::diagnosis) const MOST_STEPS: usize = 8;
+/// *Quantile.* Student's t of a step between traces that is no chance, and the fewest degrees of freedom
+/// that can tell: with five, 2 · 7 · 10⁻⁴ for all seven places of one channel. (A steady drift of eight
+/// traces gives t = 4.)
+pub(in crate::diagnosis) const STAYS: f64 = 12.0;
+/// See [`STAYS`].
+pub(in crate::diagnosis) const STAYS_FREEDOM: usize = 5;
+
+// Detection.
+
+/// *Reckoned.* A signature of which less than this part is visible is not looked for: rounding and what
+/// linearising leaves are as great.
+pub(in crate::diagnosis) const INVISIBLE: f64 = 1e-4;
+
+// Attribution.
+
+/// *Tuned.* Probability at which a cause must stand out beside the others, and an effect to be tried.
+pub(in crate::diagnosis) const EARNED: f64 = 0.002;
+/// *Tuned*: three causes imitate freely what none of them is. A set of one, two, three causes whose
+/// remainder is less probable than this is not adequate.
+pub(in crate::diagnosis) const ADEQUATE: [f64; 3] = [0.001, 0.001, 0.01];
+/// *Limit.* Standard deviations of chi-squared beyond which no doubt about the state excuses a remainder.
+pub(in crate::diagnosis) const FAR: f64 = 6.0;
+/// *Reckoned.* Beside other causes a signature must keep this part of its visible length, squared, to be
+/// told apart.
+pub(in crate::diagnosis) const SEPARABLE: f64 = 0.02;
+/// *Tuned.* Part of a plausible range by which an uncertain size may lie outside it.
+pub(in crate::diagnosis) const SLACK: f64 = 0.1;
+/// *Limit.* A cause whose statistic is below the best by this and by [`HOPELESS_PART`] of it cannot
+/// become adequate, and is not refitted.
+pub(in crate::diagnosis) const HOPELESS: f64 = 80.0;
+/// See [`HOPELESS`].
+pub(in crate::diagnosis) const HOPELESS_PART: f64 = 0.1;
+/// *Tuned* on withheld effects: part of the strongest cause's change, squared, that a further one must
+/// reach. What is less may be the remainder of a cause taken for another whose signature is off by a
+/// seventh of its size.
+pub(in crate::diagnosis) const WEIGHTY: f64 = 0.02;
+/// *Limit.* A relative of a cause that explains less than this part of what it does cannot stand for it.
+pub(in crate::diagnosis) const NEAR: f64 = 0.7;
+/// *Tuned.* A size counts from this many of its standard uncertainties on: that of the only cause, and
+/// those of several, which may imitate what another leaves.
+pub(in crate::diagnosis) const STANDS: [f64; 2] = [1.0, 2.0];
+/// *Quantile*, odds of 1 to 22 000. An effect that was given more amplitudes than the dictionary looks for,
+/// and has more unknowns than that of greatest evidence, stands in its place by its freedom alone where its
+/// log-evidence is less by this.
+pub(in crate::diagnosis) const OUTDONE: f64 = 10.0;
+/// *Reckoned.* Log-evidence that differs by less is equal: of exact aliases the one of more usual size
+/// goes first.
+pub(in crate::diagnosis) const EQUAL_EVIDENCE: f64 = 1e-3;
+/// *Limit.* A swap of causes must raise the statistic by more than what searches leave open.
+pub(in crate::diagnosis) const BETTER: f64 = 0.01;
+/// *Limit.* Pairs that are fitted with everything else free, and how far above the best misfit a coarse
+/// fit may be to become it by refining.
+pub(in crate::diagnosis) const PAIRS: usize = 3;
+/// See [`PAIRS`].
+pub(in crate::diagnosis) const PAIR_REACH: f64 = 1.3;
+/// *Limit.* Effects in one verdict.
+pub(in crate::diagnosis) const MOST_CAUSES: usize = 3;
+/// *Limit.* Effects of greatest score that are refined to find the strongest, and rounds of refining each
+/// cause beside the others.
+pub(in crate::diagnosis) const REFINED: usize = 5;
+/// See [`REFINED`].
+pub(in crate::diagnosis) const POLISHED: usize = 3;
+/// *Limit.* Part of a statistic that searching may add to that of a relative where it stands.
+pub(in crate::diagnosis) const UNSEARCHED: f64 = 0.2;
+
+// Verdict.
+
+/// *Tuned.* Part of the predicted shrinking that a named cause must reach.
+pub(in crate::diagnosis) const PROMISE: f64 = 0.5;
+/// *Quantile.* Places are reported up to this probability.
+pub(in crate::diagnosis) const PLACE: f64 = 0.05;
+/// *Tuned.* A range over more than this part of all that was tried says nothing of where.
+pub(in crate::diagnosis) const EVERYWHERE: f64 = 0.8;
+/// *Quantile.* A channel holds the gap when it stands out at this level, and is free of it beyond
+/// [`ABSENT`].
+pub(in crate::diagnosis) const PRESENT: f64 = 0.01;
+/// See [`PRESENT`].
+pub(in crate::diagnosis) const ABSENT: f64 = 0.1;
+/// *Tuned.* Part by which two figures of the noise may differ beyond three standard deviations of their
+/// ratio before it is told.
+pub(in crate::diagnosis) const NOISE_DIFFERS: f64 = 0.15;
+/// *Tuned.* Share of a gap from which on it is said to turn with the direction, or to come back in every
+/// repeat; below the rest it is said not to.
+pub(in crate::diagnosis) const MOSTLY: f64 = 0.8;
+
+// Planning.
+
+/// *Quantile.* Power at which an effect of the smallest size is seen.
+pub(in crate::diagnosis) const POWER: f64 = 0.8;
+/// *Quantile.* Probability at which two effects are told apart.
+pub(in crate::diagnosis) const TELL: f64 = 0.99;
+/// *Reckoned.* A plan promises nothing of an effect, and none is put in for a proof, of which less than
+/// this part is visible: the model of the plan is not that exact.
+pub(in crate::diagnosis) const PLANNED: f64 = 0.01;

@@ -15,7 +15,7 @@ use errsep_solvers::{
 };
 use nalgebra::{DMatrix, DVector};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::exceptions::{PyStopIteration, PyValueError};
+use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -123,11 +123,12 @@ impl Problem for Stated {
             if residuals.len() == self.residual_count() {
                 return Ok(residuals);
             }
-            Err(PyValueError::new_err(format!(
+            let told = Message::bad_input(format!(
                 "there are {} residuals here and {} at the start",
                 residuals.len(),
                 self.residual_count()
-            )))
+            ));
+            Err(exception(py, &told.remedy("return as many every time")))
         })
     }
 
@@ -168,7 +169,7 @@ impl Told {
                 return Ok(());
             };
             let parameters = PyArray1::from_slice(py, parameters.as_slice());
-            let told = callback.call1(py, (state.get_iter(), state.get_cost(), parameters));
+            let told = callback.call1(py, (state.get_iter() + 1, state.get_cost(), parameters));
             match told {
                 Err(e) if e.is_instance_of::<PyStopIteration>(py) => {
                     self.stop.store(true, Ordering::Relaxed);
@@ -302,7 +303,7 @@ fn options(
         max_iterations: asked.max_iterations,
         time_limit: time_limit
             .transpose()
-            .map_err(|e| PyValueError::new_err(format!("time_limit: {e}")))?,
+            .map_err(|e| exception(py, &Message::bad_input(format!("time_limit: {e}"))))?,
         stop: Some(Arc::clone(stop)),
         ..defaults
     })

@@ -1,9 +1,11 @@
 //! Tables that are held in memory, as the bytes that the readers take.
 
+use errsep::io::Message;
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::errors::exception;
 use crate::long::without_the_lock;
 
 /// A column as Python gives it.
@@ -55,12 +57,13 @@ pub fn table_as_csv(py: Python<'_>, columns: Vec<(String, Given<'_>)>) -> PyResu
         .unzip();
     let rows = columns.first().map_or(0, Column::len);
     if let Some(k) = columns.iter().position(|c| c.len() != rows) {
-        return Err(PyValueError::new_err(format!(
-            "column `{}` has {} values, column `{}` {rows}: give columns of one length",
+        let told = Message::bad_input(format!(
+            "column `{}` has {} values, column `{}` {rows}",
             names[k],
             columns[k].len(),
             names[0]
-        )));
+        ));
+        return Err(exception(py, &told.remedy("give columns of one length")));
     }
     without_the_lock(py, || written(&names, &columns, rows))
         .map_err(|e| PyValueError::new_err(format!("the table cannot be written: {e}")))

@@ -7,6 +7,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["Answered", "__version__", "call", "least_squares", "main", "table_as_csv"]
 __version__: str
 
 _Column = NDArray[np.float64] | list[str]

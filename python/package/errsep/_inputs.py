@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import _errsep, _toml
+from .errors import InputError
 
 #: Columns of an array of two dimensions that has none of its own, by their number.
 Columns = Mapping[int, Sequence[str]]
@@ -20,12 +21,15 @@ class Call:
     def __init__(self, *words: str) -> None:
         self.words: list[str] = list(words)
         self.inputs: list[tuple[str, bytes]] = []
+        self.tables: set[str] = set()
 
     def table(self, data: Any, name: str, columns: Columns | None = None) -> str:
         """The argument for a table."""
         if isinstance(data, (str, os.PathLike)) and not _is_text(data):
             return os.fspath(data)
-        return self._named(name, as_csv(data, columns or {}))
+        label = self._named(name, as_csv(data, columns or {}))
+        self.tables.add(label)
+        return label
 
     def toml(self, setup: Any, name: str) -> str:
         """The argument for a set-up: a dictionary, TOML text or a path."""
@@ -35,7 +39,8 @@ class Call:
             return self._named(name, setup)
         if isinstance(setup, str) and ("\n" in setup or "=" in setup):
             return self._named(name, setup.encode())
-        return os.fspath(setup)
+        path: str = os.fspath(setup)
+        return path
 
     def positional(self, word: str) -> Call:
         """Adds an argument, also one that looks like an option."""
@@ -124,7 +129,7 @@ def _of_array(array: np.ndarray, columns: Columns) -> list[tuple[str, Any]]:
     if not columns:
         raise TypeError("an array has no column names: give a dictionary of columns")
     if array.ndim != 2 or array.shape[1] not in columns:
-        raise ValueError(f"an array of shape {array.shape} is no such table: give columns {shapes}")
+        raise InputError(f"an array of shape {array.shape} is no such table", help=f"give columns {shapes}")
     return list(zip(columns[array.shape[1]], array.T, strict=True))
 
 
@@ -147,7 +152,9 @@ def _column(values: Any) -> Any:
     """Numbers as an array of float64 with NaN where one is missing; anything else as texts."""
     array = values.to_numpy() if hasattr(values, "to_numpy") else np.asarray(values)
     if array.ndim != 1:
-        raise ValueError(f"a column has one dimension, not the shape {array.shape}")
+        raise InputError(
+            f"a column has the shape {array.shape}", help="give columns of one dimension, all as long"
+        )
     if np.ma.isMaskedArray(values):
         array = np.ma.filled(np.ma.asarray(values, dtype=float), np.nan)
     if array.dtype.kind in "fiu":

@@ -8,7 +8,7 @@ from typing import Any
 
 from . import _errsep
 from ._inputs import Call, Columns
-from .errors import NotDetermined
+from .errors import Error, NotDetermined
 from .result import Result
 
 #: A table: a path, CSV text, a dictionary of columns, an array, or a table of another package.
@@ -26,7 +26,13 @@ _PROFILE: Columns = {2: ("x", "deviation")}
 
 
 def _answer(call: Call, threads: int | None) -> Result:
-    result = Result(call.words[0], _errsep.call(call.words, call.inputs, threads))
+    try:
+        answered = _errsep.call(call.words, call.inputs, threads)
+    except Error as error:
+        if error.file in call.tables and error.line is not None and error.line > 1:
+            error.row = error.line - 2
+        raise
+    result = Result(call.words[0], answered)
     if result._answered.status == 0:
         return result
     what = "; ".join(result.not_determined) or "the question"

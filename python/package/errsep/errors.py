@@ -37,12 +37,7 @@ class Error(ValueError):
         self.line = line
         self.column = column
         self.help = help
-
-    @property
-    def row(self) -> int | None:
-        """The row of a table given in memory, from 0."""
-        in_memory = self.file is not None and self.file.startswith("<")
-        return self.line - 2 if in_memory and self.line is not None and self.line > 1 else None
+        self.row: int | None = None
 
     def __str__(self) -> str:
         place = "" if self.file is None else f"{self.file}: "
@@ -50,6 +45,9 @@ class Error(ValueError):
             place = f"{self.file}:{self.line}:{self.column}: "
         help = "" if self.help is None else f"\n  help: {self.help}"
         return f"{place}{self.what}{help}"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), self.args, self.__dict__
 
 
 class InputError(Error):
@@ -65,18 +63,21 @@ class Unsolved(Error):
         What there is all the same, where there is anything.
     """
 
-    result: Any = None
+    def __init__(
+        self,
+        what: str,
+        file: str | None = None,
+        line: int | None = None,
+        column: int | None = None,
+        help: str | None = None,
+    ) -> None:
+        super().__init__(what, file, line, column, help)
+        self.result: Any = None
 
     def with_result(self, result: Any) -> Unsolved:
         """The same exception with what there is all the same."""
         self.result = result
         return self
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return (type(self), self.args, {"result": self.result})
-
-    def __setstate__(self, state: dict[str, Any] | None) -> None:
-        self.result = (state or {}).get("result")
 
 
 class NotDetermined(Unsolved):

@@ -115,6 +115,14 @@ class Fit:
         warnings = list(held)
         if not self.converged:
             warnings.insert(0, self.ending)
+        variance = None if self.residual_std is None else self.residual_std**2
+        # Five standard deviations of a chi-square beyond its mean.
+        most = 1 + 5 * math.sqrt(2 / max(self.degrees_of_freedom, 1))
+        if self._found["known_scale"] and variance is not None and variance > most:
+            warnings.append(
+                f"the residuals scatter {math.sqrt(variance):.3g} times as much as sigma says: the model "
+                "does not fit, and the uncertainties are too small"
+            )
         if self.covariance is None:
             warnings.append("no uncertainties: nothing is left over to tell the scatter of a residual")
         return warnings

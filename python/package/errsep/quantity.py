@@ -11,6 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+#: Factors to the units that people read.
+_SHOWN = {"rad": (1e6, "µrad"), "um": (1.0, "µm")}
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A value with its standard uncertainty (k = 1).
@@ -39,9 +43,14 @@ class Quantity:
     def __float__(self) -> float:
         return self.value
 
+    @property
+    def words(self) -> str:
+        """Value, standard uncertainty and unit for people, angles in µrad."""
+        factor, unit = _SHOWN.get(self.unit, (1.0, self.unit))
+        return f"{plus_minus(factor * self.value, factor * self.std)} {unit}".rstrip()
+
     def __str__(self) -> str:
-        name = f"{self.label} = " if self.label else ""
-        return f"{name}{plus_minus(self.value, self.std)} {self.unit}".rstrip()
+        return f"{self.label} = {self.words}" if self.label else self.words
 
 
 def plus_minus(value: float, std: float) -> str:
@@ -105,7 +114,7 @@ class Quantities(Mapping[str, Quantity]):
         return len(self._quantities)
 
     def __repr__(self) -> str:
-        return "\n".join(f"{name}: {q}" for name, q in self._quantities.items()) or "none"
+        return "\n".join(f"{name} = {q.words}" for name, q in self._quantities.items()) or "none"
 
 
 class Covariance:
@@ -162,19 +171,19 @@ def to_gtc(quantities: Mapping[str, Quantity], covariance: Covariance | None) ->
     import GTC
 
     names = correlated(quantities, covariance)
-    inverse = {name: short for short, name in names.items()}
     numbers = {
-        name: GTC.ureal(
-            q.value,
-            q.std,
-            math.inf if q.dof is None else q.dof,
-            label=q.label or name,
-            independent=name not in inverse,
-        )
-        for name, q in quantities.items()
+        name: GTC.ureal(q.value, q.std, _degrees(q), label=q.label or name) for name, q in quantities.items()
     }
-    if covariance is None:
+    if covariance is None or not names:
         return numbers
+    together = [quantities[name] for name in names.values()]
+    made = GTC.multiple_ureal(
+        [q.value for q in together],
+        [q.std for q in together],
+        _degrees(together[0]),
+        [q.label for q in together],
+    )
+    numbers.update(zip(names.values(), made, strict=True))
     several = list(names.items())
     for k, (short, name) in enumerate(several):
         for other_short, other in several[:k]:
@@ -182,6 +191,10 @@ def to_gtc(quantities: Mapping[str, Quantity], covariance: Covariance | None) ->
             if math.isfinite(r):
                 GTC.set_correlation(r, numbers[name], numbers[other])
     return numbers
+
+
+def _degrees(q: Quantity) -> float:
+    return math.inf if q.dof is None else q.dof
 
 
 def correlated(quantities: Mapping[str, Quantity], covariance: Covariance | None) -> dict[str, str]:

@@ -53,7 +53,8 @@ class Result:
 
     @cached_property
     def _json(self) -> dict[str, Any]:
-        return json.loads(self._answered.json())
+        answer: dict[str, Any] = json.loads(self._answered.json())
+        return answer
 
     def __getitem__(self, key: str) -> Any:
         return self._json[key]
@@ -184,6 +185,9 @@ class Result:
 
     def __repr__(self) -> str:
         _, _, sentence = self._answered.told()
+        if not sentence:
+            told = (f"{key} {self._json[key]}" for key in ("kind", "seed", "points") if key in self)
+            sentence = ", ".join(word for word in told if "[" not in word)
         return f"<errsep {self.command}: {sentence}>" if sentence else f"<errsep {self.command}>"
 
     __str__ = __repr__
@@ -248,8 +252,9 @@ def _quantities(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Quanti
 def _name(part: Any, k: int) -> str:
     if isinstance(part, Mapping):
         for key in ("label", "name", "point", "effect", "quantity"):
-            if isinstance(part.get(key), str):
-                return part[key]
+            name = part.get(key)
+            if isinstance(name, str):
+                return name
     return str(k)
 
 

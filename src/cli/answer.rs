@@ -172,7 +172,7 @@ fn unwritable(error: serde_json::Error) -> Message {
 }
 
 /// Prints to standard output. A reader that has heard enough and closed it is no error.
-fn print(text: &str) -> Result<(), Message> {
+pub(super) fn print(text: &str) -> Result<(), Message> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Message::bad_input(format!(

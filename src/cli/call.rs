@@ -3,7 +3,7 @@
 
 use clap::Parser;
 
-use super::{Cli, Command, Traced, common};
+use super::{Answering, Cli, Command, Traced, common};
 use crate::io::Message;
 use crate::io::source::{InMemory, begin_record_with};
 
@@ -34,12 +34,16 @@ pub fn call<S: AsRef<str>>(arguments: &[S], in_memory: Vec<InMemory>) -> Result<
     let arguments: Vec<String> = arguments.iter().map(|a| a.as_ref().to_owned()).collect();
     let words = std::iter::once("errsep").chain(arguments.iter().map(String::as_str));
     let mut cli = Cli::try_parse_from(words).map_err(|error| not_understood(&error))?;
-    if let Command::Reversal(args) = &mut cli.command {
+    let Command::Answer(command) = &mut cli.command else {
+        return Err(Message::bad_input("this command answers no question")
+            .remedy("call one that does, such as `reversal`"));
+    };
+    if let Answering::Reversal(args) = command {
         args.whole = true;
     }
     begin_record_with(true, in_memory);
     let _silent = common::Silent::begin();
-    cli.command.run()?.traced(&arguments)
+    command.run()?.traced(&arguments)
 }
 
 /// What is wrong with the arguments, and the hint that comes with it.

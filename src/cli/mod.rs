@@ -2,13 +2,16 @@
 
 pub mod anova;
 mod answer;
+pub mod batch;
 pub mod call;
 pub mod circle;
 mod common;
+pub mod completions;
 pub mod diagnose;
 pub mod four_sensor;
 pub mod fourier;
 pub mod machine;
+pub mod man;
 pub mod plan;
 mod quantity;
 pub mod reversal;
@@ -41,8 +44,19 @@ pub struct Cli {
     arguments: Vec<String>,
 }
 
+/// What there is to do.
 #[derive(Debug, Subcommand)]
 enum Command {
+    #[command(flatten)]
+    Answer(Answering),
+    Batch(batch::Args),
+    Completions(completions::Args),
+    Man(man::Args),
+}
+
+/// The commands that answer a question.
+#[derive(Debug, Subcommand)]
+enum Answering {
     Anova(anova::Args),
     Circle(circle::Args),
     Diagnose(diagnose::Args),
@@ -93,7 +107,13 @@ fn not_run(error: &clap::Error) -> u8 {
 impl Cli {
     /// Runs the command and prints or writes its answer.
     fn execute(&self) -> u8 {
-        let status = self.answered().unwrap_or_else(|message| {
+        let ended = match &self.command {
+            Command::Answer(command) => self.answered(command),
+            Command::Batch(args) => batch::run(args),
+            Command::Completions(args) => completions::run(args),
+            Command::Man(args) => man::run(args),
+        };
+        let status = ended.unwrap_or_else(|message| {
             // Nothing is left to tell a standard error that is closed.
             let _ = write!(std::io::stderr(), "{}", message.render());
             message.status()
@@ -102,19 +122,19 @@ impl Cli {
     }
 
     /// Makes sure that the answer can be written, works it out, and delivers it.
-    fn answered(&self) -> Result<Status, Message> {
-        let common = self.command.common();
+    fn answered(&self, command: &Answering) -> Result<Status, Message> {
+        let common = command.common();
         let out = common.out.as_deref();
         let folder = out
             .map(|place| OutFolder::reserve(place, common.force))
             .transpose()?;
         begin_record(folder.is_some() || common.format == Format::Json);
-        let answer = self.command.run()?;
+        let answer = command.run()?;
         answer.deliver(&self.arguments, common.format, folder)
     }
 }
 
-impl Command {
+impl Answering {
     fn common(&self) -> &CommonArgs {
         match self {
             Self::Anova(args) => &args.common,

@@ -2,11 +2,6 @@
 
 use std::process::ExitCode;
 
-use errsep::cli::Cli;
-
 fn main() -> ExitCode {
-    match Cli::from_arguments() {
-        Ok(command) => command.execute(),
-        Err(status) => status,
-    }
+    ExitCode::from(errsep::cli::run(std::env::args_os().collect()))
 }

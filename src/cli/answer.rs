@@ -34,75 +34,135 @@ pub struct Answer {
     pub status: Status,
 }
 
+/// An answer with the record of where it comes from, which its page shows too.
+#[derive(Debug, Clone)]
+pub struct Traced {
+    /// The answer.
+    pub answer: Answer,
+    /// Program, command and inputs.
+    pub provenance: Provenance,
+}
+
 impl Answer {
+    /// Adds where the answer comes from: `command` are the arguments.
+    pub(super) fn traced(mut self, command: &[String]) -> Result<Traced, Message> {
+        let inputs = self.inputs.iter().map(PathBuf::as_path);
+        let provenance = Provenance::of(command, inputs, self.seed)?;
+        self.page = self.page.provenance(report::Provenance {
+            version: provenance.version.clone(),
+            command: format!("{} {}", provenance.program, provenance.command.join(" ")),
+            inputs: provenance
+                .inputs
+                .iter()
+                .map(|i| (i.file.clone(), i.sha256.clone()))
+                .collect(),
+            seed: self.seed,
+            date: None,
+        });
+        Ok(Traced {
+            answer: self,
+            provenance,
+        })
+    }
+
     /// Writes the folder, if one was asked for, then prints, unless told to be quiet.
     pub(super) fn deliver(
         self,
+        command: &[String],
         common: &CommonArgs,
         folder: Option<OutFolder>,
     ) -> Result<Status, Message> {
         let format = common.format;
-        let Self {
-            text,
-            mut json,
-            page,
-            tables,
-            setup,
-            inputs,
-            seed,
-            status,
-        } = self;
         if folder.is_none() && format == Format::Text {
-            print(&printable::lines(&text))?;
-            return Ok(status);
+            print(&printable::lines(&self.text))?;
+            return Ok(self.status);
         }
-        let mut provenance = Provenance::of(inputs.iter().map(PathBuf::as_path), seed)?;
-        let (mut folder, mut written) = (folder, String::new());
-        if let Some(folder) = &mut folder {
-            let page = page.provenance(report::Provenance {
-                version: provenance.version.to_owned(),
-                command: format!("{} {}", provenance.program, provenance.command.join(" ")),
-                inputs: provenance
-                    .inputs
-                    .iter()
-                    .map(|i| (i.file.clone(), i.sha256.clone()))
-                    .collect(),
-                seed,
-                date: None,
-            });
-            folder.write("report.html", page.render().as_bytes())?;
-            for table in &tables {
-                folder.write_table(table)?;
+        let Traced { answer, provenance } = self.traced(command)?;
+        let (result, written) = match folder {
+            Some(folder) => {
+                let place = folder.place().to_owned();
+                let report = Report {
+                    html: &answer.page.render(),
+                    json: &answer.json,
+                    tables: &answer.tables,
+                    setup: answer.setup.as_deref(),
+                    inputs: &answer.inputs,
+                    provenance,
+                };
+                let names = report.names();
+                let written = format!("\nWritten to {}: {names}\n", place.display());
+                (report.write(folder)?, written)
             }
-            if let Some(setup) = &setup {
-                folder.write(SETUP, setup.as_bytes())?;
-            }
-            provenance.files = folder.written();
-            let names = tables.iter().map(|t| t.file_name.as_str());
-            let names = names.chain(setup.iter().map(|_| SETUP));
-            written = format!(
-                "\nWritten to {}: report.html, result.json{}\n",
-                folder.place().display(),
-                names.map(|name| format!(", {name}")).collect::<String>()
-            );
-        }
-        if let Value::Object(object) = &mut json {
-            object.insert("provenance".to_owned(), as_json(&provenance)?);
-        }
-        let pretty = serde_json::to_string_pretty(&json).map_err(unwritable)?;
-        let mut result = printable::json(&pretty).into_owned();
-        result.push('\n');
-        if let Some(mut folder) = folder {
-            folder.write("result.json", result.as_bytes())?;
-            folder.finish(&inputs)?;
-        }
+            None => (result_json(&answer.json, &provenance)?, String::new()),
+        };
         match format {
             _ if common.quiet => {}
-            Format::Text => print(&printable::lines(&(text + &written)))?,
+            Format::Text => print(&printable::lines(&(answer.text + &written)))?,
             Format::Json => print(&result)?,
         }
-        Ok(status)
+        Ok(answer.status)
     }
+}
+
+/// What the folder of a report holds.
+#[derive(Debug)]
+pub struct Report<'a> {
+    /// `report.html`.
+    pub html: &'a str,
+    /// `result.json` without its provenance.
+    pub json: &'a Value,
+    /// The tables.
+    pub tables: &'a [CsvTable],
+    /// `setup.toml`.
+    pub setup: Option<&'a str>,
+    /// The files that were read: none of them is replaced.
+    pub inputs: &'a [PathBuf],
+    /// Where the answer comes from; the written files are added.
+    pub provenance: Provenance,
+}
+
+impl Report<'_> {
+    /// The names of the files.
+    fn names(&self) -> String {
+        let tables = self.tables.iter().map(|t| t.file_name.as_str());
+        let names = tables.chain(self.setup.iter().map(|_| SETUP));
+        let more = names.map(|name| format!(", {name}")).collect::<String>();
+        format!("report.html, result.json{more}")
+    }
+
+    /// Writes the folder, whole or not at all; returns the text of `result.json`.
+    ///
+    /// # Errors
+    /// Those of [`OutFolder`].
+    pub fn write(mut self, mut folder: OutFolder) -> Result<String, Message> {
+        folder.write("report.html", self.html.as_bytes())?;
+        for table in self.tables {
+            folder.write_table(table)?;
+        }
+        if let Some(setup) = self.setup {
+            folder.write(SETUP, setup.as_bytes())?;
+        }
+        self.provenance.files = folder.written();
+        let result = result_json(self.json, &self.provenance)?;
+        folder.write("result.json", result.as_bytes())?;
+        folder.finish(self.inputs)?;
+        Ok(result)
+    }
+}
+
+/// An answer's JSON with its provenance, as it is printed.
+///
+/// # Errors
+/// It cannot be written as JSON.
+pub fn result_json(answer: &Value, provenance: &Provenance) -> Result<String, Message> {
+    let mut json = answer.clone();
+    if let Value::Object(object) = &mut json {
+        object.insert("provenance".to_owned(), as_json(provenance)?);
+    }
+    let pretty = serde_json::to_string_pretty(&json).map_err(unwritable)?;
+    let mut result = printable::json(&pretty).into_owned();
+    result.push('\n');
+    Ok(result)
 }
 
 fn as_json(provenance: &Provenance) -> Result<Value, Message> {

@@ -112,8 +112,11 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
 
 fn refused(error: &CircleError, args: &Args) -> Message {
     let message = match error {
-        CircleError::StraighterThanAnyCircle | CircleError::NotConverged { .. } => {
-            Message::not_solved(error.to_string()).remedy("measure a longer arc")
+        CircleError::StraighterThanAnyCircle => {
+            Message::not_determined(error.to_string()).remedy("measure a longer arc")
+        }
+        CircleError::NotConverged { .. } => {
+            Message::not_converged(error.to_string()).remedy("measure a longer arc")
         }
         CircleError::NoRedundancy => {
             Message::bad_input(error.to_string()).remedy("add points, or give --noise")

@@ -1,5 +1,6 @@
 //! What every command has.
 
+use std::cell::Cell;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -36,8 +37,30 @@ pub struct CommonArgs {
     pub seed: u64,
 }
 
+thread_local! {
+    static SILENT: Cell<bool> = const { Cell::new(false) };
+}
+
+/// While it lives, what this thread works out shows no progress.
+pub(super) struct Silent(bool);
+
+impl Silent {
+    pub(super) fn begin() -> Self {
+        Self(SILENT.replace(true))
+    }
+}
+
+impl Drop for Silent {
+    fn drop(&mut self) {
+        SILENT.set(self.0);
+    }
+}
+
 /// Progress on standard error, and only when that is a terminal. `total` where the end is known.
 pub fn progress(what: &'static str, total: Option<u64>) -> ProgressBar {
+    if SILENT.get() {
+        return ProgressBar::hidden();
+    }
     let bar = match total {
         Some(n) => ProgressBar::new(n),
         None => ProgressBar::new_spinner(),

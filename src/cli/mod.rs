@@ -2,6 +2,8 @@
 
 pub mod anova;
 mod answer;
+pub mod batch;
+pub mod call;
 pub mod circle;
 mod common;
 pub mod completions;
@@ -19,12 +21,12 @@ pub mod straightness;
 pub mod traces;
 
 use std::borrow::Cow;
+use std::ffi::OsString;
 use std::io::Write;
-use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-pub use answer::Answer;
+pub use answer::{Answer, Report, Traced, result_json};
 pub use common::{CommonArgs, Format, progress};
 
 use crate::io::source::begin_record;
@@ -37,18 +39,29 @@ use crate::io::{Message, OutFolder, Status, printable};
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// The arguments as they were given, for the record of the answer.
+    #[arg(skip)]
+    arguments: Vec<String>,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    #[command(flatten)]
+    Answer(Answering),
+    Batch(batch::Args),
+    Completions(completions::Args),
+    Man(man::Args),
+}
+
+// The commands that answer a question. (A doc comment would be taken for the program's own.)
+#[derive(Debug, Subcommand)]
+enum Answering {
     Anova(anova::Args),
     Circle(circle::Args),
-    Completions(completions::Args),
     Diagnose(diagnose::Args),
     FourSensor(four_sensor::Args),
     Fourier(fourier::Args),
     Machine(machine::Args),
-    Man(man::Args),
     Plan(plan::Args),
     Reversal(reversal::Args),
     Simulate(simulate::Args),
@@ -57,63 +70,101 @@ enum Command {
     Traces(traces::Args),
 }
 
-impl Cli {
-    /// The command line of this process. Help and version are printed and end it with status 0, a
-    /// command line that is not understood with 2.
-    ///
-    /// # Errors
-    /// How the process must end.
-    pub fn from_arguments() -> Result<Self, ExitCode> {
-        Self::try_parse().map_err(|error| {
-            let plain = error.render().to_string();
-            match printable::lines(&plain) {
-                Cow::Borrowed(_) => error.exit(),
-                // It repeats what a terminal would obey.
-                Cow::Owned(safe) => {
-                    let _ = write!(std::io::stderr(), "{safe}");
-                    ExitCode::from(Status::BadInput.code())
-                }
-            }
-        })
+/// The program: `arguments` begin with its name. Help and version are printed. Returns the exit status:
+/// 0 done, 1 could not be solved, 2 bad input or a command line that is not understood.
+pub fn run(arguments: Vec<OsString>) -> u8 {
+    let told = arguments.iter().skip(1);
+    let told = told.map(|a| a.to_string_lossy().into_owned()).collect();
+    let parsed = Cli::try_parse_from(arguments);
+    match parsed {
+        Ok(cli) => Cli {
+            arguments: told,
+            ..cli
+        }
+        .execute(),
+        Err(error) => not_run(&error),
     }
+}
 
-    /// Runs the command, prints or writes its answer, and says how it ended: 0 done, 1 could not
-    /// be solved, 2 bad input.
-    pub fn execute(&self) -> ExitCode {
-        let outcome = match &self.command {
-            Command::Anova(args) => answered(&args.common, || anova::run(args)),
-            Command::Circle(args) => answered(&args.common, || circle::run(args)),
+/// Prints what clap has to say instead of running a command.
+fn not_run(error: &clap::Error) -> u8 {
+    let plain = error.render().to_string();
+    match printable::lines(&plain) {
+        Cow::Borrowed(_) => {
+            // Nothing is left to tell a stream that is closed.
+            let _ = error.print();
+            u8::try_from(error.exit_code()).unwrap_or(Status::BadInput.code())
+        }
+        // It repeats what a terminal would obey.
+        Cow::Owned(safe) => {
+            let _ = write!(std::io::stderr(), "{safe}");
+            Status::BadInput.code()
+        }
+    }
+}
+
+impl Cli {
+    /// Runs the command and prints or writes its answer.
+    fn execute(&self) -> u8 {
+        let ended = match &self.command {
+            Command::Answer(command) => self.answered(command),
+            Command::Batch(args) => batch::run(args),
             Command::Completions(args) => completions::run(args),
-            Command::Diagnose(args) => answered(&args.common, || diagnose::run(args)),
-            Command::FourSensor(args) => answered(&args.common, || four_sensor::run(args)),
-            Command::Fourier(args) => answered(&args.common, || fourier::run(args)),
-            Command::Machine(args) => answered(args.common(), || machine::run(args)),
             Command::Man(args) => man::run(args),
-            Command::Plan(args) => answered(&args.common, || plan::run(args)),
-            Command::Reversal(args) => answered(&args.common, || reversal::run(args)),
-            Command::Simulate(args) => answered(args.common(), || simulate::run(args)),
-            Command::StepDiagonal(args) => answered(&args.common, || step_diagonal::run(args)),
-            Command::Straightness(args) => answered(&args.common, || straightness::run(args)),
-            Command::Traces(args) => answered(&args.common, || traces::run(args)),
         };
-        let status = outcome.unwrap_or_else(|message| {
+        let status = ended.unwrap_or_else(|message| {
             // Nothing is left to tell a standard error that is closed.
             let _ = write!(std::io::stderr(), "{}", message.render());
             message.status()
         });
-        ExitCode::from(status.code())
+        status.code()
+    }
+
+    /// Makes sure that the answer can be written, works it out, and delivers it.
+    fn answered(&self, command: &Answering) -> Result<Status, Message> {
+        let common = command.common();
+        let out = common.out.as_deref();
+        let folder = out
+            .map(|place| OutFolder::reserve(place, common.force))
+            .transpose()?;
+        begin_record(folder.is_some() || common.format == Format::Json);
+        let answer = command.run()?;
+        answer.deliver(&self.arguments, common, folder)
     }
 }
 
-/// Makes sure that the answer can be written, works it out, and delivers it.
-fn answered(
-    common: &CommonArgs,
-    work: impl FnOnce() -> Result<Answer, Message>,
-) -> Result<Status, Message> {
-    let out = common.out.as_deref();
-    let folder = out
-        .map(|place| OutFolder::reserve(place, common.force))
-        .transpose()?;
-    begin_record(folder.is_some() || common.format == Format::Json);
-    work()?.deliver(common, folder)
+impl Answering {
+    fn common(&self) -> &CommonArgs {
+        match self {
+            Self::Anova(args) => &args.common,
+            Self::Circle(args) => &args.common,
+            Self::Diagnose(args) => &args.common,
+            Self::FourSensor(args) => &args.common,
+            Self::Fourier(args) => &args.common,
+            Self::Machine(args) => args.common(),
+            Self::Plan(args) => &args.common,
+            Self::Reversal(args) => &args.common,
+            Self::Simulate(args) => args.common(),
+            Self::StepDiagonal(args) => &args.common,
+            Self::Straightness(args) => &args.common,
+            Self::Traces(args) => &args.common,
+        }
+    }
+
+    fn run(&self) -> Result<Answer, Message> {
+        match self {
+            Self::Anova(args) => anova::run(args),
+            Self::Circle(args) => circle::run(args),
+            Self::Diagnose(args) => diagnose::run(args),
+            Self::FourSensor(args) => four_sensor::run(args),
+            Self::Fourier(args) => fourier::run(args),
+            Self::Machine(args) => machine::run(args),
+            Self::Plan(args) => plan::run(args),
+            Self::Reversal(args) => reversal::run(args),
+            Self::Simulate(args) => simulate::run(args),
+            Self::StepDiagonal(args) => step_diagonal::run(args),
+            Self::Straightness(args) => straightness::run(args),
+            Self::Traces(args) => traces::run(args),
+        }
+    }
 }

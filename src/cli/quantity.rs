@@ -105,5 +105,5 @@ fn shown(unit: &str) -> (f64, &str) {
 
 /// The message where a result cannot be told as a quantity.
 pub(super) fn unexpandable(error: UncertaintyError) -> Message {
-    Message::not_solved(format!("the uncertainty cannot be stated: {error}"))
+    Message::not_determined(format!("the uncertainty cannot be stated: {error}"))
 }

@@ -172,7 +172,7 @@ impl LocatedScan {
 pub fn told(error: &FourierError) -> Message {
     let message = match error {
         FourierError::NoiseUnknown { .. } | FourierError::StepNotSeen { .. } => {
-            Message::not_solved(error.to_string())
+            Message::not_determined(error.to_string())
         }
         _ => Message::bad_input(error.to_string()),
     };

@@ -31,6 +31,27 @@ impl Status {
     }
 }
 
+/// What kind of trouble a message tells of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Trouble {
+    /// The input or the command line is wrong.
+    BadInput,
+    /// The data are good but do not determine what was asked for.
+    NotDetermined,
+    /// The data are good but no minimum was found.
+    NotConverged,
+}
+
+impl Trouble {
+    /// How a run ends that meets it.
+    pub const fn status(self) -> Status {
+        match self {
+            Self::BadInput => Status::BadInput,
+            Self::NotDetermined | Self::NotConverged => Status::NotSolved,
+        }
+    }
+}
+
 /// One line of an input file and the part of it that a message is about.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
@@ -133,7 +154,7 @@ pub struct Message {
     place: Option<Box<Place>>,
     shown: Option<Box<Shown>>,
     remedy: Option<String>,
-    status: Status,
+    trouble: Trouble,
 }
 
 impl Message {
@@ -144,14 +165,22 @@ impl Message {
             place: None,
             shown: None,
             remedy: None,
-            status: Status::BadInput,
+            trouble: Trouble::BadInput,
         }
     }
 
-    /// Good input, no answer (exit status 1).
-    pub fn not_solved(what: impl Into<String>) -> Self {
+    /// Good data that do not determine what was asked for (exit status 1).
+    pub fn not_determined(what: impl Into<String>) -> Self {
         Self {
-            status: Status::NotSolved,
+            trouble: Trouble::NotDetermined,
+            ..Self::bad_input(what)
+        }
+    }
+
+    /// Good data for which no minimum was found (exit status 1).
+    pub fn not_converged(what: impl Into<String>) -> Self {
+        Self {
+            trouble: Trouble::NotConverged,
             ..Self::bad_input(what)
         }
     }
@@ -188,9 +217,24 @@ impl Message {
         self.place.as_deref()
     }
 
+    /// What is wrong, without its place.
+    pub fn what(&self) -> &str {
+        &self.what
+    }
+
+    /// What to do about it, if that is known.
+    pub fn remedy_words(&self) -> Option<&str> {
+        self.remedy.as_deref()
+    }
+
+    /// What kind of trouble it tells of.
+    pub const fn trouble(&self) -> Trouble {
+        self.trouble
+    }
+
     /// How the run must end.
     pub const fn status(&self) -> Status {
-        self.status
+        self.trouble.status()
     }
 
     /// The message as the terminal shows it: the place, what is wrong, the line with the offending

@@ -19,7 +19,7 @@ pub mod table;
 pub mod units;
 
 pub use folder::{OutFile, OutFolder};
-pub use message::{Message, Status};
+pub use message::{Message, Status, Trouble};
 pub use output::CsvTable;
 pub use setup::SetupFile;
 pub use table::{Column, Row, TableReader};

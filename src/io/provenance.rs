@@ -17,21 +17,21 @@ pub struct Digested {
 }
 
 /// What a reader needs to get the same result again.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Provenance {
     /// Name of the program.
-    pub program: &'static str,
+    pub program: String,
     /// Its version.
-    pub version: &'static str,
+    pub version: String,
     /// The arguments of the command.
     pub command: Vec<String>,
     /// The seed of anything random; absent where nothing is.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
     /// The input files, as they were when they were read.
     pub inputs: Vec<Digested>,
     /// The files written beside `result.json`; empty where there is no folder.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<Digested>,
 }
 
@@ -41,6 +41,7 @@ impl Provenance {
     /// # Errors
     /// An input that was not read to its end, or was another when it was read again.
     pub fn of<'a>(
+        command: &[String],
         inputs: impl IntoIterator<Item = &'a Path>,
         seed: Option<u64>,
     ) -> Result<Self, Message> {
@@ -60,12 +61,9 @@ impl Provenance {
             })
             .collect::<Result<_, Message>>()?;
         Ok(Self {
-            program: env!("CARGO_PKG_NAME"),
-            version: env!("CARGO_PKG_VERSION"),
-            command: std::env::args_os()
-                .skip(1)
-                .map(|argument| argument.to_string_lossy().into_owned())
-                .collect(),
+            program: env!("CARGO_PKG_NAME").to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            command: command.to_vec(),
             seed,
             inputs,
             files: Vec::new(),

@@ -5,8 +5,9 @@
 //! so that a command may look at the first line before it chooses a reader.
 
 use std::cell::RefCell;
+use std::ffi::OsStr;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -22,9 +23,19 @@ thread_local! {
     static RECORD: RefCell<Option<Record>> = const { RefCell::new(None) };
 }
 
+/// An input that is held in memory under a name that no file needs to have, such as `<data>`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InMemory {
+    /// The name by which arguments and messages call it.
+    pub name: String,
+    /// Its bytes.
+    pub bytes: Arc<[u8]>,
+}
+
 /// What has been read since the record began.
 struct Record {
     hashing: bool,
+    in_memory: Vec<InMemory>,
     digests: Vec<(PathBuf, String)>,
     pipes: Vec<(PathBuf, Arc<Mutex<Pipe>>)>,
 }
@@ -32,13 +43,32 @@ struct Record {
 /// Begins the record of what this thread reads, with digests where they are wanted; an earlier one
 /// ends.
 pub fn begin_record(hashing: bool) {
+    begin_record_with(hashing, Vec::new());
+}
+
+/// As [`begin_record`], with inputs that are held in memory: until the next record begins, a path
+/// that is such a name opens these bytes.
+pub fn begin_record_with(hashing: bool, in_memory: Vec<InMemory>) {
     RECORD.with_borrow_mut(|record| {
         *record = Some(Record {
             hashing,
+            in_memory,
             digests: Vec::new(),
             pipes: Vec::new(),
         });
     });
+}
+
+impl Record {
+    /// What is held in memory under this name, or has been read of this pipe.
+    fn find(&self, path: &Path) -> Option<Bytes> {
+        let named = |held: &&InMemory| path.as_os_str() == OsStr::new(&held.name);
+        if let Some(held) = self.in_memory.iter().find(named) {
+            return Some(Bytes::Memory(Cursor::new(Arc::clone(&held.bytes))));
+        }
+        let pipe = self.pipes.iter().find(|(p, _)| p == path);
+        pipe.map(|(_, pipe)| Bytes::Pipe(Arc::clone(pipe), 0))
+    }
 }
 
 /// What a record says of an input.
@@ -79,6 +109,7 @@ pub struct Source {
 
 enum Bytes {
     File(File),
+    Memory(Cursor<Arc<[u8]>>),
     Pipe(Arc<Mutex<Pipe>>, usize),
 }
 
@@ -95,13 +126,9 @@ impl Source {
     /// # Errors
     /// The system's own.
     pub fn open(path: &Path) -> io::Result<Self> {
-        let known = RECORD.with_borrow(|record| {
-            let pipes = record.iter().flat_map(|r| &r.pipes);
-            let mut of_it = pipes.filter(|(p, _)| p == path);
-            of_it.next().map(|(_, pipe)| Arc::clone(pipe))
-        });
+        let known = RECORD.with_borrow(|record| record.as_ref().and_then(|r| r.find(path)));
         let bytes = match known {
-            Some(pipe) => Bytes::Pipe(pipe, 0),
+            Some(known) => known,
             None if path == Path::new(STANDARD_INPUT) => piped(path, Box::new(io::stdin())),
             None => {
                 let file = File::open(path)?;
@@ -160,6 +187,7 @@ impl Read for Source {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let n = match &mut self.bytes {
             Bytes::File(file) => file.read(buffer)?,
+            Bytes::Memory(bytes) => bytes.read(buffer)?,
             Bytes::Pipe(pipe, place) => {
                 let mut pipe = pipe.lock().unwrap_or_else(PoisonError::into_inner);
                 let n = pipe.read_at(*place, buffer)?;
@@ -214,6 +242,23 @@ mod tests {
         assert_eq!(digest_of(file.path()), Read256::Changed);
         begin_record(true);
         assert_eq!(digest_of(file.path()), Read256::Unread);
+    }
+
+    #[test]
+    fn what_is_in_memory_is_read_by_its_name_until_the_next_record() {
+        let held = InMemory {
+            name: "<data>".to_owned(),
+            bytes: Arc::from(&b"abc"[..]),
+        };
+        begin_record_with(true, vec![held]);
+        let name = Path::new("<data>");
+        for _ in 0..2 {
+            assert_eq!(whole(name), b"abc");
+        }
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(digest_of(name), Read256::Digest(abc.to_owned()));
+        begin_record(true);
+        assert!(Source::open(name).is_err());
     }
 
     #[test]

@@ -79,6 +79,25 @@ impl Page {
         self
     }
 
+    /// How the outcome stands, and the sentence a person acts on.
+    pub fn told(&self) -> (Standing, &str) {
+        (self.standing, &self.summary)
+    }
+
+    /// The title of the page.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// The figures, in the order of the page.
+    pub fn figures(&self) -> impl Iterator<Item = &Figure> {
+        let blocks = self.sections.iter().flat_map(|section| &section.blocks);
+        blocks.filter_map(|block| match block {
+            Block::Figure(figure) => Some(&**figure),
+            _ => None,
+        })
+    }
+
     /// Sets what the page was made from.
     #[must_use]
     pub fn provenance(mut self, provenance: Provenance) -> Self {
@@ -243,6 +262,21 @@ pub struct Figure {
 }
 
 impl Figure {
+    /// Its heading.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// What there is to see.
+    pub fn caption(&self) -> &str {
+        &self.caption
+    }
+
+    /// What is drawn.
+    pub const fn plot(&self) -> &Plot {
+        &self.plot
+    }
+
     /// A figure; the caption is a sentence or two of plain text.
     pub fn new(
         title: impl Into<String>,

@@ -50,9 +50,8 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     }
     let model = CirclePoints::new(&points, setup.circle.noise).map_err(|e| {
         let message = match e {
-            CircleError::StraighterThanAnyCircle | CircleError::NotConverged { .. } => {
-                Message::not_solved(e.to_string())
-            }
+            CircleError::StraighterThanAnyCircle => Message::not_determined(e.to_string()),
+            CircleError::NotConverged { .. } => Message::not_converged(e.to_string()),
             _ => Message::bad_input(e.to_string()),
         };
         message

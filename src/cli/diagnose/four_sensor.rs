@@ -36,7 +36,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         }
     }
     let model = FourSensors::new(&measured.each, setup.settings.noise)
-        .map_err(|e| Message::not_solved(e.to_string()).in_file(&args.data))?;
+        .map_err(|e| Message::not_determined(e.to_string()).in_file(&args.data))?;
     Case {
         readings: format!(
             "four sensors at {} slide positions, {} repeats",

@@ -116,7 +116,7 @@ pub fn notes(model: &FirstOrder) -> Vec<String> {
 /// Why readings cannot be diagnosed, and what to do.
 pub fn refusal(why: &NotDiagnosable) -> Message {
     match why {
-        NotDiagnosable::NoFit(_) => Message::not_solved(why.to_string())
+        NotDiagnosable::NoFit(_) => Message::not_converged(why.to_string())
             .remedy("`errsep reversal --simultaneous` with the same readings says more"),
         NotDiagnosable::RangesDiffer => Message::bad_input(why.to_string())
             .remedy("read every channel over the same range of x, at five or more places"),

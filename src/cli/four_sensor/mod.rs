@@ -122,7 +122,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         *noise = of_mean(*noise);
     }
     let unsolved =
-        |error: FourSensorError| Message::not_solved(error.to_string()).in_file(&args.data);
+        |error: FourSensorError| Message::not_determined(error.to_string()).in_file(&args.data);
     let geometry = measured.outputs.geometry();
     let outputs = &measured.outputs;
     let mut published = None;

@@ -77,7 +77,8 @@ pub fn write_corrected(
 
 /// Why effects cannot join, and what to do; `None` for what has nothing to do with them.
 pub fn refusal(why: &ReversalError) -> Option<Message> {
-    let not_solved = |remedy: String| Some(Message::not_solved(why.to_string()).remedy(remedy));
+    let not_determined =
+        |remedy: String| Some(Message::not_determined(why.to_string()).remedy(remedy));
     match why {
         ReversalError::UnknownEffect { effect } => {
             let names: Vec<&str> = CATALOGUE.iter().map(|e| e.name).collect();
@@ -90,19 +91,20 @@ pub fn refusal(why: &ReversalError) -> Option<Message> {
         ReversalError::EffectTwice { effect } => {
             Some(Message::bad_input(why.to_string()).remedy(format!("name {effect} once")))
         }
-        ReversalError::EffectStart { .. } => not_solved(
+        ReversalError::EffectStart { .. } => not_determined(
             "leave it out of --with: these readings have no channel that it could change".to_owned(),
         ),
-        ReversalError::EffectRefused { remedy, .. } => not_solved((*remedy).to_owned()),
-        ReversalError::EffectNotDetermined { effect, .. } => not_solved(format!(
+        ReversalError::EffectRefused { remedy, .. } => not_determined((*remedy).to_owned()),
+        ReversalError::EffectNotDetermined { effect, .. } => not_determined(format!(
             "leave {effect} out of --with, or take readings that show it: all four channels, repeats, both directions"
         )),
-        ReversalError::EffectImplausible { effect, .. } => not_solved(format!(
+        ReversalError::EffectImplausible { effect, .. } => not_determined(format!(
             "leave {effect} out of --with, and ask errsep diagnose what else the readings show"
         )),
-        ReversalError::EffectsNotConverged { .. } => not_solved(
-            "leave an effect out of --with, or take readings that tell it apart: all four channels, repeats, both directions"
-                .to_owned(),
+        ReversalError::EffectsNotConverged { .. } => Some(
+            Message::not_converged(why.to_string()).remedy(
+                "leave an effect out of --with, or take readings that tell it apart: all four channels, repeats, both directions",
+            ),
         ),
         _ => None,
     }

@@ -75,6 +75,9 @@ pub struct Args {
     columns: Option<ColumnMap>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
+    /// Page, tables and JSON are wanted whatever the other arguments say.
+    #[arg(skip)]
+    pub(super) whole: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -129,7 +132,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let mut inputs = vec![args.data.clone()];
     inputs.extend(args.setup.clone());
     // Of a million readings each of these is as large as the data: made only where asked for.
-    let folder = args.common.out.is_some();
+    let folder = args.common.out.is_some() || args.whole;
     let (page, tables) = if folder {
         (
             page::page(&args.data, &data, &setup, &outcome),

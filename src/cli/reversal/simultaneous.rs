@@ -50,11 +50,11 @@ fn refusal(why: &ReversalError, file: &Path, data: &ReversalData) -> Message {
     }
     let (message, remedy) = match why {
         ReversalError::NotConverged { .. } | ReversalError::NoStart(_) => (
-            Message::not_solved(why.to_string()),
+            Message::not_converged(why.to_string()),
             "solve in stages (without --simultaneous), or give fewer [model] knots",
         ),
         ReversalError::ThicknessNotDetermined { .. } => (
-            Message::not_solved(why.to_string()),
+            Message::not_determined(why.to_string()),
             "measure the thickness and leave fit_thickness out of the set-up",
         ),
         ReversalError::OnePosition { .. } => (
@@ -67,15 +67,15 @@ fn refusal(why: &ReversalError, file: &Path, data: &ReversalData) -> Message {
             "take more readings, or give fewer [model] knots in the set-up",
         ),
         ReversalError::TooFewToTellNoise { .. } => (
-            Message::not_solved(why.to_string()),
+            Message::not_determined(why.to_string()),
             "give fewer [model] knots, state [indicator] noise in the set-up, or take more readings",
         ),
         ReversalError::TooManyKnots { .. } => (
-            Message::not_solved(why.to_string()),
+            Message::not_determined(why.to_string()),
             "give no more [model] knots than that, or leave them out: they are chosen from the data",
         ),
         ReversalError::NotDetermined { .. } => (
-            Message::not_solved(why.to_string()),
+            Message::not_determined(why.to_string()),
             "give fewer [model] knots, or leave them out: they are chosen from the data",
         ),
         _ => (

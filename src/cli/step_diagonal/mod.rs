@@ -98,7 +98,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     };
     let refused = |e: DiagonalError| {
         let message = match e {
-            DiagonalError::Numerical { .. } => Message::not_solved(e.to_string()),
+            DiagonalError::Numerical { .. } => Message::not_converged(e.to_string()),
             DiagonalError::MeasuredUncertainty { .. } => Message::bad_input(e.to_string())
                 .remedy("give the slope and its standard uncertainty in um/mm"),
             _ => Message::bad_input(e.to_string()).remedy("see `errsep step-diagonal --help`"),

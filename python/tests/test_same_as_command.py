@@ -1,0 +1,184 @@
+"""Each function gives what the command gives, to the last bit: both are written by one serializer, so
+the comparison is of equality and has no tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import FIXTURES, plain
+
+import errsep
+
+NISTIR = FIXTURES / "nistir6868"
+
+
+def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[str | Path]]]:
+    """A call of each function and the command that is the same."""
+    readings, setup = FIXTURES / "reversal/readings.csv", FIXTURES / "reversal/setup.toml"
+    four, four_setup = FIXTURES / "four_sensor/data.csv", FIXTURES / "four_sensor/setup.toml"
+    machine, holes = NISTIR / "machine.toml", NISTIR / "holes.csv"
+    scans, section = tmp_path / "scans.csv", tmp_path / "section.toml"
+    made = errsep.simulate("fourier", seed=5)
+    scans.write_text(made.summary())
+    section.write_text(made.setup or "")
+    profile = tmp_path / "profile.csv"
+    steps = tmp_path / "steps.csv"
+    steps.write_text(errsep.simulate("step-diagonal", seed=5).summary())
+    profile.write_text("x,deviation\n0,-0.3\n100,0.9\n200,0.1\n")
+    planned = {"noise": 0.02, "travel": 300.0, "positions": 31, "repeats": 2}
+    plan = tmp_path / "plan.toml"
+    plan.write_text("\n".join(f"{key} = {value}" for key, value in planned.items()))
+    made_machine = {"stations": 5, "repeats": 3, "seed": 2}
+    return {
+        "reversal": (lambda: errsep.reversal(readings), ["reversal", readings]),
+        "reversal, simultaneous": (
+            lambda: errsep.reversal(readings, setup, simultaneous=True),
+            ["reversal", readings, "--setup", setup, "--simultaneous"],
+        ),
+        "reversal with effects": (
+            lambda: errsep.reversal(readings, simultaneous=True, with_=["thermal-drift", "zero-jump"]),
+            ["reversal", readings, "--simultaneous", "--with", "thermal-drift,zero-jump"],
+        ),
+        "reversal, diagnosed": (
+            lambda: errsep.reversal(readings, setup, simultaneous=True, diagnose=True, seed=3),
+            ["reversal", readings, "--setup", setup, "--simultaneous", "--diagnose", "--seed", "3"],
+        ),
+        "circle": (
+            lambda: errsep.circle(FIXTURES / "circle/six_points.csv", nistir=True),
+            ["circle", FIXTURES / "circle/six_points.csv", "--nistir"],
+        ),
+        "four-sensor": (
+            lambda: errsep.four_sensor(four, four_setup),
+            ["four-sensor", four, "--setup", four_setup],
+        ),
+        "fourier": (
+            lambda: errsep.fourier(scans, setup=section, length=100.0),
+            ["fourier", scans, "--setup", section, "--length", "100"],
+        ),
+        "step-diagonal": (
+            lambda: errsep.step_diagonal(steps, choose=True),
+            ["step-diagonal", steps, "--choose"],
+        ),
+        "machine predict": (
+            lambda: errsep.machine(machine, "predict", holes, independence="points"),
+            ["machine", machine, "predict", holes, "--independence", "points"],
+        ),
+        "machine length": (
+            lambda: errsep.machine(machine, "length", holes, between=[("3", "9"), "3:15"], trials=500),
+            ["machine", machine, "length", holes, *"--between 3:9 --between 3:15 --trials 500".split()],
+        ),
+        "machine circularity": (
+            lambda: errsep.machine(
+                machine, "circularity", centre=(75, 75), radius=44.5, trials=300, seed=4
+            ),
+            ["machine", machine, *"circularity --centre 75,75 --radius 44.5 --trials 300 --seed 4".split()],
+        ),
+        "machine parts": (
+            lambda: errsep.machine(machine, "parts", NISTIR / "drilled_holes.csv", points=holes),
+            ["machine", machine, "parts", NISTIR / "drilled_holes.csv", "--points", holes],
+        ),
+        "anova": (
+            lambda: errsep.anova(NISTIR / "replicates.csv", recipe="section-5.1", confidence=0.9),
+            ["anova", NISTIR / "replicates.csv", "--recipe", "section-5.1", "--confidence", "0.9"],
+        ),
+        "straightness": (lambda: errsep.straightness(profile), ["straightness", profile]),
+        "diagnose": (
+            lambda: errsep.diagnose(readings, setup, without=["taper"], false_alarm=0.05),
+            ["diagnose", readings, "--setup", setup, "--without", "taper", "--false-alarm", "0.05"],
+        ),
+        "plan": (lambda: errsep.plan(planned), ["plan", plan]),
+        "simulate": (
+            lambda: errsep.simulate(
+                "reversal", alpha=-5, thickness=42, effects={"zero-jump": 0.2}, seed=7
+            ),
+            ["simulate", "reversal", *"--alpha=-5 --thickness 42 --effect zero-jump=0.2 --seed 7".split()],
+        ),
+        "simulate machine": (
+            lambda: errsep.simulate("machine", machine, points=holes, **made_machine),
+            [
+                *["simulate", "machine", machine, "--points", holes],
+                *"--stations 5 --repeats 3 --seed 2".split(),
+            ],
+        ),
+    }
+
+
+
+
+@pytest.fixture(scope="module")
+def calls(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return both(tmp_path_factory.mktemp("inputs"))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "reversal",
+        "reversal, simultaneous",
+        "reversal with effects",
+        "reversal, diagnosed",
+        "circle",
+        "four-sensor",
+        "fourier",
+        "step-diagonal",
+        "machine predict",
+        "machine length",
+        "machine circularity",
+        "machine parts",
+        "anova",
+        "straightness",
+        "diagnose",
+        "plan",
+        "simulate",
+        "simulate machine",
+    ],
+)
+def test_the_answer_is_that_of_the_command(
+    name: str, calls: dict[str, Any], command: Callable[..., dict[str, Any]]
+) -> None:
+    call, words = calls[name]
+    answer = call()
+    assert plain(answer.to_dict()) == command(*words)
+    assert repr(answer).startswith(f"<errsep {words[0]}")
+
+
+def test_every_call_is_compared(calls: dict[str, Any]) -> None:
+    mark = next(m for m in test_the_answer_is_that_of_the_command.pytestmark)
+    assert list(calls) == mark.args[1]
+    functions = {"_".join(words[0].split("-")) for _, words in calls.values()}
+    known = {"reversal", "circle", "four_sensor", "fourier", "step_diagonal", "machine", "anova"}
+    assert functions == known | {"straightness", "diagnose", "plan", "simulate"}
+
+
+def test_the_text_is_that_of_the_command(readings: Path) -> None:
+    import subprocess
+
+    from conftest import program
+
+    words = [str(program()), "reversal", str(readings)]
+    printed = subprocess.run(words, capture_output=True, check=True, text=True).stdout
+    assert errsep.reversal(readings).summary() == printed
+
+
+def test_the_report_is_that_of_the_command(readings: Path, tmp_path: Path) -> None:
+    """The same files with the same bytes, but for the command line and the seconds told in two of them."""
+    import subprocess
+
+    from conftest import program
+
+    ours, theirs = tmp_path / "ours", tmp_path / "theirs"
+    errsep.reversal(readings).report(ours)
+    words = [str(program()), "reversal", str(readings), "--out", str(theirs)]
+    subprocess.run(words, capture_output=True, check=True)
+    names = sorted(path.name for path in theirs.iterdir())
+    assert sorted(path.name for path in ours.iterdir()) == names
+    for name in names:
+        if name not in ("report.html", "result.json"):
+            assert (ours / name).read_bytes() == (theirs / name).read_bytes(), name
+    told = f" --out {theirs}"
+    page = (theirs / "report.html").read_text()
+    assert told in page
+    assert (ours / "report.html").read_text() == page.replace(told, "")

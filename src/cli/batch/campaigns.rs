@@ -1,0 +1,144 @@
+//! The list of campaigns.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use clap::CommandFactory;
+
+use crate::cli::Cli;
+use crate::io::message::nearest;
+use crate::io::{Message, Row, TableReader};
+
+/// Commands that are no campaign: they make no answer from data.
+const NOT_HERE: [&str; 4] = ["batch", "completions", "man", "help"];
+/// Options that the batch itself decides.
+const DECIDED: [&str; 5] = ["--out", "--format", "--force", "--quiet", "-q"];
+
+/// One campaign.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Campaign {
+    /// Its name, no other's.
+    pub id: String,
+    /// The arguments of the command, its name first; paths as this process opens them.
+    pub arguments: Vec<String>,
+    /// The files among them.
+    pub files: Vec<PathBuf>,
+    /// The arguments as the list has them: what they are called does not hang on where the list lies.
+    pub as_listed: Vec<String>,
+}
+
+/// All campaigns, in the order of the list.
+pub(super) struct Campaigns(pub Vec<Campaign>);
+
+impl Campaigns {
+    /// Reads a list.
+    ///
+    /// # Errors
+    /// It is no such list: the message says where.
+    pub fn read(path: &Path) -> Result<Self, Message> {
+        let mut table = TableReader::open(path)?;
+        table.only(&["id", "command", "data", "setup", "options"])?;
+        let (id, command) = (table.column("id")?, table.column("command")?);
+        let (data, setup) = (table.optional("data"), table.optional("setup"));
+        let options = table.optional("options");
+        let known: Vec<String> = Cli::command()
+            .get_subcommands()
+            .map(|c| c.get_name().to_owned())
+            .filter(|name| !NOT_HERE.contains(&name.as_str()))
+            .collect();
+        let folder = path.parent().unwrap_or_else(|| Path::new("")).to_owned();
+        let mut lines: HashMap<String, usize> = HashMap::new();
+        let mut campaigns = Vec::new();
+        while let Some(row) = table.next_row()? {
+            let text = |column: &Option<_>| column.as_ref().map_or("", |c| row.text(c));
+            let name = row.text(&id).to_owned();
+            if name.is_empty() {
+                return Err(row
+                    .error(&id, "the campaign has no id")
+                    .remedy("give every campaign an id of its own"));
+            }
+            if let Some(line) = lines.insert(name.clone(), row.line()) {
+                return Err(row
+                    .error(&id, format!("id `{name}` stands in line {line} already"))
+                    .remedy("give every campaign an id of its own"));
+            }
+            let word = row.text(&command);
+            if !known.iter().any(|k| k == word) {
+                let remedy = match nearest(word, known.iter().map(String::as_str)) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!("commands are {}", known.join(", ")),
+                };
+                return Err(row
+                    .error(&command, format!("`{word}` is no command for a campaign"))
+                    .remedy(remedy));
+            }
+            let own = words(row, options.as_ref())?;
+            let mut campaign = Campaign {
+                id: name,
+                arguments: Vec::new(),
+                files: Vec::new(),
+                as_listed: Vec::new(),
+            };
+            campaign.word(word);
+            if !text(&data).is_empty() {
+                campaign.file(&folder, text(&data));
+            }
+            if !text(&setup).is_empty() {
+                campaign.word("--setup");
+                campaign.file(&folder, text(&setup));
+            }
+            for option in own {
+                campaign.word_or_file(&folder, &option);
+            }
+            campaigns.push(campaign);
+        }
+        if campaigns.is_empty() {
+            return Err(table.no_rows());
+        }
+        Ok(Self(campaigns))
+    }
+}
+
+/// The options of a row, word by word as a shell takes them.
+fn words(row: Row<'_>, column: Option<&crate::io::Column>) -> Result<Vec<String>, Message> {
+    let Some(column) = column else {
+        return Ok(Vec::new());
+    };
+    let words = shlex::split(row.text(column)).ok_or_else(|| {
+        row.error(column, "the options have a quote that does not end")
+            .remedy("close the quote")
+    })?;
+    let decided = words.iter().find(|word| {
+        let name = word.split('=').next().unwrap_or_default();
+        DECIDED.contains(&name)
+    });
+    match decided {
+        Some(word) => Err(row
+            .error(column, format!("`{word}` is not for a campaign of a batch"))
+            .remedy("leave it out: the batch prints nothing and writes its own folder")),
+        None => Ok(words),
+    }
+}
+
+impl Campaign {
+    fn word(&mut self, word: &str) {
+        self.arguments.push(word.to_owned());
+        self.as_listed.push(word.to_owned());
+    }
+
+    fn file(&mut self, folder: &Path, name: &str) {
+        let place = folder.join(name);
+        self.arguments.push(place.to_string_lossy().into_owned());
+        self.as_listed.push(name.to_owned());
+        self.files.push(place);
+    }
+
+    /// An option that names a file beside the list stands for that file.
+    fn word_or_file(&mut self, folder: &Path, word: &str) {
+        if !word.starts_with('-') && folder.join(word).is_file() {
+            self.file(folder, word);
+        } else {
+            self.word(word);
+        }
+    }
+}

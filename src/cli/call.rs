@@ -1,0 +1,111 @@
+//! A command called by a program: the arguments of the command line, the answer in place of its
+//! printing. The Python package calls by this.
+
+use clap::Parser;
+
+use super::{Answering, Cli, Command, Traced, common};
+use crate::io::Message;
+use crate::io::source::{InMemory, begin_record_with};
+
+/// Runs a command: `arguments` are those of the command line without the name of the program, such as
+/// `["reversal", "<data>", "--simultaneous"]`. A path that is the name of one of the inputs held in
+/// memory stands for these bytes. Nothing is printed, and of `--out` and `--format` nothing is heeded;
+/// [`Report`](super::Report) writes the folder.
+///
+/// # Errors
+/// The arguments are not understood, or what the command itself refuses.
+///
+/// ```
+/// use std::sync::Arc;
+/// use errsep::cli::call::call;
+/// use errsep::io::source::InMemory;
+///
+/// let profile = InMemory {
+///     name: "<data>".to_owned(),
+///     bytes: Arc::from(&b"x,deviation\n0,0\n100,2\n200,0\n"[..]),
+/// };
+/// let called = call(&["straightness", "<data>"], vec![profile])?;
+/// let zone = &called.answer.json["reference_lines"][2];
+/// assert_eq!(zone["reference"], "minimum_zone");
+/// assert_eq!(zone["error"]["value"], 2.0);
+/// # Ok::<(), errsep::io::Message>(())
+/// ```
+pub fn call<S: AsRef<str>>(arguments: &[S], in_memory: Vec<InMemory>) -> Result<Traced, Message> {
+    let arguments: Vec<String> = arguments.iter().map(|a| a.as_ref().to_owned()).collect();
+    let words = std::iter::once("errsep").chain(arguments.iter().map(String::as_str));
+    let mut cli = Cli::try_parse_from(words).map_err(|error| not_understood(&error))?;
+    let Command::Answer(command) = &mut cli.command else {
+        return Err(Message::bad_input("this command answers no question")
+            .remedy("call one that does, such as `reversal`"));
+    };
+    if let Answering::Reversal(args) = command {
+        args.whole = true;
+    }
+    begin_record_with(true, in_memory);
+    let _silent = common::Silent::begin();
+    command.run()?.traced(&arguments)
+}
+
+/// What is wrong with the arguments, and the hint that comes with it.
+fn not_understood(error: &clap::Error) -> Message {
+    let told = error.render().to_string();
+    let told = told.strip_prefix("error: ").unwrap_or(&told);
+    let mut parts = told.split("\n\n").map(str::trim);
+    let what = parts.next().unwrap_or_default();
+    let tip = parts.find_map(|part| part.strip_prefix("tip: "));
+    Message::bad_input(what.split_whitespace().collect::<Vec<_>>().join(" "))
+        .remedy(tip.unwrap_or("see the command's --help for what it takes"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::io::Trouble;
+
+    fn profile(text: &str) -> Vec<InMemory> {
+        vec![InMemory {
+            name: "<data>".to_owned(),
+            bytes: Arc::from(text.as_bytes()),
+        }]
+    }
+
+    #[test]
+    fn a_message_points_into_what_is_in_memory() {
+        let message = call(
+            &["straightness", "<data>"],
+            profile("x,deviation\n0,1\n1,a\n"),
+        )
+        .map(|_| ())
+        .unwrap_err();
+        let place = message.place().unwrap();
+        assert_eq!((place.line, place.column), (3, 3));
+        assert_eq!(place.file.to_str(), Some("<data>"));
+        assert_eq!(message.trouble(), Trouble::BadInput);
+    }
+
+    #[test]
+    fn an_unknown_option_is_told_with_its_hint() {
+        let message = call(&["reversal", "<data>", "--simultaneus"], profile(""))
+            .map(|_| ())
+            .unwrap_err();
+        assert!(message.what().contains("'--simultaneus'"), "{message}");
+        let hint = message.remedy_words().unwrap();
+        assert!(hint.contains("'--simultaneous'"), "{hint}");
+    }
+
+    #[test]
+    fn a_reversal_is_answered_whole() {
+        let readings: String = ["1A", "1B", "2A", "2B"]
+            .iter()
+            .flat_map(|c| (0..9).map(move |i| format!("{c},{i},0.{}\n", i * i % 7)))
+            .collect();
+        let data = format!("channel,x,reading\n{readings}");
+        let called = call(&["reversal", "<data>"], profile(&data)).unwrap();
+        assert!(called.answer.json["tilts"]["alpha"]["std"].is_number());
+        assert!(!called.answer.tables.is_empty());
+        assert!(called.answer.page.render().contains("<svg"));
+        assert_eq!(called.provenance.command, ["reversal", "<data>"]);
+    }
+}

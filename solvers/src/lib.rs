@@ -113,6 +113,7 @@ pub mod outcome;
 pub mod problem;
 mod processor;
 pub mod regularization;
+pub mod scalar;
 pub mod separable;
 pub mod structured;
 pub mod uncertainty;

@@ -62,6 +62,14 @@
 //! [`profile_interval`] follows the cost where curvature makes an interval lopsided;
 //! [`bootstrap()`] asks nothing of the distribution of the errors.
 //!
+//! # Features
+//!
+//! | feature, on unless turned off | what | brings |
+//! |---|---|---|
+//! | `checkpoint` | [`CheckpointFile`] | `ciborium` |
+//! | `periodogram` | [`regularization::periodogram`](fn@regularization::periodogram) | `realfft` |
+//! | `bootstrap` | [`bootstrap()`] | `rand`, `rand_chacha` |
+//!
 //! # Long runs
 //!
 //! The methods are argmin solvers: [`fit_with`] and [`fit_structured_with`] open argmin's executor for
@@ -101,6 +109,7 @@
 //! ```
 
 pub mod bounds;
+#[cfg(feature = "checkpoint")]
 pub mod checkpoint;
 pub mod covariance;
 pub mod derivatives;
@@ -120,6 +129,7 @@ pub mod uncertainty;
 
 pub use argmin;
 pub use bounds::{ActiveBound, Bounds, Side};
+#[cfg(feature = "checkpoint")]
 pub use checkpoint::CheckpointFile;
 pub use covariance::Covariance;
 pub use derivatives::{JacobianCheck, central_differences, check_jacobian};
@@ -133,5 +143,6 @@ pub use outcome::{Combination, Convergence, Ending, Fit, FitError, Iteration};
 pub use problem::{NoValue, Problem};
 pub use separable::{Joint, SeparableProblem};
 pub use structured::{StructuredFit, StructuredProblem, fit_structured, fit_structured_with};
+#[cfg(feature = "bootstrap")]
 pub use uncertainty::bootstrap::{Bootstrap, bootstrap};
 pub use uncertainty::profile::{Limit, ProfileInterval, ResidualScale, profile_interval};

@@ -442,9 +442,10 @@ const METHODS: [Method; 5] = [
 fn every_method_keeps_constraint_and_held_unknowns_and_finds_the_minimum() {
     for held in [false, true] {
         let mut problem = Bumps::new(12, 40, 0.05);
-        problem.held[2] = held;
+        (problem.held[1], problem.held[2]) = (held, held);
         let mut start = somewhere(&problem);
         start.border[2] = -0.05;
+        let begun = start.border.clone();
         let promised = solve(&problem, start.clone());
         assert!(promised.converged(), "{}", promised.ending);
         for method in METHODS {
@@ -465,9 +466,30 @@ fn every_method_keeps_constraint_and_held_unknowns_and_finds_the_minimum() {
             let missing = problem.constraints.missing(band, border).amax();
             // Epsilons: a mean of fourteen numbers of order one.
             assert!(missing < 1e-14, "{method:?}: {missing:e}");
-            assert!(!held || border[2] == -0.05, "{method:?}");
+            assert!(!held || border[1..] == begun[1..], "{method:?}");
         }
     }
+}
+
+#[test]
+fn the_last_step_is_taken_on_its_promise_without_a_pass() {
+    let mut problem = Bumps::new(12, 40, 0.05);
+    // Without the stretch the problem is linear: the first step is the last.
+    problem.held[0] = true;
+    let start = somewhere(&problem);
+    let whole = solve(&problem, start.clone());
+    assert_eq!(whole.passes, 2);
+    let trusting = Options {
+        cost_tolerance: 0.9999,
+        ..Options::structured()
+    };
+    let fit = fit_structured(&problem, start, &trusting).unwrap();
+    assert!(fit.converged(), "{}", fit.ending);
+    assert_eq!(fit.passes, 1);
+    // Epsilons through a condition of 1e4.
+    let apart = (fit.parameters.joined() - whole.parameters.joined()).amax();
+    assert!(apart < 1e-11, "{apart:e}");
+    assert!((fit.cost - whole.cost).abs() < 1e-11 * whole.cost);
 }
 
 #[test]
@@ -500,12 +522,17 @@ fn the_gradient_of_the_model_vanishes_at_the_constrained_minimum() {
         cosine(model.gradient())
     );
     assert!(cosine(&plain) > 1e-6, "{}", cosine(&plain));
-    let downhill = model.steepest_descent(&DVector::from_element(plain.len(), 2.0));
-    let along = problem.constraints.missing(
-        &downhill.as_slice()[..problem.coefficients],
-        &downhill.as_slice()[problem.coefficients..],
-    );
-    assert!(along.amax() <= 1e-14 * plain.amax());
+    // Steepest descent keeps the constraint, and what is held.
+    let system = evaluate(&problem, &somewhere(&problem)).unwrap().system;
+    for held in [[false; BORDER], [false, true, false]] {
+        let model = BorderedModel::new(system.clone(), &problem.constraints, &held, point);
+        let downhill = model.steepest_descent(&DVector::from_element(plain.len(), 2.0));
+        let (band, border) = downhill.as_slice().split_at(problem.coefficients);
+        let left = problem.constraints.missing(band, border).amax();
+        // Epsilons: a mean of fourteen numbers.
+        assert!(left <= 1e-14 * downhill.amax(), "{left:e}");
+        assert!(downhill.amax() > 0.0 && (!held[1] || border[1] == 0.0));
+    }
 }
 
 #[test]

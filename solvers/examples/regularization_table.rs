@@ -5,8 +5,9 @@
 
 use errsep_solvers::regularization::{
     CornerStatus, Decomposition, Family, RegularizationError, Spectrum, discrepancy, gcv, l_curve,
-    likelihood, periodogram, problems,
+    likelihood, periodogram,
 };
+use errsep_standard_problems::ill_posed as problems;
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

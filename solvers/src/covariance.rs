@@ -119,28 +119,6 @@ impl Covariance {
         let product = self.matrix[(i, i)] * self.matrix[(j, j)];
         (product > 0.0).then(|| (self.matrix[(i, j)] / product.sqrt()).clamp(-1.0, 1.0))
     }
-
-    /// The variance of gᵀp, a linear function of the parameters (g of length n): infinite where
-    /// g is not orthogonal to the undetermined combinations.
-    pub fn variance_of(&self, gradient: &DVector<f64>) -> f64 {
-        for combination in &self.undetermined {
-            let terms: Vec<f64> = combination
-                .terms
-                .iter()
-                .filter_map(|(name, amount)| {
-                    let j = self.names.iter().position(|n| n == name)?;
-                    Some(gradient.get(j)? * amount)
-                })
-                .collect();
-            let sum: f64 = terms.iter().sum();
-            let size: f64 = terms.iter().map(|t| t.abs()).sum();
-            // Combinations are known to the rank tolerance; 1e-6 is far above its rounding.
-            if sum.abs() > 1e-6 * size {
-                return f64::INFINITY;
-            }
-        }
-        (gradient.transpose() * &self.matrix * gradient)[(0, 0)].max(0.0)
-    }
 }
 
 fn free_parameters(fit: &Fit) -> Vec<usize> {

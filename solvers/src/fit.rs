@@ -1,6 +1,6 @@
 //! The front door: fit a problem from a start.
 
-use argmin::core::{Executor, State, TerminationReason};
+use argmin::core::{Executor, OptimizationResult, State, TerminationReason};
 use nalgebra::DVector;
 
 use crate::bounds::{ActiveBound, Bounds};
@@ -12,7 +12,7 @@ use crate::nonlinear::strategy::Steps;
 use crate::nonlinear::system::{Dense, System};
 use crate::nonlinear::variable_projection::{ProjectedJacobian, VariableProjection};
 use crate::options::Options;
-use crate::outcome::{Combination, Convergence, Ending, Fit, FitError};
+use crate::outcome::{Convergence, Ending, Fit, FitError, Iteration};
 use crate::problem::Problem;
 use crate::separable::{Joint, SeparableProblem};
 
@@ -50,12 +50,38 @@ pub fn fit_with<'a, P: Problem + ?Sized>(
     configure: impl FnOnce(FitExecutor<'a, P>) -> FitExecutor<'a, P>,
 ) -> Result<Fit, FitError> {
     options.validate()?;
-    check_problem(problem, &start)?;
+    check_problem(problem)?;
+    let system = dense(problem, options);
+    check_start(&system, &start)?;
     if let Some(bounds) = &options.bounds {
         check_bounds(problem, bounds, &start)?;
     }
 
-    let system = dense(problem, options);
+    let Finished {
+        system,
+        point,
+        unit,
+        ending,
+        mut effort,
+    } = finish(run(system, start, options, configure)?)?;
+    // Factoring consumed the Jacobian: one more evaluation costs less than holding two.
+    effort.jacobian_evaluations += 1;
+    assemble(problem, &system, (point, unit), ending, effort, options)
+}
+
+/// The executor of a system's minimiser.
+type SystemExecutor<O> = Executor<O, Minimiser<Steps, <O as System>::Model>, FitState>;
+
+/// What it leaves.
+type Run<O> = OptimizationResult<O, Minimiser<Steps, <O as System>::Model>, FitState>;
+
+/// Minimises any system under argmin's executor.
+pub(crate) fn run<O: System>(
+    system: O,
+    start: DVector<f64>,
+    options: &Options,
+    configure: impl FnOnce(SystemExecutor<O>) -> SystemExecutor<O>,
+) -> Result<Run<O>, FitError> {
     let minimiser = Minimiser::new(Steps::of(options), options.clone());
     let mut executor = Executor::new(system, minimiser)
         .configure(|state| state.param(start).max_iters(options.max_iterations))
@@ -63,8 +89,20 @@ pub fn fit_with<'a, P: Problem + ?Sized>(
     if let Some(limit) = options.time_limit {
         executor = executor.timeout(limit);
     }
-    let run = configure(executor).run().map_err(broken_off)?;
+    configure(executor).run().map_err(broken_off)
+}
 
+/// A run at its end.
+pub(crate) struct Finished<O: System> {
+    pub system: O,
+    pub point: Point<O::Model>,
+    pub unit: f64,
+    pub ending: Ending,
+    pub effort: Effort,
+}
+
+/// Why a run ended, where, and what it cost.
+pub(crate) fn finish<O: System>(run: Run<O>) -> Result<Finished<O>, FitError> {
     let ending = run
         .solver
         .ending()
@@ -74,8 +112,8 @@ pub fn fit_with<'a, P: Problem + ?Sized>(
     let effort = Effort {
         iterations: run.state.get_iter(),
         residual_evaluations: count("residual_count"),
-        // Factoring consumed the Jacobian: one more evaluation costs less than holding two.
-        jacobian_evaluations: count("jacobian_count") + 1,
+        jacobian_evaluations: count("jacobian_count"),
+        history: run.solver.history.clone(),
     };
     let system = run.problem.get_problem().ok_or_else(lost)?;
     let unit = run.solver.unit;
@@ -85,11 +123,17 @@ pub fn fit_with<'a, P: Problem + ?Sized>(
         None => {
             let parameters = run.state.get_param().cloned().ok_or_else(lost)?;
             run.solver
-                .check_lengths(problem.parameter_count(), &parameters)?;
+                .check_lengths(system.parameter_count(), &parameters)?;
             point_at(&system, parameters, unit)?
         }
     };
-    assemble(problem, &system, (point, unit), ending, effort, options)
+    Ok(Finished {
+        system,
+        point,
+        unit,
+        ending,
+        effort,
+    })
 }
 
 /// Fits a separable problem by variable projection from a start of its nonlinear parameters
@@ -143,6 +187,7 @@ pub fn fit_separable<P: SeparableProblem + ?Sized>(
         iterations: projected.iterations,
         residual_evaluations: projected.residual_evaluations,
         jacobian_evaluations: projected.jacobian_evaluations,
+        history: projected.history,
     };
     assemble(&joint, &system, (point, unit), ending, effort, &free)
 }
@@ -158,12 +203,7 @@ fn joint_ending<P: Problem + ?Sized>(
         _ => return projected,
     };
     let names = names_of(joint);
-    let combinations: Vec<Combination> = point
-        .model
-        .null_space()
-        .column_iter()
-        .map(|c| Combination::from_direction(&c.into_owned(), point.model.column_norms(), &names))
-        .collect();
+    let combinations = point.model.undetermined(&names);
     if combinations.is_empty() {
         return projected;
     }
@@ -171,10 +211,11 @@ fn joint_ending<P: Problem + ?Sized>(
 }
 
 /// What a fit cost.
-struct Effort {
-    iterations: u64,
-    residual_evaluations: u64,
-    jacobian_evaluations: u64,
+pub(crate) struct Effort {
+    pub iterations: u64,
+    pub residual_evaluations: u64,
+    pub jacobian_evaluations: u64,
+    pub history: Vec<Iteration>,
 }
 
 fn dense<'a, P: Problem + ?Sized>(problem: &'a P, options: &Options) -> Dense<'a, P> {
@@ -192,15 +233,15 @@ fn names_of<P: Problem + ?Sized>(problem: &P) -> Vec<String> {
         .collect()
 }
 
-fn point_at<P: Problem + ?Sized>(
-    system: &Dense<'_, P>,
+fn point_at<O: System>(
+    system: &O,
     parameters: DVector<f64>,
     unit: f64,
-) -> Result<Point<DenseModel>, FitError> {
-    let evaluation = system
+) -> Result<Point<O::Model>, FitError> {
+    let mut evaluation = system
         .evaluate(&parameters, unit)
         .map_err(|no| FitError::NoValueAtStart { reason: no.reason })?;
-    let model = system.linearize(&parameters, &evaluation, unit)?;
+    let model = system.linearize(&parameters, &mut evaluation, unit)?;
     Ok(Point {
         parameters,
         evaluation,
@@ -246,6 +287,7 @@ fn assemble<P: Problem + ?Sized>(
         iterations: effort.iterations,
         residual_evaluations: effort.residual_evaluations,
         jacobian_evaluations: effort.jacobian_evaluations,
+        history: effort.history,
         next_step,
         names,
         active_bounds,
@@ -255,16 +297,22 @@ fn assemble<P: Problem + ?Sized>(
     })
 }
 
-fn check_problem<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>) -> Result<(), FitError> {
+fn check_problem<P: Problem + ?Sized>(problem: &P) -> Result<(), FitError> {
     let (parameters, residuals) = (problem.parameter_count(), problem.residual_count());
-    if parameters == 0 {
-        return Err(FitError::NoParameters);
-    }
     if residuals < parameters {
         return Err(FitError::FewerResidualsThanParameters {
             residuals,
             parameters,
         });
+    }
+    Ok(())
+}
+
+/// Refuses a start of the wrong length or with values that are not finite.
+pub(crate) fn check_start<O: System>(system: &O, start: &DVector<f64>) -> Result<(), FitError> {
+    let parameters = system.parameter_count();
+    if parameters == 0 {
+        return Err(FitError::NoParameters);
     }
     if start.len() != parameters {
         return Err(FitError::StartLength {
@@ -274,7 +322,7 @@ fn check_problem<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>) -> Resu
     }
     match start.iter().position(|value| !value.is_finite()) {
         Some(j) => Err(FitError::StartNotFinite {
-            parameter: problem.parameter_name(j),
+            parameter: system.parameter_name(j),
             value: start[j],
         }),
         None => Ok(()),

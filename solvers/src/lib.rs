@@ -52,7 +52,8 @@
 //! | columns that may be dependent, and the shortest step is wanted | [`Factorization::Svd`] |
 //! | limits on parameters | [`Bounds`] in [`Options::bounds`] |
 //! | some readings wrong | a [`Loss`]: Huber or soft-L1 first, Tukey from a start that is nearly right |
-//! | thousands of local unknowns in order along an axis, a few global ones, any number of readings | [`structured`]: banded with a border, streaming |
+//! | a good start and a model linear in most of its parameters | [`Method::GaussNewtonFirst`] |
+//! | thousands of local unknowns in order along an axis, a few global ones, any number of readings | [`StructuredProblem`] with [`fit_structured`]: banded with a border, streaming |
 //! | an ill-posed linear problem | [`regularization`]: Tikhonov, truncated SVD and the choice of their parameter |
 //!
 //! # How sure
@@ -61,10 +62,18 @@
 //! [`profile_interval`] follows the cost where curvature makes an interval lopsided;
 //! [`bootstrap()`] asks nothing of the distribution of the errors.
 //!
+//! # Features
+//!
+//! | feature, on unless turned off | what | brings |
+//! |---|---|---|
+//! | `checkpoint` | [`CheckpointFile`] | `ciborium` |
+//! | `periodogram` | [`regularization::periodogram`](fn@regularization::periodogram) | `realfft` |
+//! | `bootstrap` | [`bootstrap()`] | `rand`, `rand_chacha` |
+//!
 //! # Long runs
 //!
-//! The methods are argmin solvers: [`fit_with`] opens argmin's executor for observers, checkpoints
-//! ([`CheckpointFile`]) and interruption, and [`Options`] has a time limit and a stop flag.
+//! The methods are argmin solvers: [`fit_with`] and [`fit_structured_with`] open argmin's executor for
+//! observers, checkpoints ([`CheckpointFile`]) and interruption, and [`Options`] has a time limit and a stop flag.
 //!
 //! ```
 //! # use errsep_solvers::{NoValue, Options, Problem, fit_with};
@@ -100,6 +109,7 @@
 //! ```
 
 pub mod bounds;
+#[cfg(feature = "checkpoint")]
 pub mod checkpoint;
 pub mod covariance;
 pub mod derivatives;
@@ -112,12 +122,14 @@ pub mod outcome;
 pub mod problem;
 mod processor;
 pub mod regularization;
+pub mod scalar;
 pub mod separable;
 pub mod structured;
 pub mod uncertainty;
 
 pub use argmin;
 pub use bounds::{ActiveBound, Bounds, Side};
+#[cfg(feature = "checkpoint")]
 pub use checkpoint::CheckpointFile;
 pub use covariance::Covariance;
 pub use derivatives::{JacobianCheck, central_differences, check_jacobian};
@@ -126,9 +138,11 @@ pub use linear::dense::Factorization;
 pub use loss::Loss;
 pub use nonlinear::minimiser::FitState;
 pub use nonlinear::variable_projection::{ProjectedJacobian, VariableProjection};
-pub use options::{Damping, Method, Options};
-pub use outcome::{Combination, Convergence, Ending, Fit, FitError};
+pub use options::{Damping, Finish, Method, Options};
+pub use outcome::{Combination, Convergence, Ending, Fit, FitError, Iteration};
 pub use problem::{NoValue, Problem};
 pub use separable::{Joint, SeparableProblem};
+pub use structured::{StructuredFit, StructuredProblem, fit_structured, fit_structured_with};
+#[cfg(feature = "bootstrap")]
 pub use uncertainty::bootstrap::{Bootstrap, bootstrap};
 pub use uncertainty::profile::{Limit, ProfileInterval, ResidualScale, profile_interval};

@@ -14,8 +14,8 @@
 //! | `max_iterations` | 1000 | iterations after which the fit gives up |
 //! | `time_limit` | none | time after which the fit gives up, looked at once an iteration |
 //! | `initial_radius` | 3 | first trust radius of Moré's method and of dogleg, as a multiple of ‖D p‖ (MINPACK's `factor`, which is 100 there: too bold for starts far from the minimum) |
-//! | `initial_damping` | 1e-3 | first damping of Nielsen's method, relative to the scaled normal matrix |
-//! | `polish` | `true` | after convergence, undamped steps until their length no longer falls: the parameters then are exact to the rounding of the residuals instead of to that of the cost, about twice the digits |
+//! | `initial_damping` | 1e-3 | first damping of Nielsen's method and of `GaussNewtonFirst`, relative to the scaled normal matrix |
+//! | `finish` | `Polish` | what is done once a minimum shows, see [`Finish`] |
 //! | `stop` | none | a flag that another thread raises to end the fit after the running iteration |
 
 use std::sync::Arc;
@@ -47,6 +47,9 @@ pub enum Method {
     /// The undamped step, shortened by line search: fastest near the minimum of a mildly nonlinear
     /// problem, lost where the Jacobian loses rank on the way.
     GaussNewton,
+    /// The undamped step, damped with Nielsen's schedule only from where one fails: fewest
+    /// evaluations where most parameters enter the model almost linearly, or the start is good.
+    GaussNewtonFirst,
     /// Damped steps: the method to take when nothing is known.
     LevenbergMarquardt(Damping),
     /// Powell's dogleg between steepest descent and the undamped step: cheaper than the exact
@@ -58,6 +61,21 @@ impl Default for Method {
     fn default() -> Self {
         Self::LevenbergMarquardt(Damping::More)
     }
+}
+
+/// What is done once a minimum shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Finish {
+    /// Undamped steps until their length no longer falls: the parameters then are exact to the
+    /// rounding of the residuals instead of to that of the cost, about twice the digits.
+    #[default]
+    Polish,
+    /// The minimum is that of the last step whose cost was computed.
+    Evaluated,
+    /// The first undamped step that promises to lower the cost by no more than `cost_tolerance` of it
+    /// is the last: it is taken on its promise, without an evaluation after it. For problems whose
+    /// every evaluation is a pass over very many rows.
+    Promised,
 }
 
 /// The settings of a fit; the module's table says what each means.
@@ -87,10 +105,10 @@ pub struct Options {
     pub time_limit: Option<Duration>,
     /// First trust radius as a multiple of the scaled parameters' length.
     pub initial_radius: f64,
-    /// First damping of Nielsen's method.
+    /// First damping of Nielsen's method, and of Gauss-Newton after a failure.
     pub initial_damping: f64,
-    /// Whether undamped steps follow until rounding.
-    pub polish: bool,
+    /// What is done once a minimum shows.
+    pub finish: Finish,
     /// Ends the fit when raised.
     #[serde(skip)]
     pub stop: Option<Arc<AtomicBool>>,
@@ -112,7 +130,7 @@ impl Default for Options {
             time_limit: None,
             initial_radius: 3.0,
             initial_damping: 1e-3,
-            polish: true,
+            finish: Finish::default(),
             stop: None,
         }
     }
@@ -124,6 +142,17 @@ impl Options {
         Self {
             method,
             ..Self::default()
+        }
+    }
+
+    /// The settings for a [`StructuredProblem`](crate::structured::StructuredProblem), of whose rows
+    /// every evaluation makes a pass: undamped steps first, the last one taken on its promise, at
+    /// most 50 of them.
+    pub fn structured() -> Self {
+        Self {
+            finish: Finish::Promised,
+            max_iterations: 50,
+            ..Self::with_method(Method::GaussNewtonFirst)
         }
     }
 

@@ -161,6 +161,19 @@ impl fmt::Display for Ending {
     }
 }
 
+/// What became of a step that was tried.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Iteration {
+    /// Cost at the best point after it.
+    pub cost: f64,
+    /// By how much the linear model promised to lower the cost.
+    pub predicted: f64,
+    /// Damping λ of the step; zero for an undamped one.
+    pub damping: f64,
+    /// Whether it was taken.
+    pub accepted: bool,
+}
+
 /// Why a fit could not be made at all.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
@@ -309,6 +322,8 @@ pub struct Fit {
     pub residual_evaluations: u64,
     /// How often the Jacobian was computed.
     pub jacobian_evaluations: u64,
+    /// What became of each step that was tried.
+    pub history: Vec<Iteration>,
     /// ‖D s‖ / ‖D p‖ of the undamped step s that would come next, D the column norms of the
     /// Jacobian: how far the parameters still are from rest.
     pub next_step: f64,

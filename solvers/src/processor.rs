@@ -5,6 +5,7 @@
 ///
 /// `fn name(arguments) from generic` needs an `#[inline(always)] fn generic<const FMA: bool>`: with
 /// `FMA`, `f64::mul_add` is one instruction; without, it would be a slow call and must be avoided.
+#[doc(hidden)]
 #[macro_export]
 macro_rules! by_processor {
     ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) from $generic:ident) => {

@@ -3,8 +3,9 @@
 
 use errsep_solvers::regularization::{
     CornerStatus, Decomposition, Discrepancy, Family, Penalty, RegularizationError, discrepancy,
-    gcv, l_curve, l_curve_between, periodogram, problems, whiteness_distance,
+    gcv, l_curve, l_curve_between, periodogram, whiteness_distance,
 };
+use errsep_standard_problems::ill_posed as problems;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,7 +1,8 @@
 //! The restricted maximum likelihood against its definition, on data drawn as it assumes, and where it
 //! has nothing to find.
 
-use errsep_solvers::regularization::{Decomposition, Family, Penalty, likelihood, problems};
+use errsep_solvers::regularization::{Decomposition, Family, Penalty, likelihood};
+use errsep_standard_problems::ill_posed as problems;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

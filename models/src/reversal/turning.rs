@@ -7,8 +7,10 @@
 //! side, as in the channels 1A and 2B of the reversal.
 
 use errsep_solvers::linear::limited::svd;
+use errsep_solvers::scalar::least_between;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::convert::Infallible;
 use std::f64::consts::{PI, TAU};
 use thiserror::Error;
 
@@ -135,8 +137,13 @@ pub fn find_turning(samples: &[Sample], about: Option<f64>) -> Result<Turning, N
         .1;
     // Of steady amplitude: a run-out that turned evenly along the artefact could not be told from a
     // little more or less speed, and would leave the frequency undetermined.
-    let squares = |f: f64| Fit::of(samples, Some(f), 2).map_or(f64::INFINITY, |fit| fit.squares);
-    let frequency = golden_section(coarse - 1.5 * step, coarse + 1.5 * step, squares);
+    let squares = |f: f64| {
+        let fit = Fit::of(samples, Some(f), 2);
+        Ok::<f64, Infallible>(fit.map_or(f64::INFINITY, |fit| fit.squares))
+    };
+    let (low, high) = (coarse - 1.5 * step, coarse + 1.5 * step);
+    // A least value is flat to about the root of a rounding.
+    let frequency = least_between(low, high, 1e-8 * step, squares).unwrap_or(coarse);
     let fit = Fit::of(samples, Some(frequency), 4).ok_or(NoTraces::NoWave)?;
     let sigma = (fit.squares / (n - fit.unknowns) as f64).sqrt();
     let amplitude = fit.cosine.hypot(fit.sine);
@@ -293,23 +300,4 @@ impl Fit {
             rests,
         })
     }
-}
-
-/// The least value of a function with one minimum between two points, to about √ε of their distance.
-fn golden_section(mut a: f64, mut b: f64, f: impl Fn(f64) -> f64) -> f64 {
-    const SHARE: f64 = 0.618_033_988_749_894_9;
-    let (mut c, mut d) = (b - SHARE * (b - a), a + SHARE * (b - a));
-    let (mut fc, mut fd) = (f(c), f(d));
-    for _ in 0..36 {
-        if fc < fd {
-            (b, d, fd) = (d, c, fc);
-            c = b - SHARE * (b - a);
-            fc = f(c);
-        } else {
-            (a, c, fc) = (c, d, fd);
-            d = a + SHARE * (b - a);
-            fd = f(d);
-        }
-    }
-    f64::midpoint(a, b)
 }

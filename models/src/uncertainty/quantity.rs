@@ -75,10 +75,4 @@ impl Quantity {
         self.degrees_of_freedom = degrees_of_freedom;
         self
     }
-
-    /// Standard uncertainty over the magnitude of the value; infinite for a value of zero.
-    #[must_use]
-    pub fn relative_uncertainty(&self) -> f64 {
-        self.standard_uncertainty / self.value.abs()
-    }
 }

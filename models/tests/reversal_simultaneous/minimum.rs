@@ -5,7 +5,8 @@ use errsep_models::reversal::simultaneous::{
     Axis, ChannelReadings, DenseReversal, Knots, Noise, Options, Reversal, Unknowns, fit,
 };
 use errsep_models::reversal::{Channel, Convention, Observations, simultaneous, staged};
-use errsep_solvers::structured::{Parameters, evaluate, minimise};
+use errsep_solvers::options::Options as Minimisation;
+use errsep_solvers::structured::{Parameters, evaluate, fit_structured};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -242,7 +243,7 @@ fn from_a_head_start_the_minimum_is_that_over_all_readings() {
             42.0,
             weights.clone(),
         );
-        let plain = minimise(&problem, start.clone(), Default::default()).unwrap();
+        let plain = fit_structured(&problem, start.clone(), &Minimisation::structured()).unwrap();
         assert!(plain.converged(), "{}", plain.ending);
         let cost: f64 = observations
             .readings

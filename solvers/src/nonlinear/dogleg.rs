@@ -52,7 +52,7 @@ impl Strategy for Dogleg {
             return full;
         }
         // Steepest descent in scaled parameters, to the lowest point of the model.
-        let downhill = -model.gradient().component_div(scale).component_div(scale);
+        let downhill = model.steepest_descent(scale);
         let slope = downhill.component_mul(scale).norm();
         let bend = model.image_norm(&downhill);
         if bend == 0.0 || slope == 0.0 {

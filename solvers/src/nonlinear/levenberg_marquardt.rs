@@ -134,13 +134,22 @@ pub struct NielsenDamping {
     growth: f64,
 }
 
+/// The first factor of the damping after a failure; each further one is this much greater.
+pub(super) const GROWTH: f64 = 2.0;
+
+/// What a step of gain ρ multiplies the damping by: 1 − (2ρ − 1)³, at least `least` (Nielsen 1999,
+/// eq. 2.5).
+pub(super) fn nielsen_factor(gain: f64, least: f64) -> f64 {
+    (1.0 - (2.0 * gain - 1.0).powi(3)).max(least)
+}
+
 impl NielsenDamping {
     /// Starts with damping λ; D carries the columns' norms, so that λ has no unit.
     pub fn new(initial_damping: f64) -> Self {
         Self {
             initial_damping,
             damping: initial_damping,
-            growth: 2.0,
+            growth: GROWTH,
         }
     }
 }
@@ -163,18 +172,18 @@ impl Strategy for NielsenDamping {
     }
 
     fn accepted(&mut self, trial: &Trial) {
-        let factor = (1.0 - (2.0 * trial.gain() - 1.0).powi(3)).max(1.0 / 3.0);
+        let factor = nielsen_factor(trial.gain(), 1.0 / 3.0);
         self.damping = (self.damping * factor).max(f64::MIN_POSITIVE);
-        self.growth = 2.0;
+        self.growth = GROWTH;
     }
 
     fn rejected(&mut self, _trial: &Trial) {
         self.damping *= self.growth;
-        self.growth *= 2.0;
+        self.growth *= GROWTH;
     }
 
     fn invalid(&mut self, _length: f64) {
         self.damping *= self.growth;
-        self.growth *= 2.0;
+        self.growth *= GROWTH;
     }
 }

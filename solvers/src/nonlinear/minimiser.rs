@@ -12,40 +12,15 @@ use nalgebra::DVector;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::rescue::Verdict;
-use super::restrict::{self, Proposal, Undamped, free_parameters};
-use super::strategy::{Strategy, Trial};
+use super::descend::Progress;
+use super::strategy::Strategy;
 use super::system::{Evaluation, System};
 use crate::linear::LinearModel;
-use crate::options::Options;
-use crate::outcome::{Convergence, Ending, FitError};
+use crate::options::{Finish, Options};
+use crate::outcome::{Ending, FitError, Iteration};
 
 /// The state that argmin's executor, observers and checkpoints see: parameters, cost, gradient.
 pub type FitState = IterState<DVector<f64>, DVector<f64>, (), (), DVector<f64>, f64>;
-
-/// Least share of the promised fall that makes a step worth taking.
-const LEAST_GAIN: f64 = 1e-4;
-
-/// Below this cost residuals are counted in another unit: squares a hundred decades smaller, as those
-/// of single residuals and of steps near the minimum are, still have all their digits.
-const LEAST_COST: f64 = 1e-200;
-
-/// A step that moves a parameter by more than this share of all that it has ever been ends nothing,
-/// however little the residuals change: roots up to the tenth order are approached by less.
-const FAR: f64 = 1e-2;
-
-/// Iterations in a row that go on so before a parameter is said to run away.
-const MOST_FADING: usize = 30;
-
-/// A step of this share of the undamped one was not held up by a wall.
-const UNIMPEDED: f64 = 0.5;
-
-/// Where a step of this share of the parameters is refused a value, the wall is here. Far steps may
-/// well be refused on the way to a minimum.
-const AT_WALL: f64 = 1e-6;
-
-/// Steps tried from one point before giving up: each failure shortens the step at least by half.
-const MOST_TRIALS: usize = 100;
 
 /// The least-squares loop with a strategy `S` and linear models `M`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -56,17 +31,18 @@ pub struct Minimiser<S, M> {
     /// D: the largest norm that each column of the Jacobian has had (Moré 1978, eq. 6.3).
     pub(super) scale: DVector<f64>,
     /// The largest ‖N p‖ so far, N the column norms of the Jacobian at p.
-    longest: f64,
+    pub(super) longest: f64,
     /// The largest magnitude that each parameter has had.
-    farthest: DVector<f64>,
+    pub(super) farthest: DVector<f64>,
     /// The power of two in which residuals are counted.
     pub(crate) unit: f64,
     /// The shortest step that was refused a value, until one about as long as the undamped step is
     /// taken.
-    refused: Option<Refusal>,
+    pub(super) refused: Option<Refusal>,
     /// Iterations in a row whose undamped step has no effect beside what parameters once had, but moves
     /// one of them far.
-    fading: usize,
+    pub(super) fading: usize,
+    pub(crate) history: Vec<Iteration>,
     ending: Option<Ending>,
     #[serde(skip)]
     pub(crate) point: Option<Point<M>>,
@@ -76,37 +52,16 @@ pub struct Minimiser<S, M> {
 #[derive(Debug, Clone)]
 pub(crate) struct Point<M> {
     pub parameters: DVector<f64>,
-    pub evaluation: Evaluation,
+    pub evaluation: Evaluation<M>,
     pub model: M,
-}
-
-/// The undamped step from a point.
-#[derive(Default)]
-struct Full {
-    /// The fall that it promises.
-    promised: f64,
-    /// ‖D s‖.
-    length: f64,
-    /// A parameter that it moves far.
-    far: Option<usize>,
-    /// Whether its effect is nothing beside what was felt of the parameters somewhere on the way.
-    fades: bool,
 }
 
 /// A step that was refused a value.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-struct Refusal {
-    reason: String,
+pub(super) struct Refusal {
+    pub reason: String,
     /// Its length as a share of the parameters' greatest.
-    share: f64,
-}
-
-/// How an iteration left things.
-enum Progress {
-    Moved(Trial),
-    Rescued,
-    Rest(Convergence),
-    Stuck(Ending),
+    pub share: f64,
 }
 
 impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
@@ -121,6 +76,7 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
             unit: 1.0,
             refused: None,
             fading: 0,
+            history: Vec::new(),
             ending: None,
             point: None,
         }
@@ -136,12 +92,12 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
         &self,
         problem: &mut Counted<O>,
         parameters: DVector<f64>,
-        evaluation: Evaluation,
+        mut evaluation: Evaluation<M>,
     ) -> Result<Point<M>, FitError> {
         let mut made = None;
         problem
             .problem("jacobian_count", |system| {
-                made = Some(system.linearize(&parameters, &evaluation, self.unit));
+                made = Some(system.linearize(&parameters, &mut evaluation, self.unit));
                 Ok(())
             })
             .map_err(broken_off)?;
@@ -158,22 +114,22 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
         &self,
         problem: &mut Counted<O>,
         parameters: &DVector<f64>,
-    ) -> Result<Result<Evaluation, String>, FitError> {
+    ) -> Result<Result<Evaluation<M>, String>, FitError> {
         let evaluation = self.residuals(problem, parameters)?;
         Ok(evaluation.and_then(|evaluation| {
             if evaluation.cost.is_finite() {
                 Ok(evaluation)
             } else {
-                Err("the sum of squared residuals overflows".to_string())
+                Err("the sum of squared residuals is not finite".to_string())
             }
         }))
     }
 
-    fn residuals<O: System<Model = M>>(
+    pub(super) fn residuals<O: System<Model = M>>(
         &self,
         problem: &mut Counted<O>,
         parameters: &DVector<f64>,
-    ) -> Result<Result<Evaluation, String>, FitError> {
+    ) -> Result<Result<Evaluation<M>, String>, FitError> {
         problem
             .problem("residual_count", |system| {
                 Ok(system
@@ -181,78 +137,6 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
                     .map_err(|no| no.reason))
             })
             .map_err(broken_off)
-    }
-
-    /// The system's number of parameters.
-    fn expected<O: System<Model = M>>(problem: &mut Counted<O>) -> Result<usize, FitError> {
-        let mut expected = 0;
-        problem
-            .problem("name_count", |system| {
-                expected = system.parameter_count();
-                Ok(())
-            })
-            .map_err(broken_off)?;
-        Ok(expected)
-    }
-
-    /// Evaluates the start and chooses the unit in which residuals are counted.
-    fn start<O: System<Model = M>>(
-        &mut self,
-        problem: &mut Counted<O>,
-        parameters: DVector<f64>,
-    ) -> Result<Point<M>, FitError> {
-        let (expected, found) = (Self::expected(problem)?, parameters.len());
-        if found != expected {
-            return Err(FitError::StartLength { expected, found });
-        }
-        let refused = |reason| FitError::NoValueAtStart { reason };
-        self.unit = 1.0;
-        let plain = self.residuals(problem, &parameters)?.map_err(refused)?;
-        let largest = plain.residuals.amax();
-        if plain.cost.is_finite() && (plain.cost > LEAST_COST || largest == 0.0) {
-            return self.arrive(problem, parameters, plain);
-        }
-        self.unit = largest.log2().floor().exp2();
-        let counted = self.evaluate(problem, &parameters)?.map_err(refused)?;
-        match self.arrive(problem, parameters.clone(), counted) {
-            // Residuals that vanish beside their derivatives need no other unit.
-            Err(FitError::JacobianNotFinite { .. }) if plain.cost.is_finite() => {
-                self.unit = 1.0;
-                self.arrive(problem, parameters, plain)
-            }
-            other => other,
-        }
-    }
-
-    /// Goes on from the parameters of a checkpoint.
-    fn resume<O: System<Model = M>>(
-        &self,
-        problem: &mut Counted<O>,
-        parameters: DVector<f64>,
-    ) -> Result<Point<M>, FitError> {
-        let expected = Self::expected(problem)?;
-        self.check_lengths(expected, &parameters)?;
-        match self.evaluate(problem, &parameters)? {
-            Ok(evaluation) => self.arrive(problem, parameters, evaluation),
-            Err(reason) => Err(FitError::NoValueAtStart { reason }),
-        }
-    }
-
-    /// Whether what a checkpoint holds is for as many parameters as the problem has.
-    pub(crate) fn check_lengths(
-        &self,
-        expected: usize,
-        parameters: &DVector<f64>,
-    ) -> Result<(), FitError> {
-        let bounds = self.options.bounds.as_ref();
-        let lengths = [parameters.len(), self.scale.len(), self.farthest.len()]
-            .into_iter()
-            .chain(bounds.map(|b| b.lower().len()))
-            .chain(bounds.map(|b| b.upper().len()));
-        match lengths.into_iter().find(|&found| found != expected) {
-            Some(found) => Err(FitError::CheckpointLength { expected, found }),
-            None => Ok(()),
-        }
     }
 
     /// Keeps D at the largest column norms seen; a column that has always been zero gets 1.
@@ -274,240 +158,6 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
 
     pub(super) fn scaled_length(&self, vector: &DVector<f64>) -> f64 {
         vector.component_mul(&self.scale).norm()
-    }
-
-    pub(super) fn undamped(&self, point: &Point<M>) -> Result<Proposal, FitError> {
-        restrict::propose(
-            &point.model,
-            &self.scale,
-            &point.parameters,
-            self.options.bounds.as_ref(),
-            Undamped,
-        )
-    }
-
-    /// The strategy's step, with the geodesic correction where asked for.
-    fn propose<O: System<Model = M>>(
-        &mut self,
-        problem: &mut Counted<O>,
-        point: &Point<M>,
-    ) -> Result<Proposal, FitError> {
-        let bounds = self.options.bounds.as_ref();
-        let mut proposal = restrict::propose(
-            &point.model,
-            &self.scale,
-            &point.parameters,
-            bounds,
-            &mut self.strategy,
-        )?;
-        // On a face of the box the correction would have to be projected again: it is left out.
-        if self.options.geodesic_acceleration
-            && bounds.is_none()
-            && let Some(correction) = self.acceleration(problem, point, &proposal.step)?
-        {
-            proposal.parameters += correction;
-        }
-        Ok(proposal)
-    }
-
-    /// The rounding of the cost: that of the residuals times the residuals. A residual is a
-    /// difference whose terms are about as large as J p.
-    pub(super) fn cost_rounding(point: &Point<M>) -> f64 {
-        let size: f64 = point
-            .model
-            .column_norms()
-            .iter()
-            .zip(point.parameters.iter())
-            .map(|(norm, p)| norm * p.abs())
-            .sum();
-        let residual = (2.0 * point.evaluation.cost).sqrt();
-        f64::EPSILON * residual * (residual + size)
-    }
-
-    /// The largest cosine between the residuals and a column of a free parameter.
-    fn largest_cosine(&self, point: &Point<M>) -> f64 {
-        let residual = (2.0 * point.evaluation.cost).sqrt();
-        let gradient = point.model.gradient();
-        let norms = point.model.column_norms();
-        free_parameters(self.options.bounds.as_ref(), &point.parameters, gradient)
-            .into_iter()
-            .filter(|&j| norms[j] > 0.0)
-            .map(|j| gradient[j].abs() / (norms[j] * residual))
-            .fold(0.0, f64::max)
-    }
-
-    /// Whether the point is a minimum to rounding, and the undamped step with the fall it promises.
-    fn at_rest(&self, point: &Point<M>) -> Result<(Option<Convergence>, Full), FitError> {
-        let rest = |by| Ok((Some(by), Full::default()));
-        if point.evaluation.cost == 0.0 {
-            return rest(Convergence::Cost);
-        }
-        if self.largest_cosine(point) <= self.options.gradient_tolerance {
-            return rest(Convergence::Gradient);
-        }
-        let step = self.undamped(point)?.step;
-        let full = Full {
-            promised: point.model.predicted_reduction(&step),
-            length: self.scaled_length(&step),
-            far: self.goes_far(&step),
-            fades: false,
-        };
-        if full.promised.abs() <= Self::cost_rounding(point) {
-            return rest(Convergence::Cost);
-        }
-        let felt = felt_length(point, &step);
-        let full = Full {
-            fades: felt <= f64::EPSILON * self.longest,
-            ..full
-        };
-        // Beside what the parameters have been, felt as they are felt here: after a start with residuals of
-        // 1e16 times those of the minimum every step is nothing beside what was felt there.
-        if full.far.is_none() && felt <= f64::EPSILON * felt_length(point, &self.farthest) {
-            return Ok((Some(Convergence::Step), full));
-        }
-        Ok((None, full))
-    }
-
-    /// A parameter that a step moves by a good part of all that it has ever been, if there is one.
-    fn goes_far(&self, step: &DVector<f64>) -> Option<usize> {
-        (0..step.len()).find(|&j| step[j].abs() > FAR * self.farthest[j])
-    }
-
-    /// One iteration: tries steps from `point` until one is worth taking.
-    fn descend<O: System<Model = M>>(
-        &mut self,
-        problem: &mut Counted<O>,
-        point: Point<M>,
-    ) -> Result<(Point<M>, Progress), FitError> {
-        // After a start whose squares overflow, what is left may vanish in the unit that it needed.
-        let vanished = point.evaluation.cost == 0.0 && point.evaluation.residuals.amax() > 0.0;
-        if vanished && self.unit > 1.0 {
-            return Ok((point, Progress::Stuck(Ending::OutOfRange)));
-        }
-        let (rest, full) = self.at_rest(&point)?;
-        if let Some(by) = rest {
-            return Ok((point, Progress::Rest(by)));
-        }
-        // Residuals may vanish along a way that does not end.
-        match full.far.filter(|_| full.fades) {
-            None => self.fading = 0,
-            Some(_) if self.fading < MOST_FADING => self.fading += 1,
-            Some(j) => {
-                let parameter = Self::name_of(problem, j)?;
-                return Ok((point, Progress::Stuck(Ending::RunsAway { parameter })));
-            }
-        }
-        let promised = full.promised;
-        let cost = point.evaluation.cost;
-        let negligible = self.options.cost_tolerance * cost;
-        let parameter_length = felt_length(&point, &point.parameters);
-        for tried in 0..MOST_TRIALS {
-            let proposal = self.propose(problem, &point)?;
-            let step = &proposal.step;
-            let length = self.scaled_length(step);
-            if !length.is_finite() {
-                self.strategy.invalid(f64::MAX);
-                continue;
-            }
-            if length == 0.0 {
-                break;
-            }
-            let mut trial = Trial {
-                actual: f64::NEG_INFINITY,
-                predicted: point.model.predicted_reduction(step),
-                length,
-                slope: point.model.gradient().dot(step),
-            };
-            if trial.predicted <= 0.0 {
-                self.strategy.rejected(&trial);
-                continue;
-            }
-            let evaluation = match self.evaluate(problem, &proposal.parameters)? {
-                Ok(evaluation) => evaluation,
-                Err(reason) => {
-                    let share = length / self.reach(&full);
-                    if self.refused.as_ref().is_none_or(|r| share < r.share) {
-                        self.refused = Some(Refusal { reason, share });
-                    }
-                    self.strategy.invalid(length);
-                    continue;
-                }
-            };
-            trial.actual = cost - evaluation.cost;
-            let gain = trial.gain();
-            let near = promised <= self.options.cost_tolerance.sqrt() * cost;
-            let settled = trial.actual.abs() <= negligible
-                && trial.predicted <= negligible
-                && gain <= 2.0
-                && near;
-            if gain < LEAST_GAIN {
-                if settled {
-                    return Ok((point, Progress::Rest(Convergence::Cost)));
-                }
-                self.strategy.rejected(&trial);
-                continue;
-            }
-            self.strategy.accepted(&trial);
-            let short = tried == 0
-                && gain > 0.25
-                && felt_length(&point, step) <= self.options.step_tolerance * parameter_length;
-            if length >= UNIMPEDED * full.length {
-                self.refused = None;
-            }
-            let next = self.arrive(problem, proposal.parameters, evaluation)?;
-            let progress = match (settled, short, self.at_wall()) {
-                (true, ..) => Progress::Rest(Convergence::Cost),
-                (_, true, Some(wall)) if !near => Progress::Stuck(wall),
-                (_, true, _) => Progress::Rest(Convergence::Step),
-                _ => Progress::Moved(trial),
-            };
-            return Ok((next, progress));
-        }
-        if promised <= negligible {
-            return Ok((point, Progress::Rest(Convergence::Cost)));
-        }
-        match self.rescue(problem, &point)? {
-            Verdict::Better(parameters, evaluation) => {
-                let next = self.arrive(problem, parameters, evaluation)?;
-                Ok((next, Progress::Rescued))
-            }
-            Verdict::NoValue(reason) => Ok((point, Progress::Stuck(Ending::AtWall { reason }))),
-            Verdict::WrongJacobian => Ok((point, Progress::Stuck(Ending::NoDescent))),
-            Verdict::Flat => Ok((
-                point,
-                self.at_wall()
-                    .map_or(Progress::Rest(Convergence::Cost), Progress::Stuck),
-            )),
-        }
-    }
-
-    /// ‖D p‖ for the greatest magnitudes that parameters have had; before any has left zero, the
-    /// undamped step's length.
-    fn reach(&self, full: &Full) -> f64 {
-        let reach = self.scaled_length(&self.farthest);
-        if reach > 0.0 { reach } else { full.length }
-    }
-
-    /// The ending, where steps were refused a value however short they were.
-    fn at_wall(&self) -> Option<Ending> {
-        let refusal = self.refused.as_ref().filter(|r| r.share <= AT_WALL)?;
-        Some(Ending::AtWall {
-            reason: refusal.reason.clone(),
-        })
-    }
-
-    fn name_of<O: System<Model = M>>(
-        problem: &mut Counted<O>,
-        index: usize,
-    ) -> Result<String, FitError> {
-        let mut name = String::new();
-        problem
-            .problem("name_count", |system| {
-                name = system.parameter_name(index);
-                Ok(())
-            })
-            .map_err(broken_off)?;
-        Ok(name)
     }
 
     fn iterate<O: System<Model = M>>(
@@ -536,7 +186,7 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
                 Ok((point, KV::new()))
             }
             Progress::Rest(by) => {
-                let (point, by) = if self.options.polish {
+                let (point, by) = if self.options.finish == Finish::Polish {
                     self.polish(problem, point, by)?
                 } else {
                     (point, by)

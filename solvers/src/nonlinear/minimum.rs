@@ -8,7 +8,7 @@ use super::restrict::{self, free_parameters};
 use super::strategy::Strategy;
 use super::system::System;
 use crate::linear::LinearModel;
-use crate::outcome::{Combination, Convergence, Ending, FitError};
+use crate::outcome::{Convergence, Ending, FitError};
 
 impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
     /// The ending at a minimum: whether the free parameters are determined there.
@@ -31,19 +31,15 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
                 Ok(())
             })
             .map_err(broken_off)?;
-        let (null, norms) = if free.len() == n {
-            (point.model.null_space(), point.model.column_norms().clone())
+        let combinations = if free.len() == n {
+            point.model.undetermined(&names)
         } else {
-            let reduced = restrict::restricted(&point.model, &free, &DVector::zeros(n))?;
-            (reduced.null_space(), reduced.column_norms().clone())
+            restrict::restricted(&point.model, &free, &DVector::zeros(n))?.undetermined(&names)
         };
-        if null.ncols() == 0 {
-            return Ok(Ending::Converged(by));
-        }
-        let combinations = null
-            .column_iter()
-            .map(|column| Combination::from_direction(&column.into_owned(), &norms, &names))
-            .collect();
-        Ok(Ending::NotIdentifiable { by, combinations })
+        Ok(if combinations.is_empty() {
+            Ending::Converged(by)
+        } else {
+            Ending::NotIdentifiable { by, combinations }
+        })
     }
 }

@@ -2,8 +2,9 @@
 //!
 //! Four things lead there: the cost is flat to its rounding although the undamped step promises
 //! more; columns of the Jacobian so badly scaled that no trust region suits them all; a Jacobian
-//! that does not belong to the residuals; a wall, beyond which the model has no value. The parameter with the steepest cost is moved alone to
-//! tell them apart.
+//! that does not belong to the residuals; a wall, beyond which the model has no value. To tell them
+//! apart, parameters are moved along a simple direction of descent: that of the parameter with the
+//! steepest cost alone, under constraints the steepest that keeps them.
 
 use argmin::core::Problem as Counted;
 use nalgebra::DVector;
@@ -15,19 +16,19 @@ use super::system::{Evaluation, System};
 use crate::linear::LinearModel;
 use crate::outcome::FitError;
 
-/// What moving one parameter showed.
-pub(super) enum Verdict {
+/// What moving along the direction showed.
+pub(super) enum Verdict<M> {
     /// It lowered the cost: the fit goes on from there.
-    Better(DVector<f64>, Evaluation),
+    Better(DVector<f64>, Evaluation<M>),
     /// The Jacobian is right and the cost as low as its rounding lets one see.
     Flat,
     /// The cost does not change as the Jacobian says.
     WrongJacobian,
-    /// The model has no value where the parameter moves to.
+    /// The model has no value where it leads.
     NoValue(String),
 }
 
-/// Fractions of the parameter's own lowest point that are tried.
+/// Fractions of the way to the lowest point along the direction that are tried.
 const FRACTIONS: [f64; 7] = [1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 
 /// Least share of the promised fall that counts as one.
@@ -37,8 +38,8 @@ const LEAST_GAIN: f64 = 1e-2;
 /// its rounding.
 const DIFFERENCE: f64 = 1e-6;
 
-/// How far a slope found by differences may lie from gⱼ, as a share of the most it could be,
-/// ‖Jⱼ‖ ‖r‖, before the Jacobian is called wrong. Slopes below that are those of a flat cost.
+/// How far a slope found by differences may lie from gᵀd, as a share of the most it could be,
+/// ‖J d‖ ‖r‖, before the Jacobian is called wrong. Slopes below that are those of a flat cost.
 const DISAGREEMENT: f64 = 1e-5;
 
 impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
@@ -46,33 +47,28 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
         &self,
         problem: &mut Counted<O>,
         point: &Point<M>,
-    ) -> Result<Verdict, FitError> {
+    ) -> Result<Verdict<M>, FitError> {
         let gradient = point.model.gradient();
-        let norms = point.model.column_norms();
         let bounds = self.options.bounds.as_ref();
-        let steepest = free_parameters(bounds, &point.parameters, gradient)
-            .into_iter()
-            .filter(|&j| norms[j] > 0.0)
-            .max_by(|&i, &j| {
-                let cosine = |k: usize| gradient[k].abs() / norms[k];
-                cosine(i).total_cmp(&cosine(j))
-            });
-        let Some(j) = steepest else {
+        let free = free_parameters(bounds, &point.parameters, gradient);
+        let Some(direction) = point.model.probe(&free) else {
             return Ok(Verdict::Flat);
         };
+        let (expected, image) = (gradient.dot(&direction), point.model.image_norm(&direction));
         let moved = |by: f64| {
-            let mut parameters = point.parameters.clone();
-            parameters[j] += by;
-            if let Some(limit) = bounds.and_then(|b| b.beyond(j, parameters[j])) {
-                parameters[j] = limit;
+            let mut parameters = &point.parameters + &direction * by;
+            for j in 0..parameters.len() {
+                if let Some(limit) = bounds.and_then(|b| b.beyond(j, parameters[j])) {
+                    parameters[j] = limit;
+                }
             }
             parameters
         };
 
         let rounding = Self::cost_rounding(point);
-        let lowest = -gradient[j] / (norms[j] * norms[j]);
+        let lowest = -expected / (image * image);
         for fraction in FRACTIONS {
-            let promised = -gradient[j] * lowest * fraction * (1.0 - 0.5 * fraction);
+            let promised = -expected * lowest * fraction * (1.0 - 0.5 * fraction);
             if promised <= rounding {
                 break;
             }
@@ -86,7 +82,8 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
         }
 
         let residual = (2.0 * point.evaluation.cost).sqrt();
-        let h = DIFFERENCE * point.parameters[j].abs().max(residual / norms[j]);
+        let along = point.parameters.dot(&direction).abs() / direction.norm_squared();
+        let h = DIFFERENCE * along.max(residual / image);
         let (ahead, behind) = (
             self.evaluate(problem, &moved(h))?,
             self.evaluate(problem, &moved(-h))?,
@@ -96,7 +93,7 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
             (Err(reason), _) | (_, Err(reason)) => return Ok(Verdict::NoValue(reason)),
         };
         let slope = 0.5 * (ahead.cost - behind.cost) / h;
-        if (slope - gradient[j]).abs() <= DISAGREEMENT * norms[j] * residual {
+        if (slope - expected).abs() <= DISAGREEMENT * image * residual {
             Ok(Verdict::Flat)
         } else {
             Ok(Verdict::WrongJacobian)

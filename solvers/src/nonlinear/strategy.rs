@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::dogleg::Dogleg;
 use super::gauss_newton::GaussNewton;
+use super::gauss_newton_first::GaussNewtonFirst;
 use super::levenberg_marquardt::{MoreDamping, NielsenDamping};
 use crate::linear::LinearModel;
 use crate::options::{Damping, Method, Options};
@@ -41,11 +42,19 @@ pub trait Strategy {
     /// Called before the first step, and to start afresh, with ‖D p‖.
     fn begin(&mut self, parameter_length: f64);
 
+    /// The undamped step from the point promises next to nothing.
+    fn near_end(&mut self) {}
+
     /// The step to try, for the positive diagonal `scale` of D.
     fn step<M: LinearModel>(&mut self, model: &M, scale: &DVector<f64>) -> DVector<f64>;
 
     /// The damping λ of the last step, zero for an undamped one.
     fn damping(&self) -> f64;
+
+    /// Whether shorter steps would not help either.
+    fn gives_up(&self) -> bool {
+        false
+    }
 
     /// The last step was taken.
     fn accepted(&mut self, trial: &Trial);
@@ -62,6 +71,8 @@ pub trait Strategy {
 pub enum Steps {
     /// Gauss-Newton with line search.
     GaussNewton(GaussNewton),
+    /// Gauss-Newton, damped where a step fails.
+    GaussNewtonFirst(GaussNewtonFirst),
     /// Levenberg-Marquardt with a trust radius.
     More(MoreDamping),
     /// Levenberg-Marquardt with Nielsen's damping.
@@ -75,6 +86,9 @@ impl Steps {
     pub fn of(options: &Options) -> Self {
         match options.method {
             Method::GaussNewton => Self::GaussNewton(GaussNewton::default()),
+            Method::GaussNewtonFirst => {
+                Self::GaussNewtonFirst(GaussNewtonFirst::new(options.initial_damping))
+            }
             Method::LevenbergMarquardt(Damping::More) => {
                 Self::More(MoreDamping::new(options.initial_radius))
             }
@@ -90,6 +104,7 @@ macro_rules! delegate {
     ($self:ident, $strategy:ident => $call:expr) => {
         match $self {
             Steps::GaussNewton($strategy) => $call,
+            Steps::GaussNewtonFirst($strategy) => $call,
             Steps::More($strategy) => $call,
             Steps::Nielsen($strategy) => $call,
             Steps::Dogleg($strategy) => $call,
@@ -106,12 +121,20 @@ impl Strategy for Steps {
         delegate!(self, s => s.begin(parameter_length));
     }
 
+    fn near_end(&mut self) {
+        delegate!(self, s => s.near_end());
+    }
+
     fn step<M: LinearModel>(&mut self, model: &M, scale: &DVector<f64>) -> DVector<f64> {
         delegate!(self, s => s.step(model, scale))
     }
 
     fn damping(&self) -> f64 {
         delegate!(self, s => s.damping())
+    }
+
+    fn gives_up(&self) -> bool {
+        delegate!(self, s => s.gives_up())
     }
 
     fn accepted(&mut self, trial: &Trial) {

@@ -11,11 +11,16 @@ use crate::problem::{NoValue, Problem};
 /// The cost at some parameters, with the residuals where the system keeps them, both for residuals
 /// counted in the unit that was asked for.
 #[derive(Debug, Clone)]
-pub struct Evaluation {
+pub struct Evaluation<M> {
     /// ½ Σ ρ(rᵢ²).
     pub cost: f64,
     /// The residuals without the loss; empty for a system that forgets them.
     pub residuals: DVector<f64>,
+    /// The linear model, where it comes with the cost: a system that makes its rows, uses and
+    /// forgets them needs one pass for both.
+    pub model: Option<M>,
+    /// Whether squares of residuals have left the range of numbers and no unit helps.
+    pub out_of_range: bool,
 }
 
 /// A least-squares system that can be evaluated and linearised.
@@ -32,21 +37,31 @@ pub trait System {
     /// The name of a parameter.
     fn parameter_name(&self, index: usize) -> String;
 
-    /// Cost and residuals at some parameters. The residuals are finite; the cost is infinite where
-    /// their squares overflow.
+    /// Whether residuals can be counted in another unit than 1.
+    fn has_units(&self) -> bool {
+        true
+    }
+
+    /// Cost and residuals at some parameters. The residuals are finite; the cost is not where their
+    /// squares overflow.
     ///
     /// # Errors
     /// [`NoValue`] where the model is not defined or not finite.
-    fn evaluate(&self, parameters: &DVector<f64>, unit: f64) -> Result<Evaluation, NoValue>;
+    fn evaluate(
+        &self,
+        parameters: &DVector<f64>,
+        unit: f64,
+    ) -> Result<Evaluation<Self::Model>, NoValue>;
 
-    /// The linear model at parameters whose evaluation is given.
+    /// The linear model at parameters whose evaluation is given; one that came with the evaluation
+    /// is taken out of it.
     ///
     /// # Errors
     /// [`FitError`] where the Jacobian is not defined, not finite or of the wrong shape.
     fn linearize(
         &self,
         parameters: &DVector<f64>,
-        evaluation: &Evaluation,
+        evaluation: &mut Evaluation<Self::Model>,
         unit: f64,
     ) -> Result<Self::Model, FitError>;
 
@@ -55,7 +70,7 @@ pub trait System {
     fn second_along(
         &self,
         _parameters: &DVector<f64>,
-        _evaluation: &Evaluation,
+        _evaluation: &Evaluation<Self::Model>,
         _model: &Self::Model,
         _direction: &DVector<f64>,
         _unit: f64,
@@ -153,18 +168,29 @@ impl<P: Problem + ?Sized> System for Dense<'_, P> {
         self.problem.parameter_name(index)
     }
 
-    fn evaluate(&self, parameters: &DVector<f64>, unit: f64) -> Result<Evaluation, NoValue> {
+    fn evaluate(
+        &self,
+        parameters: &DVector<f64>,
+        unit: f64,
+    ) -> Result<Evaluation<DenseModel>, NoValue> {
         let residuals = self.residuals(parameters)? / unit;
         let cost = self.loss.in_unit(unit).cost(residuals.as_slice());
         // A robust loss may make NaN of squares that overflow.
         let cost = if cost.is_nan() { f64::INFINITY } else { cost };
-        Ok(Evaluation { cost, residuals })
+        Ok(Evaluation {
+            // After a start whose squares overflow, what is left may vanish in the unit that it
+            // needed.
+            out_of_range: unit > 1.0 && cost == 0.0 && residuals.amax() > 0.0,
+            cost,
+            residuals,
+            model: None,
+        })
     }
 
     fn linearize(
         &self,
         parameters: &DVector<f64>,
-        evaluation: &Evaluation,
+        evaluation: &mut Evaluation<DenseModel>,
         unit: f64,
     ) -> Result<DenseModel, FitError> {
         let mut jacobian = self.jacobian_in(unit, parameters)?;
@@ -204,7 +230,7 @@ impl<P: Problem + ?Sized> System for Dense<'_, P> {
     fn second_along(
         &self,
         parameters: &DVector<f64>,
-        evaluation: &Evaluation,
+        evaluation: &Evaluation<DenseModel>,
         model: &DenseModel,
         direction: &DVector<f64>,
         unit: f64,

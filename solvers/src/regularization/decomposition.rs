@@ -101,11 +101,6 @@ impl Decomposition {
         })
     }
 
-    /// Number of unknowns, n.
-    pub fn unknown_count(&self) -> usize {
-        self.unknowns
-    }
-
     /// Number of rows of A, m.
     pub fn row_count(&self) -> usize {
         self.rows

@@ -1,7 +1,7 @@
 //! The discrepancy principle.
 
 use super::error::checked_lambda;
-use super::search::sample;
+use super::search::{root, sample};
 use super::{Family, Point, RegularizationError};
 
 /// What the discrepancy principle found.
@@ -53,19 +53,11 @@ pub fn discrepancy<F: Family + ?Sized>(
     let Some(accepted) = points.iter().rposition(|point| excess(point) <= 0.0) else {
         return Ok(Discrepancy::NoiseTooSmall(points[0]));
     };
-    let Some(mut high) = points.get(accepted + 1).copied() else {
+    let Some(high) = points.get(accepted + 1) else {
         return Ok(Discrepancy::NoiseTooLarge(points[accepted]));
     };
-    let mut low = points[accepted];
-    while high.lambda > low.lambda * (1.0 + 1e-6) {
-        let middle = family.point((low.lambda * high.lambda).sqrt())?;
-        if excess(&middle) > 0.0 {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    Ok(Discrepancy::Found(low))
+    let ends = (points[accepted].lambda, high.lambda);
+    Ok(Discrepancy::Found(root(family, ends, 1e-6, excess)?))
 }
 
 /// The 95 % quantile of the normal distribution, to which χ² tends.

@@ -1,6 +1,6 @@
 //! Generalized cross-validation.
 
-use super::search::{golden_section, sample};
+use super::search::{lowest, sample};
 use super::{Family, Point, RegularizationError};
 
 /// The minimum of the GCV function.
@@ -73,7 +73,7 @@ pub fn gcv_among<F: Family + ?Sized>(
     let point = if at_edge {
         points[best]
     } else {
-        golden_section(
+        lowest(
             family,
             points[best - 1].lambda,
             points[best + 1].lambda,

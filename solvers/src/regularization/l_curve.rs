@@ -1,6 +1,6 @@
 //! The corner of the L-curve, and whether there is one.
 
-use super::search::{golden_section, sample};
+use super::search::{lowest, sample};
 use super::{Family, Point, RegularizationError};
 
 /// What the L-curve looks like.
@@ -97,7 +97,7 @@ pub fn l_curve_between<F: Family + ?Sized>(
             continue;
         }
         let point = if inside {
-            golden_section(
+            lowest(
                 family,
                 points[best - 1].lambda,
                 points[best + 1].lambda,

@@ -1,6 +1,6 @@
 //! Restricted maximum likelihood: λ as the ratio of two scatters, both taken from the data.
 
-use super::search::sample;
+use super::search::{root, sample};
 use super::{Family, Point, RegularizationError};
 
 /// What the likelihood found.
@@ -72,7 +72,7 @@ pub fn likelihood_among<F: Family + ?Sized>(
         at_edge,
     };
     let best = least.1;
-    let (mut low, mut high) = (
+    let (low, high) = (
         points[best.saturating_sub(1)],
         points[(best + 1).min(points.len() - 1)],
     );
@@ -82,13 +82,6 @@ pub fn likelihood_among<F: Family + ?Sized>(
     if slope(&high) < 0.0 {
         return Ok(ends(last, true));
     }
-    while high.lambda > low.lambda * (1.0 + 1e-9) {
-        let middle = family.point((low.lambda * high.lambda).sqrt())?;
-        if slope(&middle) > 0.0 {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    Ok(ends(&low, false))
+    let found = root(family, (low.lambda, high.lambda), 1e-9, slope)?;
+    Ok(ends(&found, false))
 }

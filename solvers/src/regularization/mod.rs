@@ -12,7 +12,7 @@
 //! | [`gcv`] | nothing | the noise is white |
 //! | [`likelihood`](fn@likelihood) | nothing | the noise is white and Lx scatters evenly: less erratic than [`gcv`] |
 //! | [`discrepancy`] | the noise level | the noise level is known |
-//! | [`periodogram`](fn@periodogram) | residuals in their natural order | the noise is white and the signal is not |
+//! | [`periodogram`](fn@periodogram) (feature `periodogram`) | residuals in their natural order | the noise is white and the signal is not |
 //!
 //! A regularized solution is biased by construction. [`Uncertainty`] keeps the two parts apart: the
 //! covariance that noise gives the estimate, and how far the penalty may have pulled it.
@@ -27,8 +27,8 @@ mod gcv;
 mod l_curve;
 mod likelihood;
 mod penalty;
+#[cfg(feature = "periodogram")]
 mod periodogram;
-pub mod problems;
 mod search;
 mod spectrum;
 mod uncertainty;
@@ -43,6 +43,7 @@ pub use gcv::{Gcv, gcv, gcv_among};
 pub use l_curve::{Corner, CornerStatus, LCurve, l_curve, l_curve_between};
 pub use likelihood::{Likelihood, likelihood, likelihood_among};
 pub use penalty::Penalty;
+#[cfg(feature = "periodogram")]
 pub use periodogram::{Periodogram, periodogram, whiteness_distance};
 pub use spectrum::Spectrum;
 pub use uncertainty::Uncertainty;

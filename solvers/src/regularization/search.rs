@@ -1,6 +1,7 @@
-//! Searching over log λ: a grid first, then a golden section around the best point.
+//! Searching over ln λ: a grid first, then Brent's search around the best point.
 
 use super::{Family, Point, RegularizationError};
+use crate::scalar::{NotFound, least_between, root_between};
 
 /// `count` values from `smallest` to `largest`, evenly spaced in their logarithm, ascending.
 pub(super) fn logarithmic_grid(smallest: f64, largest: f64, count: usize) -> Vec<f64> {
@@ -24,37 +25,39 @@ pub(super) fn sample<F: Family + ?Sized>(
     family.points(&logarithmic_grid(smallest, largest, count))
 }
 
-/// The point of the smallest `objective` between two λ, to 1e-3 in log λ: far finer than any rule
-/// means its λ.
-pub(super) fn golden_section<F: Family + ?Sized>(
+/// How closely a λ is found, in ln λ: far finer than any rule means it.
+const CLOSE: f64 = 1e-3;
+
+/// The point of the smallest `objective` between two λ.
+pub(super) fn lowest<F: Family + ?Sized>(
     family: &F,
     smallest: f64,
     largest: f64,
     objective: impl Fn(&Point) -> f64,
 ) -> Result<Point, RegularizationError> {
-    const SHARE: f64 = 0.618_033_988_749_894_9;
-    let (mut low, mut high) = (smallest.ln(), largest.ln());
-    let at = |log_lambda: f64| family.point(log_lambda.exp());
-    let mut inner = high - SHARE * (high - low);
-    let mut outer = low + SHARE * (high - low);
-    let mut inner_point = at(inner)?;
-    let mut outer_point = at(outer)?;
-    while high - low > 1e-3 {
-        if objective(&inner_point) < objective(&outer_point) {
-            high = outer;
-            (outer, outer_point) = (inner, inner_point);
-            inner = high - SHARE * (high - low);
-            inner_point = at(inner)?;
-        } else {
-            low = inner;
-            (inner, inner_point) = (outer, outer_point);
-            outer = low + SHARE * (high - low);
-            outer_point = at(outer)?;
-        }
+    let found = least_between(smallest.ln(), largest.ln(), CLOSE, |log_lambda| {
+        Ok(objective(&family.point(log_lambda.exp())?))
+    });
+    family.point(found.map_err(as_regularization)?.exp())
+}
+
+/// The point between two λ at which `objective`, of different signs at both, is zero; λ to a share
+/// `tolerance`.
+pub(super) fn root<F: Family + ?Sized>(
+    family: &F,
+    (smallest, largest): (f64, f64),
+    tolerance: f64,
+    objective: impl Fn(&Point) -> f64,
+) -> Result<Point, RegularizationError> {
+    let found = root_between(smallest.ln(), largest.ln(), tolerance, |log_lambda| {
+        Ok(objective(&family.point(log_lambda.exp())?))
+    });
+    family.point(found.map_err(as_regularization)?.exp())
+}
+
+fn as_regularization(not: NotFound<RegularizationError>) -> RegularizationError {
+    match not {
+        NotFound::Function(own) => own,
+        NotFound::Bracket(_) => RegularizationError::NothingToChoose,
     }
-    Ok(if objective(&inner_point) < objective(&outer_point) {
-        inner_point
-    } else {
-        outer_point
-    })
 }

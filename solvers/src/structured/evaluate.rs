@@ -78,7 +78,7 @@ pub fn hat_traces<P: StructuredProblem>(
 
 /// Runs the tasks on all cores and hands over their groups in order, the next tasks being
 /// worked on meanwhile. True where squares of residuals have vanished somewhere.
-pub(super) fn for_each_task<P: StructuredProblem>(
+fn for_each_task<P: StructuredProblem>(
     problem: &P,
     prepared: &P::Prepared,
     mut take: impl FnMut(Vec<Group>) + Send,

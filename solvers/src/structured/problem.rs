@@ -1,5 +1,6 @@
 //! What the structured solver needs to know of a problem.
 
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::sink::Sink;
@@ -31,6 +32,12 @@ impl Parameters {
             band: add(&self.band, band),
             border: add(&self.border, border),
         }
+    }
+
+    /// All unknowns in one vector, those of the band first.
+    pub fn joined(&self) -> DVector<f64> {
+        let all = self.band.iter().chain(&self.border);
+        DVector::from_iterator(self.band.len() + self.border.len(), all.copied())
     }
 }
 

@@ -5,6 +5,8 @@
 //! model is linear along the profile, which is far weaker than linear in all parameters (Bates &
 //! Watts 1988, 6.1.2). The interval ends where |τ| reaches the quantile.
 
+use std::cell::RefCell;
+
 use super::student_quantile;
 use nalgebra::DVector;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -14,6 +16,7 @@ use crate::fit::fit;
 use crate::options::Options;
 use crate::outcome::{Fit, FitError};
 use crate::problem::Problem;
+use crate::scalar::{NotFound, root_between};
 
 /// What is known of the residuals' standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -70,8 +73,6 @@ const FARTHEST: f64 = 1e4;
 
 /// How closely |τ| must reach the quantile.
 const TAU_TOLERANCE: f64 = 1e-6;
-
-const MOST_REFINEMENTS: usize = 60;
 
 /// The interval of parameter `index` at a confidence `level` between 0 and 1, around a fit made
 /// with the same problem and options.
@@ -173,7 +174,7 @@ impl<P: Problem + ?Sized> Profile<'_, P> {
             excess: -self.quantile,
         };
         let mut reach = self.quantile * self.uncertainty;
-        let mut outside = loop {
+        let outside = loop {
             let wanted = estimate + sign * reach;
             let stopped = sign * (wanted - bound) >= 0.0;
             let place = self.place(if stopped { bound } else { wanted }, &inside)?;
@@ -189,26 +190,35 @@ impl<P: Problem + ?Sized> Profile<'_, P> {
             reach *= 1.5;
             inside = place;
         };
-        for _ in 0..MOST_REFINEMENTS {
-            if outside.excess <= TAU_TOLERANCE * self.quantile {
-                break;
-            }
-            // τ is nearly linear: the chord, kept away from the ends.
-            let share = inside.excess / (inside.excess - outside.excess);
-            let value = inside.value + share.clamp(0.02, 0.98) * (outside.value - inside.value);
-            if value == inside.value || value == outside.value {
-                break;
-            }
-            let place = self.place(value, &inside)?;
-            if place.excess >= 0.0 {
-                outside = place;
-            } else if -place.excess <= TAU_TOLERANCE * self.quantile {
-                return Ok(Limit::At(place.value));
-            } else {
-                inside = place;
-            }
-        }
-        Ok(Limit::At(outside.value))
+        self.between(inside, &outside).map(Limit::At)
+    }
+
+    /// Where |τ| reaches the quantile between two places. Each fit begins at the farthest place inside.
+    fn between(&self, inside: Place, outside: &Place) -> Result<f64, FitError> {
+        let close = TAU_TOLERANCE * self.quantile;
+        let (from, to) = (inside.value, outside.value);
+        let ends = [(from, inside.excess), (to, outside.excess)];
+        let start = RefCell::new(inside);
+        let excess = |value: f64| {
+            let known = ends.iter().find(|(end, _)| *end == value);
+            let found = match known {
+                Some((_, excess)) => *excess,
+                None => {
+                    let place = self.place(value, &start.borrow())?;
+                    let found = place.excess;
+                    if found < 0.0 {
+                        start.replace(place);
+                    }
+                    found
+                }
+            };
+            // Close enough ends the search.
+            Ok(if found.abs() <= close { 0.0 } else { found })
+        };
+        root_between(from, to, close * self.uncertainty, excess).map_err(|not| match not {
+            NotFound::Function(own) => own,
+            NotFound::Bracket(reason) => FitError::BrokenOff { reason },
+        })
     }
 
     fn bound(&self, sign: f64) -> f64 {

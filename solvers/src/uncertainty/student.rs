@@ -3,7 +3,11 @@
 //! The usual way inverts the incomplete beta function by Newton's method, which for many thousands of
 //! degrees of freedom need not end; effective degrees of freedom take any value.
 
+use std::convert::Infallible;
+
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+
+use crate::scalar::root_between;
 
 /// From here on the expansion about the normal quantile is exact to 1e-12 of the quantile, for shares
 /// to 1e-9 from the ends; below it the survival function is exact.
@@ -31,7 +35,7 @@ pub fn student_quantile(probability: f64, degrees: f64) -> f64 {
     let size = if degrees >= MANY {
         expanded(-Normal::standard().inverse_cdf(tail), degrees)
     } else {
-        StudentsT::new(0.0, 1.0, degrees).map_or(f64::NAN, |t| bisected(tail, |x| t.sf(x)))
+        StudentsT::new(0.0, 1.0, degrees).map_or(f64::NAN, |t| place_of(tail, |x| t.sf(x)))
     };
     if probability < 0.5 { -size } else { size }
 }
@@ -49,23 +53,15 @@ fn expanded(z: f64, degrees: f64) -> f64 {
     z * (1.0 + series)
 }
 
-/// The x > 0 at which a falling survival function from 1/2 takes the value `tail`.
-fn bisected(tail: f64, survival: impl Fn(f64) -> f64) -> f64 {
+/// The x > 0, to its rounding, at which a falling survival function from 1/2 takes the value `tail`.
+fn place_of(tail: f64, survival: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     while survival(high) > tail && high < f64::MAX / 4.0 {
         low = high;
         high *= 2.0;
     }
-    // Each step halves the bracket, until its ends are neighbours.
-    loop {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            return middle;
-        }
-        if survival(middle) > tail {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    root_between(low, high, 0.0, |x| {
+        Ok::<_, Infallible>(survival(x) / tail - 1.0)
+    })
+    .unwrap_or(high)
 }

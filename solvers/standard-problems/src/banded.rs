@@ -39,14 +39,6 @@ impl<'a, P: Problem> Divided<'a, P> {
             border: border.to_vec(),
         }
     }
-
-    /// The point of the problem.
-    pub fn join(at: &Parameters) -> DVector<f64> {
-        DVector::from_iterator(
-            at.band.len() + at.border.len(),
-            at.band.iter().chain(&at.border).copied(),
-        )
-    }
 }
 
 impl<P: Problem + Sync> StructuredProblem for Divided<'_, P> {
@@ -69,7 +61,7 @@ impl<P: Problem + Sync> StructuredProblem for Divided<'_, P> {
     }
 
     fn prepare(&self, at: &Parameters) -> Result<Self::Prepared, NoValue> {
-        let point = Self::join(at);
+        let point = at.joined();
         Ok((
             self.problem.residuals(&point)?,
             self.problem.jacobian(&point)?,

@@ -349,13 +349,6 @@ impl Panels {
         self.one_x_scale = false;
         self
     }
-
-    /// Lets each chart have its own vertical scale, for different quantities.
-    #[must_use]
-    pub const fn own_y_scales(mut self) -> Self {
-        self.one_y_scale = false;
-        self
-    }
 }
 
 #[cfg(test)]

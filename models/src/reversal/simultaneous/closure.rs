@@ -1,6 +1,6 @@
 //! What the one redundancy of four channels says after a fit.
 
-use errsep_solvers::structured::Fit;
+use errsep_solvers::structured::StructuredFit;
 
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
@@ -12,7 +12,7 @@ use crate::reversal::staged::Value;
 /// profile (R1A + R1B − R2A − R2B)/4 of the residuals.
 pub fn of(
     problem: &Reversal,
-    result: &Fit,
+    result: &StructuredFit,
     channels: &[ChannelReadings],
     residuals: &[Vec<f64>],
     scatter: &Scatter,

@@ -3,10 +3,12 @@
 
 use std::sync::Arc;
 
+use errsep_solvers::options::Options;
 use errsep_solvers::problem::NoValue;
-use errsep_solvers::structured::{self, Fit, Options, Parameters};
+use errsep_solvers::structured::{Parameters, StructuredFit, fit_structured};
 
 use super::effects::{Kind, Left, Unknown};
+use super::error::ReversalError;
 use super::placed::Placed;
 use super::problem::Reversal;
 
@@ -20,23 +22,23 @@ const SAME_COST: f64 = 1e-6;
 /// Minimises; without effects in one descent.
 ///
 /// # Errors
-/// [`NoValue`] where the model is not defined at the start.
+/// [`ReversalError`] where the model is not defined at the start.
 pub fn minimise(
     problem: &mut Reversal,
     start: Parameters,
-    options: Options,
-) -> Result<Fit, NoValue> {
+    options: &Options,
+) -> Result<StructuredFit, ReversalError> {
     if problem.joined.is_none() {
-        return structured::minimise(problem, start, options);
+        return Ok(fit_structured(problem, start, options)?);
     }
     let (mut at, mut history) = (start, Vec::new());
     let (mut before, mut descents) = (f64::INFINITY, 0);
     loop {
         hold_turning(problem, &at)?;
-        let mut fit = structured::minimise(problem, at, options)?;
+        let mut fit = fit_structured(problem, at, options)?;
         descents += 1;
-        history.append(&mut fit.iterations);
-        fit.iterations.clone_from(&history);
+        history.append(&mut fit.history);
+        fit.history.clone_from(&history);
         let mut next = fit.parameters.clone();
         let moved = keep_within(problem, &mut next);
         if descents >= MOST_DESCENTS || !(moved || fit.converged()) {
@@ -56,12 +58,12 @@ pub fn minimise(
 /// start has not yet.
 ///
 /// # Errors
-/// [`NoValue`] where the model is not defined at the start.
+/// [`ReversalError`] where the model is not defined at the start.
 pub fn approach(
     problem: &Reversal,
     start: Parameters,
-    options: Options,
-) -> Result<Parameters, NoValue> {
+    options: &Options,
+) -> Result<Parameters, ReversalError> {
     if problem.joined.is_none() {
         return Ok(start);
     }
@@ -70,7 +72,7 @@ pub fn approach(
         held.hold(problem.unknowns.effect(k), true);
     }
     hold_turning(&mut held, &start)?;
-    Ok(structured::minimise(&held, start, options)?.parameters)
+    Ok(fit_structured(&held, start, options)?.parameters)
 }
 
 /// Holds the turning points of a play where they are at this point.

@@ -1,6 +1,6 @@
 //! Why there is no simultaneous solution.
 
-use errsep_solvers::problem::NoValue;
+use errsep_solvers::{FitError, NoValue};
 use thiserror::Error;
 
 use super::knots::FEWEST_POSITIONS;
@@ -181,10 +181,22 @@ pub enum ReversalError {
     /// The model has no value at the start.
     #[error("the fit cannot begin: {0}")]
     NoStart(#[from] NoValue),
+    /// The minimiser refuses its settings, or an observer broke it off.
+    #[error("the fit was not made: {0}")]
+    NotMade(FitError),
     /// The fit did not end at a minimum that determines the unknowns.
     #[error("the simultaneous fit has no answer: {ending}")]
     NotConverged {
         /// How it ended, in words.
         ending: String,
     },
+}
+
+impl From<FitError> for ReversalError {
+    fn from(error: FitError) -> Self {
+        match error {
+            FitError::NoValueAtStart { reason } => Self::NoStart(NoValue::new(reason)),
+            other => Self::NotMade(other),
+        }
+    }
 }

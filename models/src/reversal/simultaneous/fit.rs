@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use errsep_solvers::linear::bordered::BorderedCovariance;
 use errsep_solvers::loss::Loss;
-use errsep_solvers::structured::{self, Options as Minimisation, Parameters};
+use errsep_solvers::options::Options as Minimisation;
+use errsep_solvers::structured::{Parameters, fit_structured};
 
 use super::along::AlongTraces;
 use super::closure;
@@ -84,10 +85,10 @@ fn solve(
     )?;
     let (mut problem, start) = ground.problem(&breaks, effects)?;
     let start = match problem.unknowns.thickness_index() {
-        Some(index) => start_of_thickness(&mut problem, index, start, options.minimisation)?,
-        None => head_start(&problem, &start, options.minimisation).unwrap_or(start),
+        Some(index) => start_of_thickness(&mut problem, index, start, &options.minimisation)?,
+        None => head_start(&problem, &start, &options.minimisation).unwrap_or(start),
     };
-    let start = approach(&problem, start, options.minimisation)?;
+    let start = approach(&problem, start, &options.minimisation)?;
     let settled = noise::settle(&mut problem, start, options, survey, &mut sigmas)?;
     let knots = FittedKnots::new(breaks, table, &settled.residuals);
     let mut solution = assemble(ground, &problem, &settled, &sigmas, knots)?;
@@ -364,15 +365,17 @@ fn start_of_thickness(
     problem: &mut Reversal,
     index: usize,
     start: Parameters,
-    options: Minimisation,
+    options: &Minimisation,
 ) -> Result<Parameters, ReversalError> {
     problem.hold(index, true);
     let start = head_start(problem, &start, options).unwrap_or(start);
     let held = minimise(problem, start, options)?;
-    let released = held.if_released(problem, index);
+    let released = held.released(problem, index);
     problem.hold(index, false);
     let unit = (2.0 * held.cost / freedom_left(problem).max(1.0)).sqrt();
-    let std_mm = released.map_or(f64::INFINITY, |(_, variance)| unit * variance.sqrt());
+    let std_mm = released.map_or(f64::INFINITY, |(_, covariance)| {
+        unit * covariance.border()[(index, index)].sqrt()
+    });
     if std_mm > problem.thickness_mm {
         return Err(ReversalError::ThicknessNotDetermined { std_mm });
     }
@@ -388,7 +391,11 @@ const HEAD_START_GAIN: usize = 4;
 /// The minimum over a few readings of each cell: from within the noise of that of all readings,
 /// where one more step is enough. `None` where there are not many more readings than that, or
 /// where those few determine no minimum.
-fn head_start(problem: &Reversal, start: &Parameters, options: Minimisation) -> Option<Parameters> {
+fn head_start(
+    problem: &Reversal,
+    start: &Parameters,
+    options: &Minimisation,
+) -> Option<Parameters> {
     if problem.joined.is_some() {
         return None;
     }
@@ -397,7 +404,7 @@ fn head_start(problem: &Reversal, start: &Parameters, options: Minimisation) -> 
     if HEAD_START_GAIN * count(&thin) > count(problem.channels) {
         return None;
     }
-    let fit = structured::minimise(&problem.over(&thin), start.clone(), options).ok()?;
+    let fit = fit_structured(&problem.over(&thin), start.clone(), options).ok()?;
     fit.converged().then_some(fit.parameters)
 }
 

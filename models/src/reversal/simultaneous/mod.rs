@@ -41,6 +41,7 @@ mod told;
 mod traces;
 mod unknowns;
 
+#[doc(hidden)]
 pub use dense::DenseReversal;
 pub use error::ReversalError;
 pub use fit::fit;

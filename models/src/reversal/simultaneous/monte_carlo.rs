@@ -1,7 +1,7 @@
 //! Uncertainty by propagation of distributions (JCGM 101:2008, clause 7): readings are drawn anew
 //! around the fitted model with the estimated noise, and fitted again on the same knots.
 
-use errsep_solvers::structured::Options as Minimisation;
+use errsep_solvers::options::Options as Minimisation;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -93,7 +93,7 @@ pub fn monte_carlo(
         let fit = minimise(
             &mut problem,
             solution.parameters.clone(),
-            Minimisation::default(),
+            &Minimisation::structured(),
         )?;
         if !fit.converged() {
             return Err(ReversalError::NotConverged {

@@ -5,7 +5,9 @@
 //! take it all and the others would be trusted. What the model misses is shared by all channels alike.
 
 use errsep_solvers::loss::Loss;
-use errsep_solvers::structured::{Fit, Iteration, Options as Minimisation, Parameters, hat_traces};
+use errsep_solvers::options::Options as Minimisation;
+use errsep_solvers::outcome::Iteration;
+use errsep_solvers::structured::{Parameters, StructuredFit, hat_traces};
 
 use super::descent::minimise;
 use super::error::ReversalError;
@@ -102,7 +104,7 @@ impl<'a> Survey<'a> {
 /// A fit with settled noise.
 pub struct Settled {
     /// The fit under the last weights.
-    pub fit: Fit,
+    pub fit: StructuredFit,
     /// Reading less model, µm, by channel in the order of its sorted readings.
     pub residuals: Vec<Vec<f64>>,
     /// What the noise is known to be apart from the model, in weighted units; `None` where nothing
@@ -159,8 +161,8 @@ pub fn settle(
         }
         *sigmas = next;
         problem.weights = weights_of(sigmas);
-        fit = minimise(problem, fit.parameters, options.minimisation)?;
-        history.extend(&fit.iterations);
+        fit = minimise(problem, fit.parameters, &options.minimisation)?;
+        history.extend(&fit.history);
         residuals = problem.residuals(&fit.parameters)?;
     }
     Ok(Settled {
@@ -178,26 +180,26 @@ fn first_fit(
     problem: &mut Reversal,
     start: Parameters,
     options: &Options,
-) -> Result<(Fit, Vec<Iteration>), ReversalError> {
+) -> Result<(StructuredFit, Vec<Iteration>), ReversalError> {
     if options.loss == Loss::Quadratic {
-        let fit = minimise(problem, start, options.minimisation)?;
-        let history = fit.iterations.clone();
+        let fit = minimise(problem, start, &options.minimisation)?;
+        let history = fit.history.clone();
         return Ok((fit, history));
     }
     let near = Minimisation {
         cost_tolerance: NEAR,
-        ..options.minimisation
+        ..options.minimisation.clone()
     };
-    let mut fit = minimise(problem, start, near)?;
-    let mut history = fit.iterations.clone();
+    let mut fit = minimise(problem, start, &near)?;
+    let mut history = fit.history.clone();
     problem.loss = options.loss;
-    for (far, stop) in [(true, near), (false, options.minimisation)] {
+    for (far, stop) in [(true, &near), (false, &options.minimisation)] {
         if !fit.converged() {
             break;
         }
         problem.far = far;
         fit = minimise(problem, fit.parameters, stop)?;
-        history.extend(&fit.iterations);
+        history.extend(&fit.history);
     }
     Ok((fit, history))
 }
@@ -226,7 +228,7 @@ fn share_left(readings: usize, used: f64) -> f64 {
 /// The channels' standard deviations as far as they are told apart.
 fn told_apart(
     problem: &Reversal,
-    fit: &Fit,
+    fit: &StructuredFit,
     levels: &Levels,
     options: &Options,
     survey: &Survey,

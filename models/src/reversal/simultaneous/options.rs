@@ -1,11 +1,12 @@
 //! What a user may choose.
 
 use errsep_solvers::loss::Loss;
+use errsep_solvers::options::Options as Minimisation;
 
 use crate::reversal::Convention;
 
 /// How to fit.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone)]
 pub struct Options {
     /// Which contrasts of the slopes are tilts and which is held at zero.
     pub convention: Convention,
@@ -19,10 +20,25 @@ pub struct Options {
     pub loss: Loss,
     /// Tilts to begin with instead of those of the staged solution, rad, in the order of the fit.
     pub start_tilts_rad: Option<Vec<f64>>,
-    /// Settings of the minimisation.
-    pub minimisation: errsep_solvers::structured::Options,
+    /// Settings of each minimisation: tolerances, limits of passes and of time, a flag that stops it.
+    pub minimisation: Minimisation,
     /// Effects that are unknowns of the fit too.
     pub effects: Vec<With>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            convention: Convention::default(),
+            thickness: Thickness::default(),
+            noise: Noise::default(),
+            knots: Knots::default(),
+            loss: Loss::default(),
+            start_tilts_rad: None,
+            minimisation: Minimisation::structured(),
+            effects: Vec::new(),
+        }
+    }
 }
 
 /// An effect that joins the fit.

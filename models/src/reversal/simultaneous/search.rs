@@ -183,7 +183,7 @@ impl<'g, 'a> Search<'g, 'a> {
             all.push((name, Arc::clone(effect), values.clone()));
             let begun = Begun::new(self.ground.observations, self.times, &all);
             let (mut problem, start) = self.ground_problem(Some(&begun))?;
-            let options = self.ground.options.minimisation;
+            let options = &self.ground.options.minimisation;
             let fit = approach(&problem, start, options)
                 .and_then(|start| minimise(&mut problem, start, options));
             let Ok(fit) = fit else {
@@ -224,7 +224,7 @@ impl<'g, 'a> Search<'g, 'a> {
         } else {
             problem
         };
-        let options = self.ground.options.minimisation;
+        let options = &self.ground.options.minimisation;
         let start = approach(&problem, start, options)?;
         let Ok(fit) = minimise(&mut problem, start, options) else {
             return Ok(None);

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use errsep_solvers::linear::bordered::{BorderedCovariance, Constraints};
-use errsep_solvers::outcome::Ending;
+use errsep_solvers::outcome::{Ending, Iteration};
 use errsep_solvers::problem::NoValue;
-use errsep_solvers::structured::{Iteration, Parameters};
+use errsep_solvers::structured::Parameters;
 use nalgebra::DMatrix;
 
 use super::along::Gathered;

@@ -57,21 +57,6 @@ impl Tall {
         &mut self.values[j * Self::CAPACITY..j * Self::CAPACITY + self.rows]
     }
 
-    /// The first `N` columns at once, to be written in one loop.
-    ///
-    /// # Panics
-    /// If the batch has fewer than `N` columns.
-    pub fn first_columns_mut<const N: usize>(&mut self) -> [&mut [f64]; N] {
-        assert!(N <= self.columns, "the batch has {} columns", self.columns);
-        let rows = self.rows;
-        let mut rest = self.values.as_mut_slice();
-        std::array::from_fn(|_| {
-            let (column, after) = std::mem::take(&mut rest).split_at_mut(Self::CAPACITY);
-            rest = after;
-            &mut column[..rows]
-        })
-    }
-
     fn pad(&mut self) -> usize {
         let padded = self.rows.next_multiple_of(LANES);
         for j in 0..self.columns {

@@ -14,9 +14,11 @@
 mod assemble;
 mod constraints;
 mod covariance;
+mod model;
 mod solve;
 
 pub use assemble::{Bordered, Group, Share};
 pub use constraints::Constraints;
 pub use covariance::BorderedCovariance;
+pub use model::BorderedModel;
 pub use solve::{Solved, Undetermined};

@@ -142,12 +142,8 @@ impl Bordered {
         })
     }
 
-    /// By how much a step changes the rows' linear prediction, relative to it: ‖Rδ‖/‖R p‖.
-    pub fn relative_change(&self, step: &Solved, band: &[f64], border: &[f64]) -> f64 {
-        self.image_norm(&step.band, &step.border) / self.image_norm(band, border)
-    }
-
-    fn image_norm(&self, band: &[f64], border: &[f64]) -> f64 {
+    /// ‖R δ‖: by how much a step changes the rows' linear prediction.
+    pub(super) fn image_norm(&self, band: &[f64], border: &[f64]) -> f64 {
         let q = self.border;
         let mut sum = 0.0;
         for i in 0..self.triangle.len() {

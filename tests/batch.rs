@@ -244,7 +244,8 @@ fn a_wrong_list_is_told_where() {
             "id,command,options\na,circle,'x\n",
             "a quote that does not end",
         ),
-        ("id,comand\na,circle\n", "column `command` is missing"),
+        ("id,comand\na,circle\n", "unknown column `comand`"),
+        ("id\na\n", "column `command` is missing"),
         ("id,command\n", "has no row of data"),
     ] {
         fs::write(&list, text).unwrap();

@@ -119,7 +119,7 @@ fn what_stands_elsewhere_is_found_with_the_tilts() {
         &machine,
         &[Fault::Askew(20.0, 0.15, 0.04)],
         "off-crest",
-        &[("loss", 0.3), ("loss-along-line", 0.0)],
+        &[("loss", 0.3)],
     );
 }
 

@@ -9,6 +9,7 @@ pub mod four_sensor;
 pub mod fourier;
 pub mod machine;
 pub mod plan;
+pub mod positioning;
 mod quantity;
 pub mod reversal;
 pub mod simulate;
@@ -46,6 +47,7 @@ enum Command {
     Fourier(fourier::Args),
     Machine(machine::Args),
     Plan(plan::Args),
+    Positioning(positioning::Args),
     Reversal(reversal::Args),
     Simulate(simulate::Args),
     StepDiagonal(step_diagonal::Args),
@@ -84,6 +86,7 @@ impl Cli {
             Command::Fourier(args) => answered(&args.common, || fourier::run(args)),
             Command::Machine(args) => answered(args.common(), || machine::run(args)),
             Command::Plan(args) => answered(&args.common, || plan::run(args)),
+            Command::Positioning(args) => answered(&args.common, || positioning::run(args)),
             Command::Reversal(args) => answered(&args.common, || reversal::run(args)),
             Command::Simulate(args) => answered(args.common(), || simulate::run(args)),
             Command::StepDiagonal(args) => answered(&args.common, || step_diagonal::run(args)),

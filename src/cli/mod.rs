@@ -5,6 +5,7 @@ mod answer;
 pub mod circle;
 mod common;
 pub mod diagnose;
+pub mod export;
 pub mod four_sensor;
 pub mod fourier;
 pub mod machine;
@@ -43,6 +44,7 @@ enum Command {
     Anova(anova::Args),
     Circle(circle::Args),
     Diagnose(diagnose::Args),
+    Export(export::Args),
     FourSensor(four_sensor::Args),
     Fourier(fourier::Args),
     Machine(machine::Args),
@@ -82,6 +84,7 @@ impl Cli {
             Command::Anova(args) => answered(&args.common, || anova::run(args)),
             Command::Circle(args) => answered(&args.common, || circle::run(args)),
             Command::Diagnose(args) => answered(&args.common, || diagnose::run(args)),
+            Command::Export(args) => answered(&args.common(), || export::run(args)),
             Command::FourSensor(args) => answered(&args.common, || four_sensor::run(args)),
             Command::Fourier(args) => answered(&args.common, || fourier::run(args)),
             Command::Machine(args) => answered(args.common(), || machine::run(args)),

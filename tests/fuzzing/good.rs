@@ -38,6 +38,11 @@ pub const COMMANDS: &[&str] = &[
     "simulate step-diagonal --steps 2 --travel 600 500 400",
     "step-diagonal steps.csv --setup steps.toml",
     "straightness profile.csv",
+    "export linuxcnc positions.json --out x.comp --force",
+    "export isg-leadscrew positions.json --axis 1 --points 5 --out x.lis --force",
+    "export siemens-eec positions.json --axis X --step 100 --reference 50 --out x.ini --force",
+    "export etalon machine.toml --travel X=0:200 --out x.etalon --force",
+    "export klipper machine.toml --out x.cfg --force",
     "traces run.csv --window 30",
 ];
 
@@ -82,6 +87,13 @@ const TEXTS: &[(&str, &str)] = &[
     (
         "steps.toml",
         "[test]\nnoise = 0.2\n[[measured]]\naxis = \"X\"\nslope = 0.004\nstd = 0.0005\ndegrees_of_freedom = 9\n",
+    ),
+    (
+        "positions.json",
+        "{\"schema\": \"errsep.positioning/1\", \"axis\": {\"name\": \"X\"}, \"unit\": \"um\", \"points\": [\
+         {\"target\": 0, \"mean_forward\": 0.1, \"mean_backward\": 1.2},\n\
+         {\"target\": 100, \"mean_forward\": 1.1, \"mean_backward\": 2.4},\n\
+         {\"target\": 200, \"mean_forward\": -0.3, \"mean_backward\": 0.9}]}\n",
     ),
     (
         "positioning.toml",

@@ -20,9 +20,10 @@ pub const COVERAGE: f64 = 0.95;
 
 /// Simulated tests; fewer where a test has very many readings.
 const TRIALS: usize = 10_000;
-const FEWEST: usize = 2_000;
-/// Means that are simulated at most.
+const FEWEST: usize = 400;
+/// Means that are simulated at most, and targets.
 const MOST_MEANS: usize = 4_000_000;
+const MOST_TARGETS: usize = 10_000;
 
 /// What is known of the measurement beside its readings: expanded uncertainties (k = 2), µm or
 /// seconds of arc.
@@ -67,6 +68,9 @@ pub enum NoUncertainty {
         "readings scatter differently from target to target, and so few runs do not tell how much at each"
     )]
     ScatterDiffers,
+    /// More targets than tests are simulated of.
+    #[error("there are more than 10 000 targets")]
+    TooManyTargets,
     /// Readings of a run that are alike.
     #[error(
         "neighbouring readings of a run are alike, so that the targets do not tell the scatter independently"
@@ -89,6 +93,9 @@ pub(super) fn expanded(
     };
     if scatter.std == 0.0 {
         return none(NoUncertainty::NoScatter);
+    }
+    if deviations.targets.len() > MOST_TARGETS {
+        return none(NoUncertainty::TooManyTargets);
     }
     let why = match (scatter.depends(), scatter.differs()) {
         (true, _) => Some(NoUncertainty::ReadingsAlike),

@@ -87,18 +87,23 @@ pub fn read(path: &Path) -> Result<(Content, String), Message> {
                 .remedy("give result.json of a report"),
         );
     }
-    let start = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
-    if start.trim_ascii_start().first() != Some(&b'{') {
+    if path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+    {
         let filed = read_filed(path, None)?;
         return Ok((
             Content::Machine(machine(&filed.machine)),
             "a machine".to_owned(),
         ));
     }
+    let start = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
     let result: Value = serde_json::from_slice(start).map_err(|e| {
         Message::bad_input(format!("this is no JSON: {e}"))
             .in_file(path)
-            .remedy("give result.json of a report, or what --format json printed")
+            .remedy(
+                "give result.json of a report, what --format json printed, or a machine as .toml",
+            )
     })?;
     let schema = result["schema"].as_str().unwrap_or_default().to_owned();
     let content = match schema.as_str() {

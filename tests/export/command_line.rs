@@ -177,6 +177,10 @@ fn a_result_of_the_wrong_kind_names_what_takes_it() {
         ),
         ("linuxcnc nothing.json", &["nothing.json", "cannot be read"]),
         ("linuxcnc broken.json", &["broken.json", "no JSON"]),
+        (
+            "etalon profile.csv",
+            &["profile.csv", "no JSON", "a machine as .toml"],
+        ),
         ("linuxcnc other.json", &["no result of errsep"]),
         ("linuxcnc empty.json", &["lacks what a controller needs"]),
         ("siemens-cec straightness.json", &["--axis X:Z"]),

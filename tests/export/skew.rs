@@ -40,15 +40,16 @@ fn content(angles: [f64; 3]) -> Content {
     })
 }
 
-/// A machine whose slides all carry the tool, X first, with these angles alone.
-fn machine(angles: [f64; 3]) -> Machine {
+/// A machine with these angles alone, in the coordinates of the tool against the workpiece.
+fn machine(chain: &str, angles: [f64; 3]) -> Machine {
     let names = ["C0Y", "B0Z", "A0Z"].into_iter().zip(angles);
     let errors = names.map(|(name, value)| ComponentError {
         component: name.parse().unwrap(),
         function: ErrorFunction::constant(value),
         spread: Spread::none(),
     });
-    Machine::new(Chain::parse("FXYZ").unwrap(), Sense::Tool, errors.collect()).unwrap()
+    let chain = Chain::parse(chain).unwrap().with_tool_coordinates();
+    Machine::new(chain, Sense::Tool, errors.collect()).unwrap()
 }
 
 proptest! {
@@ -58,10 +59,11 @@ proptest! {
     fn firmwares_make_the_machine_square(
         angles in prop::array::uniform3(-3e-3..3e-3f64),
         at in prop::array::uniform3(-200.0..200.0f64),
+        chain in 0usize..3,
     ) {
         let content = content(angles);
         let at = Position::new(at[0], at[1], at[2]);
-        let machine = machine(angles);
+        let machine = machine(["FXYZ", "XYFZ", "YFXZ"][chain], angles);
         let read = |format| export(format, &content, &Request::default()).unwrap().text;
         let klipper = read("klipper");
         let profile = ["xy_skew = ", "xz_skew = ", "yz_skew = "].map(|k| number(&klipper, k));

@@ -86,6 +86,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             "schema": "errsep.straightness/1",
             "points": x.len(),
             "reference_lines": results.iter().map(as_json).collect::<Vec<_>>(),
+            "profile": profile(&x, &y, &results),
         }),
         page: Page::new("Straightness", args.profile.display().to_string()).section(section),
         tables: vec![table],
@@ -109,6 +110,23 @@ fn read(path: &Path) -> Result<(Vec<f64>, Vec<f64>), Message> {
         return Err(table.no_rows());
     }
     Ok((x, y))
+}
+
+/// Deviations from each reference line, in the order of the positions.
+fn profile(x: &[f64], y: &[f64], results: &[Straightness]) -> serde_json::Value {
+    let mut points: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut profile = serde_json::Map::new();
+    profile.insert(
+        "x".to_owned(),
+        json!(points.iter().map(|p| p.0).collect::<Vec<_>>()),
+    );
+    for s in results {
+        let deviations: Vec<f64> = points.iter().map(|p| s.deviation(p.0, p.1)).collect();
+        profile.insert(s.reference.key().to_owned(), json!(deviations));
+    }
+    profile.insert("unit".to_owned(), json!("um"));
+    profile.into()
 }
 
 fn in_words(s: &Straightness) -> String {

@@ -43,6 +43,7 @@ mod html;
 pub use crate::number;
 mod page;
 pub mod plot;
+pub mod positioning;
 pub mod reversal;
 pub mod step_diagonal;
 mod table;

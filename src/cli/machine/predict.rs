@@ -101,6 +101,7 @@ pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
             "independence": context.propagation.independence(),
             "prediction": context.propagation.prediction(),
             "confidence": context.propagation.confidence,
+            "errors": context.errors(),
             "points": json_points,
         }),
         page,

@@ -6,6 +6,7 @@ pub mod circle;
 pub mod four_sensor;
 pub mod fourier;
 pub mod machine;
+pub mod positioning;
 pub mod reversal;
 pub mod step_diagonal;
 
@@ -37,6 +38,7 @@ enum Kind {
     FourSensor(four_sensor::Args),
     Fourier(fourier::Args),
     Machine(machine::Args),
+    Positioning(positioning::Args),
     Reversal(reversal::Args),
     StepDiagonal(step_diagonal::Args),
 }
@@ -50,6 +52,7 @@ impl Args {
             Kind::FourSensor(args) => &args.common,
             Kind::Fourier(args) => &args.common,
             Kind::Machine(args) => &args.common,
+            Kind::Positioning(args) => &args.common,
             Kind::Reversal(args) => &args.common,
             Kind::StepDiagonal(args) => &args.common,
         }
@@ -68,6 +71,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         Kind::FourSensor(args) => four_sensor::run(args),
         Kind::Fourier(args) => fourier::run(args),
         Kind::Machine(args) => machine::run(args),
+        Kind::Positioning(args) => positioning::run(args),
         Kind::Reversal(args) => reversal::run(args),
         Kind::StepDiagonal(args) => step_diagonal::run(args),
     }?;

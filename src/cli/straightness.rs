@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{Answer, CommonArgs};
 use crate::io::{CsvTable, Message, Status, TableReader};
-use crate::report::{Page, Section};
+use crate::report;
 
 /// Straightness of a profile: least-squares, end-point and minimum-zone reference lines.
 #[derive(Debug, clap::Args)]
@@ -75,11 +75,6 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             )
         },
     );
-    let section = results
-        .iter()
-        .fold(Section::new("Straightness"), |section, s| {
-            section.paragraph(in_words(s))
-        });
     Ok(Answer {
         text,
         json: json!({
@@ -88,7 +83,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             "reference_lines": results.iter().map(as_json).collect::<Vec<_>>(),
             "profile": profile(&x, &y, &results),
         }),
-        page: Page::new("Straightness", args.profile.display().to_string()).section(section),
+        page: report::straightness::page(&args.profile.display().to_string(), &x, &y, &results),
         tables: vec![table],
         inputs: vec![args.profile.clone()],
         setup: None,

@@ -21,7 +21,7 @@ use super::{Answer, CommonArgs};
 use crate::io::message::nearest;
 use crate::io::output::Values;
 use crate::io::{CsvTable, Message, Status};
-use crate::report::{Page, Section};
+use crate::report;
 
 /// Makes data with known truth.
 #[derive(Debug, clap::Args)]
@@ -249,6 +249,8 @@ pub(super) fn answer(
             (name.clone(), values)
         })
         .collect::<serde_json::Map<String, Value>>();
+    let rows = data.columns.first().map_or(0, |(_, values)| values.len());
+    let page = report::simulation::page(kind, seed, (&data.file_name, rows), &truth);
     Ok(Answer {
         text: format!("# errsep simulate {kind} --seed {seed}\n{table}"),
         json: json!({
@@ -258,9 +260,7 @@ pub(super) fn answer(
             "truth": truth,
             "data": columns,
         }),
-        page: Page::new("Simulation", kind).section(
-            Section::new("Data").paragraph(format!("{} with seed {seed}.", data.file_name)),
-        ),
+        page,
         tables: vec![data],
         inputs: Vec::new(),
         setup: None,

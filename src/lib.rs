@@ -3,6 +3,7 @@
 
 pub mod cli;
 pub mod diagnosis;
+pub mod export;
 pub mod io;
 pub mod number;
 pub mod report;

@@ -13,6 +13,7 @@ mod diagnosis;
 mod four_sensor;
 mod fourier;
 mod machine;
+mod positioning;
 mod reversal;
 mod staged;
 mod step_diagonal;
@@ -36,6 +37,7 @@ const ROOMS: &[Room] = &[
     ("fourier", 2000, fourier::rows),
     ("step-diagonal", 2000, step_diagonal::rows),
     ("machine", 2000, machine::rows),
+    ("positioning", 2000, positioning::rows),
     ("anova", 2000, anova::rows),
     ("calibration-line", 2000, calibration_line::rows),
     ("diagnosis", 60, diagnosis::rows),

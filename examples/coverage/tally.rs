@@ -12,6 +12,7 @@ pub struct Tally {
     squares: f64,
     inside_68: u64,
     inside_95: u64,
+    wide_alone: bool,
 }
 
 impl Tally {
@@ -48,6 +49,12 @@ impl Tally {
         self.inside_95 += u64::from(inside_95);
     }
 
+    /// One value of which only the interval of 95 % is given, and whether it holds the truth.
+    pub fn add_wide(&mut self, inside: bool) {
+        self.add_inside(false, inside);
+        self.wide_alone = true;
+    }
+
     /// Whether anything was counted.
     pub fn any(&self) -> bool {
         self.values > 0
@@ -61,6 +68,7 @@ impl Tally {
             squares: self.squares + other.squares,
             inside_68: self.inside_68 + other.inside_68,
             inside_95: self.inside_95 + other.inside_95,
+            wide_alone: self.wide_alone || other.wide_alone,
         }
     }
 }
@@ -80,9 +88,10 @@ pub struct Row {
 
 /// The mark of a row: a 95 % interval that holds less than 93 % or more than 97 %, one of 68.27 % that
 /// holds less than 65 % or more than 71 %.
-fn mark(of_68: f64, of_95: f64) -> &'static str {
+fn mark(of_68: Option<f64>, of_95: f64) -> &'static str {
     let (narrow, wide) = (65.0..=71.0, 93.0..=97.0);
-    match (narrow.contains(&of_68), wide.contains(&of_95)) {
+    let narrow = of_68.is_none_or(|share| narrow.contains(&share));
+    match (narrow, wide.contains(&of_95)) {
         (true, true) => "",
         (true, false) => "outside",
         (false, true) => "68 % outside",
@@ -104,15 +113,16 @@ pub fn print(rows: &[Row]) {
         } else {
             String::new()
         };
+        let of_68 = (!t.wide_alone).then(|| share(t.inside_68));
+        let narrow = of_68.map(|s| format!("{s:.1} %")).unwrap_or_default();
         println!(
-            "| {} | {} | {} | {} | {rms} | {:.1} % | {:.1} % | {} |",
+            "| {} | {} | {} | {} | {rms} | {narrow} | {:.1} % | {} |",
             row.case,
             row.quantity,
             row.seeds,
             t.values,
-            share(t.inside_68),
             share(t.inside_95),
-            mark(share(t.inside_68), share(t.inside_95))
+            mark(of_68, share(t.inside_95))
         );
     }
 }

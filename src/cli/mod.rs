@@ -8,11 +8,13 @@ pub mod circle;
 mod common;
 pub mod completions;
 pub mod diagnose;
+pub mod export;
 pub mod four_sensor;
 pub mod fourier;
 pub mod machine;
 pub mod man;
 pub mod plan;
+pub mod positioning;
 mod quantity;
 pub mod reversal;
 pub mod simulate;
@@ -50,6 +52,7 @@ enum Command {
     Answer(Answering),
     Batch(batch::Args),
     Completions(completions::Args),
+    Export(export::Args),
     Man(man::Args),
 }
 
@@ -63,6 +66,7 @@ enum Answering {
     Fourier(fourier::Args),
     Machine(machine::Args),
     Plan(plan::Args),
+    Positioning(positioning::Args),
     Reversal(reversal::Args),
     Simulate(simulate::Args),
     StepDiagonal(step_diagonal::Args),
@@ -107,9 +111,10 @@ impl Cli {
     /// Runs the command and prints or writes its answer.
     fn execute(&self) -> u8 {
         let ended = match &self.command {
-            Command::Answer(command) => self.answered(command),
+            Command::Answer(command) => self.answered(command.common(), || command.run()),
             Command::Batch(args) => batch::run(args),
             Command::Completions(args) => completions::run(args),
+            Command::Export(args) => self.answered(&args.common(), || export::run(args)),
             Command::Man(args) => man::run(args),
         };
         let status = ended.unwrap_or_else(|message| {
@@ -121,15 +126,17 @@ impl Cli {
     }
 
     /// Makes sure that the answer can be written, works it out, and delivers it.
-    fn answered(&self, command: &Answering) -> Result<Status, Message> {
-        let common = command.common();
+    fn answered(
+        &self,
+        common: &CommonArgs,
+        work: impl FnOnce() -> Result<Answer, Message>,
+    ) -> Result<Status, Message> {
         let out = common.out.as_deref();
         let folder = out
             .map(|place| OutFolder::reserve(place, common.force))
             .transpose()?;
         begin_record(folder.is_some() || common.format == Format::Json);
-        let answer = command.run()?;
-        answer.deliver(&self.arguments, common, folder)
+        work()?.deliver(&self.arguments, common, folder)
     }
 }
 
@@ -143,6 +150,7 @@ impl Answering {
             Self::Fourier(args) => &args.common,
             Self::Machine(args) => args.common(),
             Self::Plan(args) => &args.common,
+            Self::Positioning(args) => &args.common,
             Self::Reversal(args) => &args.common,
             Self::Simulate(args) => args.common(),
             Self::StepDiagonal(args) => &args.common,
@@ -160,6 +168,7 @@ impl Answering {
             Self::Fourier(args) => fourier::run(args),
             Self::Machine(args) => machine::run(args),
             Self::Plan(args) => plan::run(args),
+            Self::Positioning(args) => positioning::run(args),
             Self::Reversal(args) => reversal::run(args),
             Self::Simulate(args) => simulate::run(args),
             Self::StepDiagonal(args) => step_diagonal::run(args),

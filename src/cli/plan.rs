@@ -17,7 +17,8 @@ use super::{Answer, CommonArgs};
 use crate::diagnosis::{Diagnosability, NoiseLaw, NoiseSource, Options, certificate, for_people};
 use crate::io::{Message, SetupFile, Status};
 use crate::report::number::plain;
-use crate::report::{Cell, Page, Section, Table};
+use crate::report::plot::{Axis, Bar, Bars};
+use crate::report::{Cell, Figure, Page, Section, Standing, Table};
 
 /// What a planned reversal can show: visible part, smallest detectable and identifiable size,
 /// confusions and harm of every effect, and which change of the plan helps most.
@@ -312,6 +313,14 @@ fn answer(
             "most like",
         ],
     );
+    let shown = rows.iter().filter(|row| row.detectable.is_some()).count();
+    let sentence = format!(
+        "Of {} effects such a measurement would show {shown}, each from some size on; {} would not show whatever their size.",
+        rows.len(),
+        rows.len() - shown
+    );
+    let bar = |row: &Diagnosability| Bar::new(row.effect.clone(), 100.0 * row.visible);
+    let visible = Bars::new(Axis::new("visible part", "%")).bars(rows.iter().map(bar));
     for row in rows {
         let (seen, told) = (
             size(row.detectable, &row.unit),
@@ -359,8 +368,15 @@ fn answer(
     Answer {
         text,
         json: json!({"schema": "errsep.plan/1", "effects": rows, "extra_measurements": extras}),
-        page: Page::new("Plan", args.plan.display().to_string()).section(
+        page: Page::new("Plan", args.plan.display().to_string())
+            .summary(Standing::Neutral, sentence)
+            .section(
             Section::new("What the plan can show")
+                .figure(Figure::new(
+                    "Visible part of each effect",
+                    "What the fit of such a measurement cannot take up, so that it shows; below the rest it passes for form, tilt or offset.",
+                    visible,
+                ))
                 .table(table)
                 .paragraph("What would help most:")
                 .list(help),

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{Answer, CommonArgs};
 use crate::io::{CsvTable, Message, Status, TableReader};
-use crate::report::{Page, Section};
+use crate::report;
 
 /// Straightness of a profile: least-squares, end-point and minimum-zone reference lines.
 #[derive(Debug, clap::Args)]
@@ -75,19 +75,15 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             )
         },
     );
-    let section = results
-        .iter()
-        .fold(Section::new("Straightness"), |section, s| {
-            section.paragraph(in_words(s))
-        });
     Ok(Answer {
         text,
         json: json!({
             "schema": "errsep.straightness/1",
             "points": x.len(),
             "reference_lines": results.iter().map(as_json).collect::<Vec<_>>(),
+            "profile": profile(&x, &y, &results),
         }),
-        page: Page::new("Straightness", args.profile.display().to_string()).section(section),
+        page: report::straightness::page(&args.profile.display().to_string(), &x, &y, &results),
         tables: vec![table],
         inputs: vec![args.profile.clone()],
         setup: None,
@@ -109,6 +105,23 @@ fn read(path: &Path) -> Result<(Vec<f64>, Vec<f64>), Message> {
         return Err(table.no_rows());
     }
     Ok((x, y))
+}
+
+/// Deviations from each reference line, in the order of the positions.
+fn profile(x: &[f64], y: &[f64], results: &[Straightness]) -> serde_json::Value {
+    let mut points: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut profile = serde_json::Map::new();
+    profile.insert(
+        "x".to_owned(),
+        json!(points.iter().map(|p| p.0).collect::<Vec<_>>()),
+    );
+    for s in results {
+        let deviations: Vec<f64> = points.iter().map(|p| s.deviation(p.0, p.1)).collect();
+        profile.insert(s.reference.key().to_owned(), json!(deviations));
+    }
+    profile.insert("unit".to_owned(), json!("um"));
+    profile.into()
 }
 
 fn in_words(s: &Straightness) -> String {

@@ -13,7 +13,7 @@ use crate::io::units::LengthUnit;
 use crate::io::{CsvTable, Message, Status, TableReader};
 use crate::report::number::{measured, plain};
 use crate::report::plot::{Axis, Chart, Series};
-use crate::report::{Figure, KeyFigure, Page, Section};
+use crate::report::{Figure, KeyFigure, Page, Section, Standing};
 
 /// Traces for `errsep reversal` from one indicator on an artefact that turns while the slide feeds.
 #[derive(Debug, clap::Args)]
@@ -204,7 +204,15 @@ fn page(args: &Args, turning: &Turning, data: &Observations) -> Page {
             chart.series(Series::line(channel.name(), of(|r| r.x), of(|r| r.value)))
         },
     );
-    Page::new("Traces of a turning artefact", args.run.display().to_string()).section(
+    let sentence = format!(
+        "Traces at two opposite spindle angles, from {} turns at {} turns/min; what wave and form leave is {} µm RMS.",
+        plain(turning.turns, 3),
+        plain(turning.frequency * 60.0, 4),
+        plain(turning.rest_rms, 3)
+    );
+    Page::new("Traces of a turning artefact", args.run.display().to_string())
+        .summary(Standing::Neutral, sentence)
+        .section(
         Section::new("Two opposite spindle angles")
             .key_figures([
                 KeyFigure::new("Speed", turning.frequency * 60.0, "turns/min")

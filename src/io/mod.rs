@@ -9,6 +9,7 @@ pub mod machine;
 pub mod message;
 pub mod output;
 pub mod parts;
+pub mod positioning;
 pub mod printable;
 pub mod provenance;
 pub mod replicates;

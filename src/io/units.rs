@@ -8,12 +8,21 @@ pub const URAD_PER_RAD: f64 = 1e6;
 /// Arcseconds in a radian.
 pub const ARCSEC_PER_RAD: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
 
+/// Seconds of arc in a degree.
+pub const ARCSEC_PER_DEG: f64 = 3600.0;
+
+/// Seconds in an hour.
+pub const SECONDS_PER_HOUR: f64 = 3600.0;
+
 /// A unit as people read it: the micro sign for the `u` of the files.
 pub fn symbol(unit: &str) -> &str {
     match unit {
         "um" => "µm",
         "urad" => "µrad",
         "arcsec" => "″",
+        "um/h" => "µm/h",
+        "arcsec/h" => "″/h",
+        "deg" => "°",
         other => other,
     }
 }

@@ -43,8 +43,11 @@ mod html;
 pub use crate::number;
 mod page;
 pub mod plot;
+pub mod positioning;
 pub mod reversal;
+pub mod simulation;
 pub mod step_diagonal;
+pub mod straightness;
 mod table;
 
 pub use page::{Block, Figure, KeyFigure, Page, Provenance, Section, Standing};

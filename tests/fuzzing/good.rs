@@ -23,6 +23,8 @@ pub const COMMANDS: &[&str] = &[
     "machine machine.toml circularity --centre 80,60 --radius 40 --trials 50 --count 12",
     "machine machine.toml parts readings.csv --points points.csv",
     "plan plan.toml",
+    "positioning positions.csv --setup positioning.toml",
+    "simulate positioning --targets 4 --runs 2 --drift 3",
     "reversal traces.csv --setup reversal.toml",
     "reversal traces.csv --setup reversal.toml --simultaneous",
     "reversal wide.csv --columns x=x:mm,1A=1A:um,1B=1B:um",
@@ -36,6 +38,11 @@ pub const COMMANDS: &[&str] = &[
     "simulate step-diagonal --steps 2 --travel 600 500 400",
     "step-diagonal steps.csv --setup steps.toml",
     "straightness profile.csv",
+    "export linuxcnc positions.json --out x.comp --force",
+    "export isg-leadscrew positions.json --axis 1 --points 5 --out x.lis --force",
+    "export siemens-eec positions.json --axis X --step 100 --reference 50 --out x.ini --force",
+    "export etalon machine.toml --travel X=0:200 --out x.etalon --force",
+    "export klipper machine.toml --out x.cfg --force",
     "traces run.csv --window 30",
 ];
 
@@ -82,6 +89,18 @@ const TEXTS: &[(&str, &str)] = &[
         "[test]\nnoise = 0.2\n[[measured]]\naxis = \"X\"\nslope = 0.004\nstd = 0.0005\ndegrees_of_freedom = 9\n",
     ),
     (
+        "positions.json",
+        "{\"schema\": \"errsep.positioning/1\", \"axis\": {\"name\": \"X\"}, \"unit\": \"um\", \"points\": [\
+         {\"target\": 0, \"mean_forward\": 0.1, \"mean_backward\": 1.2},\n\
+         {\"target\": 100, \"mean_forward\": 1.1, \"mean_backward\": 2.4},\n\
+         {\"target\": 200, \"mean_forward\": -0.3, \"mean_backward\": 0.9}]}\n",
+    ),
+    (
+        "positioning.toml",
+        "[axis]\nname = \"X\"\nkind = \"linear\"\ntravel_from = 0.0\ntravel_to = 500.0\n\
+         [uncertainty]\ndevice = 1.0\ndrift = 0.4\n",
+    ),
+    (
         "plan.toml",
         "noise = 0.02\ntravel = 300.0\npositions = 11\ntilts = [50.0, 0.0, 20.0]\nforms = [1.0, 1.0]\n",
     ),
@@ -106,6 +125,10 @@ const SIMULATED: &[(&str, &str)] = &[
         "fourier --samples 60 --length 40 --spacing 10 --spacing 17",
     ),
     ("steps.csv", "step-diagonal --steps 2"),
+    (
+        "positions.csv",
+        "positioning --targets 4 --runs 3 --drift 2",
+    ),
 ];
 
 /// The files, each good.

@@ -10,7 +10,7 @@ use crate::io::message::nearest;
 use crate::io::{Message, Row, TableReader};
 
 /// Commands that are no campaign: they make no answer from data.
-const NOT_HERE: [&str; 4] = ["batch", "completions", "man", "help"];
+const NOT_HERE: [&str; 5] = ["batch", "completions", "export", "man", "help"];
 /// Options that the batch itself decides.
 const DECIDED: [&str; 5] = ["--out", "--format", "--force", "--quiet", "-q"];
 

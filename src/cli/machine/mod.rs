@@ -8,7 +8,9 @@ mod result;
 use std::path::PathBuf;
 
 use clap::{Subcommand, ValueEnum};
-use errsep_models::machine::{Independence, Machine, MachineError, Prediction};
+use errsep_models::machine::{ErrorFunction, Independence, Machine, MachineError, Prediction};
+
+use serde_json::{Value, json};
 
 use super::{Answer, CommonArgs};
 use crate::io::Message;
@@ -143,6 +145,31 @@ impl Context<'_> {
     fn inputs(&self, more: Option<&PathBuf>) -> Vec<PathBuf> {
         let own = [Some(&self.args.model), self.args.components.as_ref(), more];
         own.into_iter().flatten().cloned().collect()
+    }
+
+    /// The component errors, as a result names them.
+    fn errors(&self) -> Vec<Value> {
+        let told = self.machine.errors().iter().map(|error| {
+            let function = match &error.function {
+                ErrorFunction::Polynomial {
+                    basis,
+                    coefficients,
+                } => json!({
+                    "centre": basis.centre,
+                    "scale": basis.scale,
+                    "coefficients": coefficients,
+                }),
+                ErrorFunction::Table { positions, values } => {
+                    json!({"positions": positions, "values": values})
+                }
+            };
+            json!({
+                "component": error.component.to_string(),
+                "unit": error.component.unit(),
+                "function": function,
+            })
+        });
+        told.collect()
     }
 
     /// What the model could not answer, as a message about the machine's file.

@@ -37,6 +37,30 @@ struct Predicted {
     expanded: [Expanded; 3],
 }
 
+/// The largest deviation of so many points: where, and how well it is known.
+fn told(point: &Predicted, count: usize) -> String {
+    let p = point.position;
+    let parts = ["X", "Y", "Z"]
+        .iter()
+        .zip(&point.budgets)
+        .zip(&point.expanded);
+    let parts: Vec<String> = parts
+        .map(|((axis, budget), expanded)| {
+            let u = Some(expanded.expanded_uncertainty);
+            format!("{axis} {} µm", number::measured(budget.result.value, u))
+        })
+        .collect();
+    format!(
+        "The largest deviation of {count} points is {} µm at {} ({}, {}, {} mm): {} (expanded uncertainties).",
+        number::plain(point.exact.norm(), 3),
+        point.name,
+        number::plain(p.x, 6),
+        number::plain(p.y, 6),
+        number::plain(p.z, 6),
+        parts.join(", ")
+    )
+}
+
 pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
     let points = read_points(&args.points)?
         .into_iter()
@@ -51,7 +75,8 @@ pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
             u(a).total_cmp(&u(b))
         });
     let machine = context.args.model.display().to_string();
-    let largest = points.iter().map(|p| p.exact.norm()).fold(0.0, f64::max);
+    let by_size = |a: &&Predicted, b: &&Predicted| a.exact.norm().total_cmp(&b.exact.norm());
+    let largest = points.iter().max_by(by_size);
     let mut text = format!("Deviations of {machine} ({})\n\n", context.machine.chain());
     let _ = writeln!(
         text,
@@ -73,7 +98,7 @@ pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
     let mut page = Page::new("Machine: predicted deviations", machine)
         .summary(
             Standing::Good,
-            format!("The largest deviation of {} points is {} µm.", points.len(), number::plain(largest, 3)),
+            largest.map_or_else(String::new, |p| told(p, points.len())),
         )
         .section(
             Section::new("Deviations").figure(figure(&points)).table(table(&points)).note(
@@ -101,6 +126,7 @@ pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
             "independence": context.propagation.independence(),
             "prediction": context.propagation.prediction(),
             "confidence": context.propagation.confidence,
+            "errors": context.errors(),
             "points": json_points,
         }),
         page,

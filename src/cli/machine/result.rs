@@ -214,6 +214,7 @@ pub(super) fn answer(
             "assumption": assumption,
             "prediction": context.propagation.prediction(),
             "confidence": confidence,
+            "errors": context.errors(),
             "results": results,
         }),
         page: page.summary(Standing::Good, first),

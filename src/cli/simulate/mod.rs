@@ -6,6 +6,7 @@ pub mod circle;
 pub mod four_sensor;
 pub mod fourier;
 pub mod machine;
+pub mod positioning;
 pub mod reversal;
 pub mod step_diagonal;
 
@@ -20,7 +21,7 @@ use super::{Answer, CommonArgs};
 use crate::io::message::nearest;
 use crate::io::output::Values;
 use crate::io::{CsvTable, Message, Status};
-use crate::report::{Page, Section};
+use crate::report;
 
 /// Makes data with known truth.
 #[derive(Debug, clap::Args)]
@@ -37,6 +38,7 @@ enum Kind {
     FourSensor(four_sensor::Args),
     Fourier(fourier::Args),
     Machine(machine::Args),
+    Positioning(positioning::Args),
     Reversal(reversal::Args),
     StepDiagonal(step_diagonal::Args),
 }
@@ -50,6 +52,7 @@ impl Args {
             Kind::FourSensor(args) => &args.common,
             Kind::Fourier(args) => &args.common,
             Kind::Machine(args) => &args.common,
+            Kind::Positioning(args) => &args.common,
             Kind::Reversal(args) => &args.common,
             Kind::StepDiagonal(args) => &args.common,
         }
@@ -68,6 +71,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         Kind::FourSensor(args) => four_sensor::run(args),
         Kind::Fourier(args) => fourier::run(args),
         Kind::Machine(args) => machine::run(args),
+        Kind::Positioning(args) => positioning::run(args),
         Kind::Reversal(args) => reversal::run(args),
         Kind::StepDiagonal(args) => step_diagonal::run(args),
     }?;
@@ -245,6 +249,8 @@ pub(super) fn answer(
             (name.clone(), values)
         })
         .collect::<serde_json::Map<String, Value>>();
+    let rows = data.columns.first().map_or(0, |(_, values)| values.len());
+    let page = report::simulation::page(kind, seed, (&data.file_name, rows), &truth);
     Ok(Answer {
         text: format!("# errsep simulate {kind} --seed {seed}\n{table}"),
         json: json!({
@@ -254,9 +260,7 @@ pub(super) fn answer(
             "truth": truth,
             "data": columns,
         }),
-        page: Page::new("Simulation", kind).section(
-            Section::new("Data").paragraph(format!("{} with seed {seed}.", data.file_name)),
-        ),
+        page,
         tables: vec![data],
         inputs: Vec::new(),
         setup: None,

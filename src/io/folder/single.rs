@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use super::staged::Staged;
 use crate::io::Message;
 
-/// A file that gets its name when it is complete; it replaces nothing.
+/// A file that gets its name when it is complete; it replaces nothing unless that was asked for.
 pub struct OutFile {
     place: PathBuf,
+    replaces: bool,
 }
 
 impl OutFile {
@@ -22,8 +23,26 @@ impl OutFile {
                 .in_file(place)
                 .remedy("give another name, or remove it first"));
         }
+        Self::checked(place, false)
+    }
+
+    /// The same for a place where a file may stand, which is then replaced in one step.
+    ///
+    /// # Errors
+    /// Nothing can be written there, or something other than a file is there.
+    pub fn replacing(place: &Path) -> Result<Self, Message> {
+        if place.symlink_metadata().is_ok_and(|there| !there.is_file()) {
+            return Err(Message::bad_input("is there and is no file")
+                .in_file(place)
+                .remedy("give another name"));
+        }
+        Self::checked(place, true)
+    }
+
+    fn checked(place: &Path, replaces: bool) -> Result<Self, Message> {
         let file = Self {
             place: place.to_owned(),
+            replaces,
         };
         Staged::new(file.folder()).map_err(|e| file.unwritable(&e))?;
         Ok(file)
@@ -36,7 +55,17 @@ impl OutFile {
     pub fn write(self, content: &[u8]) -> Result<(), Message> {
         let written = Staged::new(self.folder()).and_then(|mut staged| {
             staged.write_all(content)?;
-            staged.name(&self.place)
+            if !self.replaces {
+                return staged.name(&self.place);
+            }
+            // Only a name can be exchanged for a name.
+            let beside = self
+                .folder()
+                .join(format!(".errsep-{}.part", std::process::id()));
+            staged.name(&beside)?;
+            std::fs::rename(&beside, &self.place).inspect_err(|_| {
+                let _ = std::fs::remove_file(&beside);
+            })
         });
         written.map_err(|e| self.unwritable(&e))
     }

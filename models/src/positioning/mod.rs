@@ -1,0 +1,79 @@
+//! Positioning of one axis: accuracy and repeatability by ISO 230-2 and VDI/DGQ 3441, with their
+//! uncertainties, and the drift of the deviations over time.
+//!
+//! Targets are in mm and deviations (actual less target position) in µm; of a rotary axis they are
+//! in degrees and seconds of arc. Nothing here converts one into the other.
+
+mod dependence;
+mod drift;
+mod figures;
+mod readings;
+mod simulate;
+mod uncertainty;
+
+pub use dependence::Scatter;
+pub use drift::Drift;
+pub use figures::{Figure, FigureValues, Profile};
+pub use readings::{Deviations, Direction, PositioningError, Reading, Targets};
+pub use simulate::{PositioningSimulation, Truth, simulate};
+pub use uncertainty::{COVERAGE, Influences, NoUncertainty};
+
+/// What one test of an axis tells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Positioning {
+    /// The deviations by target, direction and run.
+    pub deviations: Deviations,
+    /// Mean and standard deviation at each target and direction.
+    pub profile: Profile,
+    /// The figures of both standards.
+    pub values: FigureValues,
+    /// The expanded uncertainty of each figure ([`COVERAGE`]), or why there is none.
+    pub expanded: Vec<(Figure, Result<f64, NoUncertainty>)>,
+    /// Scatter of one reading, and whether readings are alike; absent with one run.
+    pub scatter: Option<Scatter>,
+    /// Drift common to all targets; absent without times, or where they do not tell it.
+    pub drift: Option<Drift>,
+}
+
+impl Positioning {
+    /// Value of a figure, where the data tell it.
+    #[must_use]
+    pub fn value(&self, figure: Figure) -> Option<f64> {
+        self.values.get(figure)
+    }
+
+    /// Expanded uncertainty of a figure, or why there is none. Absent where the figure itself is.
+    #[must_use]
+    pub fn uncertainty(&self, figure: Figure) -> Option<Result<f64, NoUncertainty>> {
+        let found = self.expanded.iter().find(|(f, _)| *f == figure)?;
+        Some(found.1)
+    }
+}
+
+/// Works out the figures of a test with their uncertainties. The same `seed` gives the same
+/// uncertainties.
+///
+/// # Errors
+/// Readings that are not those of a whole test: see [`PositioningError`].
+pub fn analyse(
+    readings: &[Reading],
+    influences: &Influences,
+    seed: u64,
+) -> Result<Positioning, PositioningError> {
+    let deviations = Deviations::new(readings)?;
+    let profile = Profile::of(&deviations);
+    let values = FigureValues::of(&profile);
+    if values.iter().any(|(_, v)| !v.is_finite()) {
+        return Err(PositioningError::TooLarge);
+    }
+    let scatter = Scatter::of(&deviations);
+    let expanded = uncertainty::expanded(&deviations, &profile, scatter.as_ref(), influences, seed);
+    Ok(Positioning {
+        drift: Drift::of(readings),
+        deviations,
+        profile,
+        values,
+        expanded,
+        scatter,
+    })
+}

@@ -1,0 +1,251 @@
+//! `errsep export`: a result as the compensation file of a controller.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use serde_json::json;
+
+use super::{Answer, CommonArgs, Format};
+use crate::export::{self, Exported, FORMATS, Grid, Request, Unit};
+use crate::io::message::{list, nearest};
+use crate::io::provenance::Provenance;
+use crate::io::source::begin_record;
+use crate::io::{Message, OutFile, Status, printable};
+use crate::report::{Page, Section};
+
+/// The compensation file of a controller from a result, with what it says in a side file.
+#[derive(Debug, clap::Args)]
+#[command(after_help = formats_help(), after_long_help = formats_help())]
+pub struct Args {
+    /// Format of the controller (below).
+    #[arg(value_name = "FORMAT")]
+    format_name: String,
+    /// The result (result.json, or what --format json printed); a machine (TOML) for the 21 errors.
+    #[arg(value_name = "RESULT.json")]
+    result: PathBuf,
+    /// The file; FILE.about.json beside it says sign, unit and what was left out.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Name or number of the axis for the controller; for siemens-cec X:Z, the axis that moves and the one
+    /// that corrects.
+    #[arg(long, value_name = "AXIS")]
+    axis: Option<String>,
+    /// Unit of the controller.
+    #[arg(long, value_enum, value_name = "mm|inch")]
+    unit: Option<UnitName>,
+    /// Position where the deviation is to be zero, mm (degrees).
+    #[arg(long, value_name = "POS", allow_negative_numbers = true)]
+    reference: Option<f64>,
+    /// So many evenly spaced points in place of those measured.
+    #[arg(long, value_name = "N", conflicts_with = "step")]
+    points: Option<usize>,
+    /// Evenly spaced points so far apart, mm (degrees).
+    #[arg(long, value_name = "MM")]
+    step: Option<f64>,
+    /// Travel of an axis whose errors are polynomials, such as X=0:500, mm; may be given several times.
+    #[arg(long, value_name = "AXIS=FROM:TO", value_parser = parse_travel)]
+    travel: Vec<(char, f64, f64)>,
+    /// Replace the two files if they are there.
+    #[arg(long)]
+    force: bool,
+    /// How to print what was written.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum UnitName {
+    /// Millimetre.
+    Mm,
+    /// Inch.
+    Inch,
+}
+
+fn formats_help() -> String {
+    let mut text = "Formats:\n".to_owned();
+    for format in FORMATS {
+        text += &format!("  {:15} {}\n", format.name, format.meaning);
+    }
+    text + "\nExample: errsep export linuxcnc positioning/result.json --out x.comp"
+}
+
+fn parse_travel(text: &str) -> Result<(char, f64, f64), String> {
+    let parsed = || {
+        let (axis, ends) = text.split_once('=')?;
+        let (from, to) = ends.split_once(':')?;
+        let (from, to): (f64, f64) = (from.parse().ok()?, to.parse().ok()?);
+        let mut letters = axis.chars();
+        let letter = letters.next().filter(|l| "XYZ".contains(*l))?;
+        (letters.next().is_none() && from < to && (to - from).is_finite())
+            .then_some((letter, from, to))
+    };
+    parsed().ok_or_else(|| "write AXIS=FROM:TO, such as X=0:500".to_owned())
+}
+
+impl Args {
+    /// As the options that every command has; the folder of a report is none of them here.
+    pub(super) fn common(&self) -> CommonArgs {
+        CommonArgs {
+            format: self.format,
+            out: None,
+            force: false,
+            quiet: false,
+            seed: 1,
+        }
+    }
+}
+
+/// Writes the file and what is told of it.
+///
+/// # Errors
+/// An unknown format, a result that it does not take, options that do not fit, files that are there already
+/// or cannot be written.
+pub fn run(args: &Args) -> Result<Answer, Message> {
+    let format = FORMATS
+        .into_iter()
+        .find(|f| f.name == args.format_name)
+        .ok_or_else(|| unknown(&args.format_name))?;
+    let finite = [args.reference, args.step]
+        .into_iter()
+        .flatten()
+        .all(f64::is_finite);
+    if !finite {
+        return Err(
+            Message::bad_input("--reference or --step is not finite").remedy("give a number")
+        );
+    }
+    let about_path = about_path(&args.out);
+    let place = |path: &Path| reserve(path, &args.result, args.force);
+    let (file, about_file) = (place(&args.out)?, place(&about_path)?);
+    // The side file names the result by its digest, however the answer is printed.
+    begin_record(true);
+    let (content, schema) = export::read(&args.result)?;
+    if !format.takes.is_in(&content) {
+        return Err(not_taken(format, &schema, &content, &args.result));
+    }
+    let exported = (format.write)(&content, &request(args))?;
+    let mut about = exported.about(format.name);
+    let provenance = Provenance::of(&[], [args.result.as_path()], None)?;
+    let provenance = serde_json::to_value(&provenance).map_err(|e| unwritable(&e))?;
+    about["result"] = json!({"schema": schema, "sha256": provenance["inputs"][0]["sha256"]});
+    let pretty = serde_json::to_string_pretty(&about).map_err(|e| unwritable(&e))?;
+    about_file.write((printable::json(&pretty) + "\n").as_bytes())?;
+    if let Err(message) = file.write(exported.text.as_bytes()) {
+        // Without its file the side file tells of nothing.
+        let _ = std::fs::remove_file(&about_path);
+        return Err(message);
+    }
+    let text = in_words(args, format.name, &exported, &about_path);
+    Ok(Answer {
+        page: Page::new("Export", format.name)
+            .section(Section::new("Written").verbatim(text.as_str())),
+        text,
+        json: about,
+        tables: Vec::new(),
+        setup: None,
+        inputs: vec![args.result.clone()],
+        seed: None,
+        status: Status::Done,
+    })
+}
+
+fn unwritable(error: &serde_json::Error) -> Message {
+    Message::bad_input(format!("the side file cannot be written: {error}"))
+}
+
+fn request(args: &Args) -> Request {
+    Request {
+        axis: args.axis.clone(),
+        unit: args.unit.map(|unit| match unit {
+            UnitName::Mm => Unit::Mm,
+            UnitName::Inch => Unit::Inch,
+        }),
+        reference: args.reference,
+        grid: match (args.points, args.step) {
+            (Some(n), _) => Some(Grid::Points(n)),
+            (None, Some(step)) => Some(Grid::Step(step)),
+            (None, None) => None,
+        },
+        travel: args.travel.clone(),
+    }
+}
+
+/// `FILE.about.json`.
+fn about_path(file: &Path) -> PathBuf {
+    let mut name: OsString = file.as_os_str().to_owned();
+    name.push(".about.json");
+    name.into()
+}
+
+fn reserve(path: &Path, result: &Path, force: bool) -> Result<OutFile, Message> {
+    if !force {
+        return OutFile::reserve(path);
+    }
+    let same = |a: &Path, b: &Path| match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    };
+    if same(path, result) {
+        return Err(Message::bad_input("is the result that is to be exported")
+            .in_file(path)
+            .remedy("give another name as --out"));
+    }
+    OutFile::replacing(path)
+}
+
+fn unknown(name: &str) -> Message {
+    let known: Vec<&str> = FORMATS.iter().map(|f| f.name).collect();
+    Message::bad_input(format!("there is no format `{name}`")).remedy(
+        match nearest(name, known.iter().copied()) {
+            Some(near) => format!("did you mean `{near}`? There are {}", known.join(", ")),
+            None => format!("there are {}", known.join(", ")),
+        },
+    )
+}
+
+fn not_taken(
+    format: &export::Format,
+    schema: &str,
+    content: &export::Content,
+    path: &Path,
+) -> Message {
+    let others: Vec<&str> = FORMATS
+        .iter()
+        .filter(|f| f.takes.is_in(content))
+        .map(|f| f.name)
+        .collect();
+    Message::bad_input(format!(
+        "{} takes {}; this is {schema}",
+        format.name,
+        format.takes.results()
+    ))
+    .in_file(path)
+    .remedy(format!("{schema} is taken by {}", list(&others)))
+}
+
+fn in_words(args: &Args, format: &str, exported: &Exported, about: &Path) -> String {
+    let mut text = format!(
+        "Written {format}: {} ({})\n  exported    {}\n",
+        args.out.display(),
+        exported.unit,
+        exported.exported.join(", ")
+    );
+    for (name, why) in &exported.not_exported {
+        text += &format!("  left out    {name}: {why}\n");
+    }
+    text += &format!("  sign        {}\n", exported.sign);
+    if let Some((missed, unit)) = exported.resampling {
+        let missed = crate::number::plain(missed, 2);
+        let unit = crate::io::units::symbol(unit);
+        text += &format!("  even points miss the measured values by {missed} {unit} at most\n");
+    }
+    for step in &exported.load {
+        text += &format!("  load        {step}\n");
+    }
+    text + &format!(
+        "  verify      {}\nAll this stands in {}\n",
+        exported.verify,
+        about.display()
+    )
+}

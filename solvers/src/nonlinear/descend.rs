@@ -1,26 +1,19 @@
 //! One iteration: steps are proposed and judged until one is worth taking, or none is needed.
 
 use argmin::core::Problem as Counted;
-use nalgebra::DVector;
 
+use super::at_rest::Full;
 use super::minimiser::{Minimiser, Point, Refusal, broken_off, felt_length};
 use super::rescue::Verdict;
-use super::restrict::{self, Proposal, Undamped, free_parameters};
+use super::restrict::{self, Proposal};
 use super::strategy::{Strategy, Trial};
-use super::system::System;
+use super::system::{Evaluation, System};
 use crate::linear::LinearModel;
 use crate::options::Finish;
 use crate::outcome::{Convergence, Ending, FitError, Iteration};
 
 /// Least share of the promised fall that makes a step worth taking.
 const LEAST_GAIN: f64 = 1e-4;
-
-/// A step that moves a parameter by more than this share of all that it has ever been ends nothing,
-/// however little the residuals change: roots up to the tenth order are approached by less.
-const FAR: f64 = 1e-2;
-
-/// Iterations in a row that go on so before a parameter is said to run away.
-const MOST_FADING: usize = 30;
 
 /// A step of this share of the undamped one was not held up by a wall.
 const UNIMPEDED: f64 = 0.5;
@@ -39,29 +32,8 @@ const NEAR_END: f64 = 1e-9;
 /// fails for the rounding of the cost: a wrong Jacobian leads astray long before.
 const ROUNDING: f64 = 1e-12;
 
-/// A step that changes the linear prediction of the residuals by no more than this share of it is a
-/// few roundings.
-const FEW_ROUNDINGS: f64 = 4.0 * f64::EPSILON;
-
 /// Costs that differ by no more than this share are the same up to rounding.
 const SAME_COST: f64 = 1e-12;
-
-/// The undamped step from a point.
-#[derive(Default)]
-struct Full {
-    /// The fall that it promises.
-    promised: f64,
-    /// ‖D s‖.
-    length: f64,
-    /// ‖N s‖.
-    felt: f64,
-    /// A parameter that it moves far.
-    far: Option<usize>,
-    /// Whether its effect is nothing beside what was felt of the parameters somewhere on the way.
-    fades: bool,
-    /// Where it leads; `None` where the point is at rest without it.
-    reached: Option<DVector<f64>>,
-}
 
 /// How an iteration left things.
 pub(super) enum Progress {
@@ -71,17 +43,19 @@ pub(super) enum Progress {
     Stuck(Ending),
 }
 
-impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
-    pub(super) fn undamped(&self, point: &Point<M>) -> Result<Proposal, FitError> {
-        restrict::propose(
-            &point.model,
-            &self.scale,
-            &point.parameters,
-            self.options.bounds.as_ref(),
-            Undamped,
-        )
-    }
+/// What became of a step.
+enum Tried<M> {
+    /// It failed: another one is to be tried.
+    Failed,
+    /// There is no other one to try.
+    Nothing,
+    /// It failed, and the point is the last.
+    Ends(Progress),
+    /// It was taken.
+    Taken(Point<M>, Progress),
+}
 
+impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
     /// The strategy's step, with the geodesic correction where asked for.
     fn propose<O: System<Model = M>>(
         &mut self,
@@ -106,88 +80,6 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
         Ok(proposal)
     }
 
-    /// The rounding of the cost: that of the residuals times the residuals. A residual is a
-    /// difference whose terms are about as large as J p.
-    pub(super) fn cost_rounding(point: &Point<M>) -> f64 {
-        let size: f64 = point
-            .model
-            .column_norms()
-            .iter()
-            .zip(point.parameters.iter())
-            .map(|(norm, p)| norm * p.abs())
-            .sum();
-        let residual = (2.0 * point.evaluation.cost).sqrt();
-        f64::EPSILON * residual * (residual + size)
-    }
-
-    /// The largest cosine between the residuals and a column of a free parameter.
-    fn largest_cosine(&self, point: &Point<M>) -> f64 {
-        let residual = (2.0 * point.evaluation.cost).sqrt();
-        let gradient = point.model.gradient();
-        let norms = point.model.column_norms();
-        free_parameters(self.options.bounds.as_ref(), &point.parameters, gradient)
-            .into_iter()
-            .filter(|&j| norms[j] > 0.0)
-            .map(|j| gradient[j].abs() / (norms[j] * residual))
-            .fold(0.0, f64::max)
-    }
-
-    /// Whether the point is a minimum, to rounding or on the promise of the undamped step, and that step.
-    fn at_rest(&self, point: &Point<M>) -> Result<(Option<Convergence>, Full), FitError> {
-        let rest = |by| Ok((Some(by), Full::default()));
-        if point.evaluation.cost == 0.0 {
-            return rest(Convergence::Cost);
-        }
-        if self.largest_cosine(point) <= self.options.gradient_tolerance {
-            return rest(Convergence::Gradient);
-        }
-        let proposal = self.undamped(point)?;
-        let step = &proposal.step;
-        let promised = point.model.predicted_reduction(step);
-        let felt = felt_length(point, step);
-        let full = Full {
-            promised,
-            length: self.scaled_length(step),
-            felt,
-            far: self.goes_far(step),
-            fades: felt <= f64::EPSILON * self.longest,
-            reached: None,
-        };
-        let rest = match self.options.finish {
-            Finish::Promised => self.rests_on_promise(point, step, promised),
-            Finish::Polish | Finish::Evaluated => self.rests_by_rounding(point, &full),
-        };
-        let reached = Some(proposal.parameters);
-        Ok((rest, Full { reached, ..full }))
-    }
-
-    /// The test by which neither cost nor parameters can show that a point is no minimum.
-    fn rests_by_rounding(&self, point: &Point<M>, full: &Full) -> Option<Convergence> {
-        if full.promised.abs() <= Self::cost_rounding(point) {
-            return Some(Convergence::Cost);
-        }
-        // Beside what the parameters have been, felt as they are felt here: after a start with residuals of
-        // 1e16 times those of the minimum every step is nothing beside what was felt there.
-        let nothing = full.felt <= f64::EPSILON * felt_length(point, &self.farthest);
-        (full.far.is_none() && nothing).then_some(Convergence::Step)
-    }
-
-    /// The test by which the undamped step is the last: it promises next to nothing of the cost, or
-    /// changes the residuals' linear prediction by a few roundings of it.
-    fn rests_on_promise(
-        &self,
-        point: &Point<M>,
-        step: &DVector<f64>,
-        promised: f64,
-    ) -> Option<Convergence> {
-        if promised <= self.options.cost_tolerance * point.evaluation.cost {
-            return Some(Convergence::Cost);
-        }
-        let size = point.model.image_norm(&point.parameters);
-        let nothing = point.model.image_norm(step) <= FEW_ROUNDINGS * size;
-        nothing.then_some(Convergence::Step)
-    }
-
     /// Whether an undamped step that is to be followed by a last one is worth taking though it is too
     /// small to show in the cost: the promises still fall.
     fn polishes(&self, trial: &Trial, cost: f64) -> bool {
@@ -198,11 +90,6 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
                 let before = last.predicted / (self.unit * self.unit);
                 last.accepted && last.damping == 0.0 && trial.predicted < 0.5 * before
             })
-    }
-
-    /// A parameter that a step moves by a good part of all that it has ever been, if there is one.
-    fn goes_far(&self, step: &DVector<f64>) -> Option<usize> {
-        (0..step.len()).find(|&j| step[j].abs() > FAR * self.farthest[j])
     }
 
     /// One iteration: tries steps from `point` until one is worth taking.
@@ -227,97 +114,135 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
             let parameter = Self::name_of(problem, j)?;
             return Ok((point, Progress::Stuck(Ending::RunsAway { parameter })));
         }
-        let promised = full.promised;
-        let cost = point.evaluation.cost;
-        let negligible = self.options.cost_tolerance * cost;
-        let parameter_length = felt_length(&point, &point.parameters);
-        let lost_in_rounding = full.far.is_none() && full.felt <= ROUNDING * parameter_length;
-        if promised <= NEAR_END * cost {
+        if full.promised <= NEAR_END * point.evaluation.cost {
             self.strategy.near_end();
         }
         for tried in 0..MOST_TRIALS {
-            if self.strategy.gives_up() {
-                break;
+            match self.attempt(problem, &point, &full, tried == 0)? {
+                Tried::Failed => {}
+                Tried::Nothing => break,
+                Tried::Ends(progress) => return Ok((point, progress)),
+                Tried::Taken(next, progress) => return Ok((next, progress)),
             }
-            let proposal = self.propose(problem, &point)?;
-            let step = &proposal.step;
-            let length = self.scaled_length(step);
-            if !length.is_finite() {
-                self.strategy.invalid(f64::MAX);
-                continue;
-            }
-            if length == 0.0 {
-                break;
-            }
-            let mut trial = Trial {
-                actual: f64::NEG_INFINITY,
-                predicted: point.model.predicted_reduction(step),
-                length,
-                slope: point.model.gradient().dot(step),
-            };
-            if trial.predicted <= 0.0 {
-                self.strategy.rejected(&trial);
-                continue;
-            }
-            let evaluation = match self.evaluate(problem, &proposal.parameters)? {
-                Ok(evaluation) => evaluation,
-                Err(reason) => {
-                    let share = length / self.reach(&full);
-                    if self.refused.as_ref().is_none_or(|r| share < r.share) {
-                        self.refused = Some(Refusal { reason, share });
-                    }
-                    self.record(cost, &trial, false);
-                    self.strategy.invalid(length);
-                    continue;
-                }
-            };
-            trial.actual = cost - evaluation.cost;
-            let gain = trial.gain();
-            let near = promised <= self.options.cost_tolerance.sqrt() * cost;
-            let settled = trial.actual.abs() <= negligible
-                && trial.predicted <= negligible
-                && gain <= 2.0
-                && near;
-            if gain < LEAST_GAIN && !self.polishes(&trial, cost) {
-                self.record(cost, &trial, false);
-                if settled {
-                    return Ok((point, Progress::Rest(Convergence::Cost)));
-                }
-                if lost_in_rounding {
-                    return Ok((point, self.wall_or(Convergence::Step)));
-                }
-                self.strategy.rejected(&trial);
-                continue;
-            }
-            self.record(evaluation.cost, &trial, true);
-            self.strategy.accepted(&trial);
-            let short = tried == 0
-                && gain > 0.25
-                && felt_length(&point, step) <= self.options.step_tolerance * parameter_length;
-            if length >= UNIMPEDED * full.length {
-                self.refused = None;
-            }
-            let next = self.arrive(problem, proposal.parameters, evaluation)?;
-            let progress = match (settled, short, self.at_wall()) {
-                (true, ..) => Progress::Rest(Convergence::Cost),
-                (_, true, Some(wall)) if !near => Progress::Stuck(wall),
-                (_, true, _) => Progress::Rest(Convergence::Step),
-                _ => Progress::Moved(trial),
-            };
-            return Ok((next, progress));
         }
-        if promised <= negligible {
+        self.without_descent(problem, point, full.promised)
+    }
+
+    /// Proposes a step and, where it promises anything, has it judged.
+    fn attempt<O: System<Model = M>>(
+        &mut self,
+        problem: &mut Counted<O>,
+        point: &Point<M>,
+        full: &Full,
+        first: bool,
+    ) -> Result<Tried<M>, FitError> {
+        if self.strategy.gives_up() {
+            return Ok(Tried::Nothing);
+        }
+        let proposal = self.propose(problem, point)?;
+        let step = &proposal.step;
+        let length = self.scaled_length(step);
+        if !length.is_finite() {
+            self.strategy.invalid(f64::MAX);
+            return Ok(Tried::Failed);
+        }
+        if length == 0.0 {
+            return Ok(Tried::Nothing);
+        }
+        let trial = Trial {
+            actual: f64::NEG_INFINITY,
+            predicted: point.model.predicted_reduction(step),
+            length,
+            slope: point.model.gradient().dot(step),
+        };
+        if trial.predicted <= 0.0 {
+            self.strategy.rejected(&trial);
+            return Ok(Tried::Failed);
+        }
+        match self.evaluate(problem, &proposal.parameters)? {
+            Ok(evaluation) => {
+                let trial = Trial {
+                    actual: point.evaluation.cost - evaluation.cost,
+                    ..trial
+                };
+                self.judge(problem, (point, full, first), trial, (proposal, evaluation))
+            }
+            Err(reason) => {
+                let share = length / self.reach(full);
+                if self.refused.as_ref().is_none_or(|r| share < r.share) {
+                    self.refused = Some(Refusal { reason, share });
+                }
+                self.record(point.evaluation.cost, &trial, false);
+                self.strategy.invalid(length);
+                Ok(Tried::Failed)
+            }
+        }
+    }
+
+    /// Takes a step or turns it down by what it brought, and looks whether it is the last.
+    fn judge<O: System<Model = M>>(
+        &mut self,
+        problem: &mut Counted<O>,
+        (point, full, first): (&Point<M>, &Full, bool),
+        trial: Trial,
+        (proposal, evaluation): (Proposal, Evaluation<M>),
+    ) -> Result<Tried<M>, FitError> {
+        let cost = point.evaluation.cost;
+        let negligible = self.options.cost_tolerance * cost;
+        let parameter_length = felt_length(point, &point.parameters);
+        let near = full.promised <= self.options.cost_tolerance.sqrt() * cost;
+        let gain = trial.gain();
+        let settled = trial.actual.abs() <= negligible
+            && trial.predicted <= negligible
+            && gain <= 2.0
+            && near;
+        if gain < LEAST_GAIN && !self.polishes(&trial, cost) {
+            self.record(cost, &trial, false);
+            if settled {
+                return Ok(Tried::Ends(Progress::Rest(Convergence::Cost)));
+            }
+            if full.far.is_none() && full.felt <= ROUNDING * parameter_length {
+                return Ok(Tried::Ends(self.wall_or(Convergence::Step)));
+            }
+            self.strategy.rejected(&trial);
+            return Ok(Tried::Failed);
+        }
+        self.record(evaluation.cost, &trial, true);
+        self.strategy.accepted(&trial);
+        let felt = felt_length(point, &proposal.step);
+        let short = first && gain > 0.25 && felt <= self.options.step_tolerance * parameter_length;
+        if trial.length >= UNIMPEDED * full.length {
+            self.refused = None;
+        }
+        let next = self.arrive(problem, proposal.parameters, evaluation)?;
+        let progress = match (settled, short, self.at_wall()) {
+            (true, ..) => Progress::Rest(Convergence::Cost),
+            (_, true, Some(wall)) if !near => Progress::Stuck(wall),
+            (_, true, _) => Progress::Rest(Convergence::Step),
+            _ => Progress::Moved(trial),
+        };
+        Ok(Tried::Taken(next, progress))
+    }
+
+    /// Where every step has failed: flat, a wall, a wrong Jacobian, or a way out.
+    fn without_descent<O: System<Model = M>>(
+        &self,
+        problem: &mut Counted<O>,
+        point: Point<M>,
+        promised: f64,
+    ) -> Result<(Point<M>, Progress), FitError> {
+        if promised <= self.options.cost_tolerance * point.evaluation.cost {
             return Ok((point, Progress::Rest(Convergence::Cost)));
         }
-        match self.rescue(problem, &point)? {
+        Ok(match self.rescue(problem, &point)? {
             Verdict::Better(parameters, evaluation) => {
                 let next = self.arrive(problem, parameters, evaluation)?;
-                Ok((next, Progress::Rescued))
+                (next, Progress::Rescued)
             }
-            Verdict::NoValue(reason) => Ok((point, Progress::Stuck(Ending::AtWall { reason }))),
-            Verdict::WrongJacobian => Ok((point, Progress::Stuck(Ending::NoDescent))),
-            Verdict::Flat => Ok((point, self.wall_or(Convergence::Cost))),
-        }
+            Verdict::NoValue(reason) => (point, Progress::Stuck(Ending::AtWall { reason })),
+            Verdict::WrongJacobian => (point, Progress::Stuck(Ending::NoDescent)),
+            Verdict::Flat => (point, self.wall_or(Convergence::Cost)),
+        })
     }
 
     /// ‖D p‖ for the greatest magnitudes that parameters have had; before any has left zero, the
@@ -330,13 +255,6 @@ impl<S: Strategy, M: LinearModel> Minimiser<S, M> {
     /// At rest by this test, unless a wall is here.
     fn wall_or(&self, by: Convergence) -> Progress {
         self.at_wall().map_or(Progress::Rest(by), Progress::Stuck)
-    }
-
-    /// The parameter that runs away, if one does: residuals may vanish along a way that does not end.
-    fn runs_away(&mut self, full: &Full) -> Option<usize> {
-        let far = full.far.filter(|_| full.fades);
-        self.fading = far.map_or(0, |_| self.fading + 1);
-        far.filter(|_| self.fading > MOST_FADING)
     }
 
     /// Takes the undamped step on its promise; model and residuals stay those of the point before.

@@ -1,9 +1,16 @@
 //! Nonlinear least squares: one loop, several ways to choose a step.
 //!
-//! [`minimiser`] holds the loop as an argmin `Solver`; a [`strategy`] proposes steps and is told
-//! what became of them; a [`system`] is evaluated and linearised. Any strategy minimises any
-//! system.
+//! | who | does |
+//! |---|---|
+//! | [`system`] | is evaluated and linearised; a dense problem, or one that streams its rows and brings cost and linear model in one pass |
+//! | [`LinearModel`](crate::linear::LinearModel) | what it makes: steps, damped or not, their promise, what is not determined; keeps constraints and held parameters itself |
+//! | [`strategy`] | proposes steps and is told what became of them |
+//! | [`minimiser`] | the loop (propose, judge, damp, end), as an argmin `Solver` |
+//!
+//! Any strategy minimises any system. [`Finish`](crate::options::Finish) says what is done once a
+//! minimum shows.
 
+mod at_rest;
 mod descend;
 pub mod dogleg;
 pub mod gauss_newton;

@@ -25,8 +25,9 @@ from .commands import (
     step_diagonal,
     straightness,
 )
+from .engine import State, least_squares
 from .errors import Error, InputError, NotConverged, NotDetermined
-from .fit import Fit, Interval, State, least_squares
+from .fit import Fit, Interval
 from .quantity import Covariance, Quantities, Quantity
 from .result import Result
 

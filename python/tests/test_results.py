@@ -44,6 +44,7 @@ def answers() -> dict[str, errsep.Result]:
         "diagnose": errsep.diagnose(reversal),
         "plan": errsep.plan({"noise": 0.02, "travel": 300.0, "positions": 31}),
         "simulate": errsep.simulate("reversal", seed=1),
+        "simulate fourier": scans,
         "simulate anova": errsep.simulate("anova", seed=1),
     }
 
@@ -122,6 +123,7 @@ def test_warnings_are_those_of_the_command(answers: dict[str, errsep.Result]) ->
 
 
 def test_a_pickle_and_a_copy_keep_everything(answers: dict[str, errsep.Result], tmp_path: Path) -> None:
+    assert "length = 100" in answers["simulate fourier"].setup
     for name, answer in answers.items():
         again = pickle.loads(pickle.dumps(answer))
         twice = pickle.loads(pickle.dumps(again))

@@ -66,8 +66,10 @@ enum Shown {
     Drawn(Drawn),
 }
 
-#[derive(Clone)]
-struct Drawn {
+/// A page in the forms in which it is looked at.
+#[derive(Clone, FromPyObject, IntoPyObject)]
+#[pyo3(from_item_all)]
+pub struct Drawn {
     html: String,
     title: String,
     standing: String,
@@ -126,45 +128,22 @@ impl Shown {
     }
 }
 
-/// A table for Python: its file's name, and its columns as arrays or texts.
+/// A table for Python: its file's name, and its columns as arrays or lists of texts.
 type Table<'py> = (String, Vec<(String, Bound<'py, PyAny>)>);
 
-/// What a pickle keeps: text, JSON, provenance, (HTML, title, standing, sentence, figures), tables,
-/// set-up, inputs, status.
-type State<'py> = (
-    String,
-    String,
-    String,
-    (
-        String,
-        String,
-        String,
-        String,
-        Vec<(String, String, String)>,
-    ),
-    Vec<Table<'py>>,
-    Option<String>,
-    Vec<PathBuf>,
-    u8,
-);
-
-/// The same on its way back.
-type Kept<'py> = (
-    String,
-    String,
-    String,
-    (
-        String,
-        String,
-        String,
-        String,
-        Vec<(String, String, String)>,
-    ),
-    Vec<(String, Vec<(String, Given<'py>)>)>,
-    Option<String>,
-    Vec<PathBuf>,
-    u8,
-);
+/// What a pickle keeps of an answer: a dictionary of Python.
+#[derive(FromPyObject, IntoPyObject)]
+#[pyo3(from_item_all)]
+pub struct Kept<'py> {
+    text: String,
+    json: String,
+    provenance: String,
+    shown: Drawn,
+    tables: Vec<Table<'py>>,
+    setup: Option<String>,
+    inputs: Vec<PathBuf>,
+    status: u8,
+}
 
 impl Answered {
     fn of(traced: Traced) -> Self {
@@ -240,50 +219,37 @@ impl Answered {
     }
 
     /// What a pickle keeps.
-    fn state<'py>(&self, py: Python<'py>) -> PyResult<State<'py>> {
-        let text = |value: &Value| value.to_string();
-        let provenance = serde_json::to_value(&self.provenance);
-        let provenance = provenance.map_err(|e| PyValueError::new_err(e.to_string()))?;
-        let drawn = without_the_lock(py, || self.shown.drawn());
-        Ok((
-            self.text.clone(),
-            text(&self.json),
-            text(&provenance),
-            (
-                drawn.html,
-                drawn.title,
-                drawn.standing,
-                drawn.sentence,
-                drawn.figures,
-            ),
-            self.tables(py)?,
-            self.setup.clone(),
-            self.inputs.clone(),
-            self.status.code(),
-        ))
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Kept<'py>> {
+        let provenance = serde_json::to_string(&self.provenance);
+        Ok(Kept {
+            text: self.text.clone(),
+            json: self.json.to_string(),
+            provenance: provenance.map_err(|e| PyValueError::new_err(e.to_string()))?,
+            shown: without_the_lock(py, || self.shown.drawn()),
+            tables: self.tables(py)?,
+            setup: self.setup.clone(),
+            inputs: self.inputs.clone(),
+            status: self.status.code(),
+        })
     }
 
     /// The answer that a pickle kept.
     #[staticmethod]
     fn of_state(state: Kept<'_>) -> PyResult<Self> {
-        let (text, json, provenance, shown, tables, setup, inputs, status) = state;
-        let (html, title, standing, sentence, figures) = shown;
         let broken = |e: serde_json::Error| PyValueError::new_err(format!("a broken pickle: {e}"));
         Ok(Self {
-            text,
-            json: serde_json::from_str(&json).map_err(broken)?,
-            provenance: serde_json::from_str(&provenance).map_err(broken)?,
-            shown: Shown::Drawn(Drawn {
-                html,
-                title,
-                standing,
-                sentence,
-                figures,
-            }),
-            tables: tables.into_iter().map(kept_table).collect(),
-            setup,
-            inputs,
-            status: if status == 0 {
+            text: state.text,
+            json: serde_json::from_str(&state.json).map_err(broken)?,
+            provenance: serde_json::from_str(&state.provenance).map_err(broken)?,
+            shown: Shown::Drawn(state.shown),
+            tables: state
+                .tables
+                .iter()
+                .map(kept_table)
+                .collect::<PyResult<_>>()?,
+            setup: state.setup,
+            inputs: state.inputs,
+            status: if state.status == Status::Done.code() {
                 Status::Done
             } else {
                 Status::NotSolved
@@ -294,7 +260,8 @@ impl Answered {
 
 impl Answered {
     fn write_folder(&self, folder: &Path, force: bool) -> Result<(), errsep::io::Message> {
-        let folder = OutFolder::reserve(folder, force)?;
+        // Python has handlers of its own, and would be ended by ours.
+        let folder = OutFolder::reserve(folder, force)?.leave_signals();
         let report = Report {
             html: &self.shown.html(),
             json: &self.json,
@@ -318,13 +285,13 @@ fn array<'py>(py: Python<'py>, values: &Values) -> PyResult<Bound<'py, PyAny>> {
     }
 }
 
-fn kept_table((name, columns): (String, Vec<(String, Given<'_>)>)) -> CsvTable {
-    columns
-        .into_iter()
-        .fold(CsvTable::new(name), |table, (name, given)| match given {
-            Given::Numbers(array) => {
-                table.numbers(name, array.as_array().iter().copied().collect::<Vec<f64>>())
-            }
+fn kept_table((name, columns): &Table<'_>) -> PyResult<CsvTable> {
+    let mut table = CsvTable::new(name);
+    for (name, column) in columns {
+        table = match column.extract()? {
+            Given::Numbers(array) => table.numbers(name, array.as_array().to_vec()),
             Given::Texts(texts) => table.texts(name, texts),
-        })
+        };
+    }
+    Ok(table)
 }

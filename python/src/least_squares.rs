@@ -1,26 +1,24 @@
 //! The engine on residuals that Python works out.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use errsep::io::Message;
 use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
-use errsep_solvers::argmin::core::observers::{Observe, ObserverMode};
-use errsep_solvers::argmin::core::{Error as Broken, KV, State};
+use errsep_solvers::argmin::core::observers::ObserverMode;
 use errsep_solvers::{
-    Bounds, Combination, Damping, Ending, Factorization, Fit, FitError, FitState, Limit, Loss,
-    Method, NoValue, Options, Problem, ProfileInterval, ResidualScale, Side, central_differences,
-    fit_with, profile_interval,
+    Bounds, Combination, Damping, Ending, Factorization, Fit, FitError, Limit, Loss, Method,
+    Options, ProfileInterval, ResidualScale, Side, fit_with, profile_interval,
 };
 use nalgebra::{DMatrix, DVector};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::exceptions::PyStopIteration;
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors::exception;
 use crate::long::without_the_lock;
+use crate::stated::{Raised, Stated, Told, residuals_of};
 
 /// What a fit is asked for, as a dictionary of Python.
 #[derive(FromPyObject)]
@@ -44,151 +42,6 @@ pub struct Asked {
     known_scale: bool,
     profile: Option<f64>,
     coverage: f64,
-}
-
-/// The first exception raised by a function of Python; no more of them are called after it.
-#[derive(Clone, Default)]
-struct Raised(Arc<Mutex<Option<PyErr>>>);
-
-impl Raised {
-    fn put(&self, error: PyErr) {
-        let mut raised = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        raised.get_or_insert(error);
-    }
-
-    fn take(&self) -> Option<PyErr> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
-    }
-
-    fn is_there(&self) -> bool {
-        let raised = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        raised.is_some()
-    }
-}
-
-/// The problem that functions of Python state.
-struct Stated {
-    names: Vec<String>,
-    residuals: Py<PyAny>,
-    jacobian: Option<Py<PyAny>>,
-    /// The start and its residuals, which also tell how many there are.
-    first: (DVector<f64>, DVector<f64>),
-    raised: Raised,
-    stop: Arc<AtomicBool>,
-}
-
-impl Stated {
-    /// What Python answers, unless it has raised an exception before.
-    fn ask<T>(&self, question: impl FnOnce(Python<'_>) -> PyResult<T>) -> Result<T, NoValue> {
-        let over = || NoValue::new("a function of Python raised an exception");
-        if self.raised.is_there() {
-            return Err(over());
-        }
-        Python::attach(question).map_err(|error| {
-            self.raised.put(error);
-            self.stop.store(true, Ordering::Relaxed);
-            over()
-        })
-    }
-}
-
-fn residuals_of(
-    py: Python<'_>,
-    function: &Py<PyAny>,
-    parameters: &DVector<f64>,
-) -> PyResult<DVector<f64>> {
-    let given = function.call1(py, (PyArray1::from_slice(py, parameters.as_slice()),))?;
-    let array: PyReadonlyArray1<'_, f64> = given.extract(py)?;
-    Ok(DVector::from_iterator(
-        array.len()?,
-        array.as_array().iter().copied(),
-    ))
-}
-
-impl Problem for Stated {
-    fn parameter_count(&self) -> usize {
-        self.names.len()
-    }
-
-    fn residual_count(&self) -> usize {
-        self.first.1.len()
-    }
-
-    fn residuals(&self, parameters: &DVector<f64>) -> Result<DVector<f64>, NoValue> {
-        if *parameters == self.first.0 {
-            return Ok(self.first.1.clone());
-        }
-        self.ask(|py| {
-            let residuals = residuals_of(py, &self.residuals, parameters)?;
-            if residuals.len() == self.residual_count() {
-                return Ok(residuals);
-            }
-            let told = Message::bad_input(format!(
-                "there are {} residuals here and {} at the start",
-                residuals.len(),
-                self.residual_count()
-            ));
-            Err(exception(py, &told.remedy("return as many every time")))
-        })
-    }
-
-    fn jacobian(&self, parameters: &DVector<f64>) -> Result<DMatrix<f64>, NoValue> {
-        let Some(function) = &self.jacobian else {
-            return central_differences(|p| self.residuals(p), parameters);
-        };
-        self.ask(|py| {
-            let given = function.call1(py, (PyArray1::from_slice(py, parameters.as_slice()),))?;
-            let array: PyReadonlyArray2<'_, f64> = given.extract(py)?;
-            let array = array.as_array();
-            let (rows, columns) = array.dim();
-            Ok(DMatrix::from_row_iterator(
-                rows,
-                columns,
-                array.iter().copied(),
-            ))
-        })
-    }
-
-    fn parameter_name(&self, index: usize) -> String {
-        self.names.get(index).cloned().unwrap_or_default()
-    }
-}
-
-/// Tells the caller of each iteration, and looks for Ctrl-C.
-struct Told {
-    callback: Option<Py<PyAny>>,
-    raised: Raised,
-    stop: Arc<AtomicBool>,
-}
-
-impl Told {
-    fn tell(&self, state: &FitState) -> PyResult<()> {
-        Python::attach(|py| {
-            py.check_signals()?;
-            let (Some(callback), Some(parameters)) = (&self.callback, state.get_param()) else {
-                return Ok(());
-            };
-            let parameters = PyArray1::from_slice(py, parameters.as_slice());
-            let told = callback.call1(py, (state.get_iter() + 1, state.get_cost(), parameters));
-            match told {
-                Err(e) if e.is_instance_of::<PyStopIteration>(py) => {
-                    self.stop.store(true, Ordering::Relaxed);
-                    Ok(())
-                }
-                other => other.map(|_| ()),
-            }
-        })
-    }
-}
-
-impl Observe<FitState> for Told {
-    fn observe_iter(&mut self, state: &FitState, _kv: &KV) -> Result<(), Broken> {
-        self.tell(state).map_err(|error| {
-            let told = Broken::msg(error.to_string());
-            self.raised.put(error);
-            told
-        })
-    }
 }
 
 /// Fits: `residuals` and `jacobian` take an array of parameters and return arrays of float64.

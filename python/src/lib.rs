@@ -5,6 +5,7 @@ mod answered;
 mod errors;
 mod least_squares;
 mod long;
+mod stated;
 mod table;
 
 use pyo3::prelude::*;

@@ -26,7 +26,7 @@ enum Column {
 impl Column {
     fn of(given: Given<'_>) -> Self {
         match given {
-            Given::Numbers(array) => Self::Numbers(array.as_array().iter().copied().collect()),
+            Given::Numbers(array) => Self::Numbers(array.as_array().to_vec()),
             Given::Texts(texts) => Self::Texts(texts),
         }
     }

@@ -119,6 +119,11 @@ def test_a_missing_number_is_an_empty_field_whatever_says_so() -> None:
         with pytest.raises(errsep.InputError, match="deviation is missing") as caught:
             errsep.straightness(made({"x": x, "deviation": deviation}))
         assert (caught.value.file, caught.value.line, caught.value.row) == ("<profile>", 3, 1)
+    from errsep._inputs import as_csv
+
+    for dtype in ("Int64", "Float64", "string"):
+        column = pandas.DataFrame({"x": pandas.array([1, None, 3], dtype=dtype)})
+        assert as_csv(column, {}) == b'x\n1\n""\n3\n', dtype
     masked = np.ma.masked_array([0.0, 5.0, 1.0], [False, True, False])
     with pytest.raises(errsep.InputError, match="deviation is missing"):
         errsep.straightness({"x": x, "deviation": masked})
@@ -175,7 +180,9 @@ def test_toml_reads_back_what_was_written() -> None:
         "effect": [{"name": "one", "on": True}, {"name": "two", "channels": {"1A": 1.0}}],
         "mixed": [{"x": 1}, [1, 2]],
     }
-    plain_values = dict(given, errors={"EXX": {"table": {"positions": [0.0, 1.0], "values": [1, 2]}}, "C0Y": {}})
+    plain_values = dict(
+        given, errors={"EXX": {"table": {"positions": [0.0, 1.0], "values": [1, 2]}}, "C0Y": {}}
+    )
     assert tomllib.loads(dumps(given | {"left out": None})) == plain_values
 
 

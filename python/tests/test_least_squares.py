@@ -35,7 +35,7 @@ def misra_jacobian(p: np.ndarray) -> np.ndarray:
 def test_certified_digits(start: tuple[float, float], method: str, jacobian: object) -> None:
     """Certified digits: eleven are printed. With derivatives ten are asked of the parameters and nine of
     the uncertainties; with differences, whose own error is 1e-10 of a derivative, eight and seven."""
-    found = least_squares(misra, dict(zip(MISRA, start)), jacobian=jacobian, method=method)
+    found = least_squares(misra, dict(zip(MISRA, start, strict=True)), jacobian=jacobian, method=method)
     digits, of_std = (1e-10, 1e-9) if jacobian else (1e-8, 1e-7)
     for name, (value, std) in MISRA.items():
         assert found.parameters[name].value == pytest.approx(value, rel=digits)
@@ -79,6 +79,21 @@ def test_the_profile_of_a_linear_problem_is_the_interval_of_student(
         interval = found.profile[name]
         assert (interval.lower, interval.upper) == pytest.approx(q.interval, abs=3e-6 * q.expanded)
         assert (interval.lower_end, interval.upper_end) == ("at", "at")
+
+
+def test_a_profile_may_end_at_a_bound_or_not_at_all() -> None:
+    """A saturated reading limits its parameter below only: tanh ∞ = 1 is half a standard deviation off."""
+
+    def residuals(p: np.ndarray) -> np.ndarray:
+        return (np.tanh(p) - 0.9) / 0.2
+
+    found = least_squares(residuals, {"a": 1.0}, sigma="known", profile=0.95)
+    interval = found.profile["a"]
+    assert (interval.lower_end, interval.upper_end, interval.upper) == ("at", "open", np.inf)
+    # Where the residual reaches the quantile, to the engine's 1e-6 of it.
+    assert np.tanh(interval.lower) == pytest.approx(0.9 - 0.2 * 1.959964, abs=1e-6)
+    held = least_squares(residuals, {"a": 1.0}, sigma="known", profile=0.95, bounds={"a": (None, 3)})
+    assert (held.profile["a"].upper_end, held.profile["a"].upper) == ("bound", 3.0)
 
 
 def test_known_scatter(line: tuple[np.ndarray, np.ndarray]) -> None:
@@ -268,7 +283,9 @@ def test_a_fit_goes_through_a_pickle_and_into_other_packages() -> None:
     for again in (pickle.loads(pickle.dumps(found)), copy.copy(found), copy.deepcopy(found)):
         assert again.to_json() == found.to_json() and again.summary() == found.summary()
     assert found.to_dataframe().loc["b1", "std"] == found.parameters["b1"].std
-    assert found.to_xarray()["covariance"].sel(parameter="b1", parameter_="b2") == found.covariance["b1", "b2"]
+    assert (
+        found.to_xarray()["covariance"].sel(parameter="b1", parameter_="b2") == found.covariance["b1", "b2"]
+    )
     correlation = found.covariance.correlation("b1", "b2")
     numbers = found.to_gtc()
     import GTC

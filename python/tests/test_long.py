@@ -109,6 +109,8 @@ def test_ctrl_c_ends_a_command(tmp_path: Path) -> None:
             print("at work", flush=True)
             threading.Event().wait()
 
+        # Signals wait while a report is put in place, and then are Python's again.
+        errsep.straightness({"x": [0, 1], "deviation": [0, 1]}).report(sys.argv[1] + ".report")
         threading.Thread(target=say, daemon=True).start()
         try:
             errsep.straightness(sys.argv[1])

@@ -44,6 +44,7 @@ def answers() -> dict[str, errsep.Result]:
         "diagnose": errsep.diagnose(reversal),
         "plan": errsep.plan({"noise": 0.02, "travel": 300.0, "positions": 31}),
         "simulate": errsep.simulate("reversal", seed=1),
+        "simulate fourier": scans,
         "simulate anova": errsep.simulate("anova", seed=1),
     }
 
@@ -113,7 +114,8 @@ def test_what_is_not_determined_is_told(answers: dict[str, errsep.Result], readi
 
 def test_warnings_are_those_of_the_command(answers: dict[str, errsep.Result]) -> None:
     still = dict(errsep.simulate("reversal", seed=1)["data"])
-    still["reading"] = [0.0 if c == "1A" else r for c, r in zip(still["channel"], still["reading"])]
+    pairs = zip(still["channel"], still["reading"], strict=True)
+    still["reading"] = [0.0 if channel == "1A" else reading for channel, reading in pairs]
     answer = errsep.reversal(still)
     assert answer.warnings == answer["warnings"]
     assert any("all readings of 1A are equal" in warning for warning in answer.warnings)
@@ -121,6 +123,7 @@ def test_warnings_are_those_of_the_command(answers: dict[str, errsep.Result]) ->
 
 
 def test_a_pickle_and_a_copy_keep_everything(answers: dict[str, errsep.Result], tmp_path: Path) -> None:
+    assert "length = 100" in answers["simulate fourier"].setup
     for name, answer in answers.items():
         again = pickle.loads(pickle.dumps(answer))
         twice = pickle.loads(pickle.dumps(again))
@@ -218,10 +221,13 @@ def test_the_program_comes_with_the_package(tmp_path: Path) -> None:
     profile = tmp_path / "profile.csv"
     profile.write_text("x,deviation\n0,0\n1,1\n2,0\n")
     script = Path(sys.executable).parent / "errsep"
+
+    def run(words: list[str], *more: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([*words, *more], capture_output=True, text=True, check=False)
+
     for words in ([str(script)], [sys.executable, "-m", "errsep"]):
-        run = lambda *more: subprocess.run([*words, *more], capture_output=True, text=True, check=False)
-        done = run("straightness", str(profile))
+        done = run(words, "straightness", str(profile))
         assert done.returncode == 0, done.stderr
         assert done.stdout == errsep.straightness(profile).summary()
-        assert run("straightness", "/nowhere.csv").returncode == 2
-        assert run("--version").stdout == f"errsep {errsep.__version__}\n"
+        assert run(words, "straightness", "/nowhere.csv").returncode == 2
+        assert run(words, "--version").stdout == f"errsep {errsep.__version__}\n"

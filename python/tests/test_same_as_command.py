@@ -71,9 +71,7 @@ def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[st
             ["machine", machine, "length", holes, *"--between 3:9 --between 3:15 --trials 500".split()],
         ),
         "machine circularity": (
-            lambda: errsep.machine(
-                machine, "circularity", centre=(75, 75), radius=44.5, trials=300, seed=4
-            ),
+            lambda: errsep.machine(machine, "circularity", centre=(75, 75), radius=44.5, trials=300, seed=4),
             ["machine", machine, *"circularity --centre 75,75 --radius 44.5 --trials 300 --seed 4".split()],
         ),
         "machine parts": (
@@ -91,9 +89,7 @@ def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[st
         ),
         "plan": (lambda: errsep.plan(planned), ["plan", plan]),
         "simulate": (
-            lambda: errsep.simulate(
-                "reversal", alpha=-5, thickness=42, effects={"zero-jump": 0.2}, seed=7
-            ),
+            lambda: errsep.simulate("reversal", alpha=-5, thickness=42, effects={"zero-jump": 0.2}, seed=7),
             ["simulate", "reversal", *"--alpha=-5 --thickness 42 --effect zero-jump=0.2 --seed 7".split()],
         ),
         "simulate machine": (
@@ -104,8 +100,6 @@ def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[st
             ],
         ),
     }
-
-
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ own. Angles are in rad, positions in mm, readings and forms in µm.
 
 >>> import errsep
 >>> made = errsep.simulate("reversal", alpha=40, noise=0.02, seed=7)
->>> answer = errsep.reversal(made["data"], made.setup)
+>>> answer = errsep.reversal(made["data"])
 >>> answer.tilts["alpha"].unit
 'rad'
 """
@@ -25,8 +25,9 @@ from .commands import (
     step_diagonal,
     straightness,
 )
+from .engine import State, least_squares
 from .errors import Error, InputError, NotConverged, NotDetermined
-from .fit import Fit, Interval, State, least_squares
+from .fit import Fit, Interval
 from .quantity import Covariance, Quantities, Quantity
 from .result import Result
 

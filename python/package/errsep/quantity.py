@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-
 #: Factors to the units that people read.
 _SHOWN = {"rad": (1e6, "µrad"), "um": (1.0, "µm")}
 

@@ -180,15 +180,19 @@ class Result:
         return self._answered.figures()
 
     def _repr_html_(self) -> str:
-        title, standing, sentence = self._answered.told()
-        return notebook(title, standing, sentence, self.warnings, self._answered.figures())
+        title, standing, _ = self._answered.told()
+        return notebook(title, standing, self._sentence(), self.warnings, self._answered.figures())
 
     def __repr__(self) -> str:
+        sentence = self._sentence()
+        return f"<errsep {self.command}: {sentence}>" if sentence else f"<errsep {self.command}>"
+
+    def _sentence(self) -> str:
         _, _, sentence = self._answered.told()
         if not sentence:
-            told = (f"{key} {self._json[key]}" for key in ("kind", "seed", "points") if key in self)
-            sentence = ", ".join(word for word in told if "[" not in word)
-        return f"<errsep {self.command}: {sentence}>" if sentence else f"<errsep {self.command}>"
+            told = (f"{key} {self._json[key]}" for key in ("kind", "seed") if key in self)
+            sentence = ", ".join(told)
+        return sentence
 
     __str__ = __repr__
 

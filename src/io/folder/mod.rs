@@ -46,6 +46,7 @@ pub struct OutFolder {
     place: PathBuf,
     force: bool,
     files: Vec<(String, Staged)>,
+    signals_wait: bool,
 }
 
 impl OutFolder {
@@ -64,6 +65,7 @@ impl OutFolder {
             place: place.to_owned(),
             force,
             files: Vec::new(),
+            signals_wait: true,
         };
         let location = Location::of(place).map_err(|e| folder.refused(&e))?;
         sweep(&location.there);
@@ -73,6 +75,14 @@ impl OutFolder {
             Contents::of(&location.there, place, &["report.html", RESULT], &[], force)?;
         }
         Ok(folder)
+    }
+
+    /// Leaves the signals of the process alone: for a program that handles them itself. Otherwise they
+    /// wait while the folder is put in place, and from then on end the program.
+    #[must_use]
+    pub fn leave_signals(mut self) -> Self {
+        self.signals_wait = false;
+        self
     }
 
     /// Where the results will be.
@@ -138,7 +148,7 @@ impl OutFolder {
     /// # Errors
     /// Something would be lost that this program did not write; the files cannot be moved.
     pub fn finish(mut self, inputs: &[PathBuf]) -> Result<(), Message> {
-        let _held = Held::new();
+        let _held = self.signals_wait.then(Held::new);
         for attempt in 1.. {
             match self.put_in_place(inputs)? {
                 Ok(()) => break,

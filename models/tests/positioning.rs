@@ -344,6 +344,7 @@ fn what_cannot_be_known_has_no_uncertainty() {
     // A shift of each run.
     let mut shifted = simulate(&what, 3).unwrap();
     for r in &mut shifted {
+        r.time = None;
         r.deviation += [0.0, 1.5, -0.7, 0.4, -1.2][r.run as usize - 1];
     }
     let withheld = reasons(&shifted);
@@ -353,6 +354,21 @@ fn what_cannot_be_known_has_no_uncertainty() {
             .all(|(f, why)| f.rests_on_scatter() && *why == NoUncertainty::ReadingsAlike)
     );
     assert_eq!(withheld.len(), 9);
+
+    // A drift that the times show.
+    let drifting = PositioningSimulation {
+        drift: 20.0,
+        ..what
+    };
+    let withheld = reasons(&simulate(&drifting, 3).unwrap());
+    assert!(
+        withheld
+            .iter()
+            .all(|(_, why)| *why == NoUncertainty::Drifts)
+    );
+    assert_eq!(withheld.len(), 11);
+    let figures: Vec<Figure> = withheld.iter().map(|(f, _)| *f).collect();
+    assert!(figures.contains(&Figure::BMean) && !figures.contains(&Figure::E));
 }
 
 /// A shift that a run has at all targets is no uncertainty of a range: exact limit.

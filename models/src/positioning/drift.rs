@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use super::dependence::LEVEL;
 use super::readings::{Direction, Reading};
+use crate::uncertainty::{DegreesOfFreedom, coverage_factor};
 
 /// The common slope of the deviations over time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,6 +20,14 @@ pub struct Drift {
 }
 
 impl Drift {
+    /// Whether the rate differs from none at the 1 % level.
+    #[must_use]
+    pub fn shows(&self) -> bool {
+        let freedom = DegreesOfFreedom::new(self.degrees_of_freedom as f64);
+        let factor = freedom.and_then(|freedom| coverage_factor(1.0 - LEVEL, freedom));
+        factor.is_ok_and(|k| self.rate.abs() > k * self.std)
+    }
+
     /// Least squares of x = a(target, direction) + rate · time. None where a reading has no time,
     /// where no target is read at two times, or where no reading is left to tell the scatter.
     #[must_use]

@@ -67,9 +67,11 @@ pub fn analyse(
         return Err(PositioningError::TooLarge);
     }
     let scatter = Scatter::of(&deviations);
-    let expanded = uncertainty::expanded(&deviations, &profile, scatter.as_ref(), influences, seed);
+    let drift = Drift::of(readings);
+    let dependence = (scatter.as_ref(), drift.as_ref());
+    let expanded = uncertainty::expanded(&deviations, &profile, dependence, influences, seed);
     Ok(Positioning {
-        drift: Drift::of(readings),
+        drift,
         deviations,
         profile,
         values,

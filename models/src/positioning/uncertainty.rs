@@ -11,6 +11,7 @@ use rand::Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 
 use super::dependence::{Scatter, residuals};
+use super::drift::Drift;
 use super::figures::{Figure, FigureValues, Profile};
 use super::readings::{Deviations, Direction, Targets};
 use crate::uncertainty;
@@ -71,6 +72,9 @@ pub enum NoUncertainty {
     /// More targets than tests are simulated of.
     #[error("there are more than 10 000 targets")]
     TooManyTargets,
+    /// A drift with time.
+    #[error("the readings drift with time, so that they do not scatter independently")]
+    Drifts,
     /// Readings of a run that are alike.
     #[error(
         "neighbouring readings of a run are alike, so that the targets do not tell the scatter independently"
@@ -82,7 +86,7 @@ pub enum NoUncertainty {
 pub(super) fn expanded(
     deviations: &Deviations,
     profile: &Profile,
-    scatter: Option<&Scatter>,
+    (scatter, drift): (Option<&Scatter>, Option<&Drift>),
     influences: &Influences,
     seed: u64,
 ) -> Vec<(Figure, Result<f64, NoUncertainty>)> {
@@ -97,11 +101,12 @@ pub(super) fn expanded(
     if deviations.targets.len() > MOST_TARGETS {
         return none(NoUncertainty::TooManyTargets);
     }
-    let why = match (scatter.depends(), scatter.differs()) {
-        (true, _) => Some(NoUncertainty::ReadingsAlike),
-        (false, true) => Some(NoUncertainty::ScatterDiffers),
-        (false, false) => None,
-    };
+    let why = [
+        (drift.is_some_and(Drift::shows), NoUncertainty::Drifts),
+        (scatter.depends(), NoUncertainty::ReadingsAlike),
+        (scatter.differs(), NoUncertainty::ScatterDiffers),
+    ];
+    let why = why.into_iter().find(|(is, _)| *is).map(|(_, why)| why);
     let noise = match why {
         None => Noise::Independent {
             std: scatter.std,
@@ -116,6 +121,10 @@ pub(super) fn expanded(
     told.into_iter()
         .map(|figure| match why {
             Some(why) if figure.rests_on_scatter() => (figure, Err(why)),
+            // A drift shifts one direction against the other, and their mean difference most clearly.
+            Some(NoUncertainty::Drifts) if matches!(figure, Figure::BMean | Figure::UMean) => {
+                (figure, Err(NoUncertainty::Drifts))
+            }
             _ => {
                 let own = found.iter().find(|(f, _)| *f == figure);
                 (figure, own.map(|(_, u)| *u).ok_or(NoUncertainty::NoScatter))

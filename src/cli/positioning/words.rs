@@ -6,7 +6,7 @@ use errsep_models::positioning::{Drift, Figure, NoUncertainty, Positioning};
 use errsep_models::uncertainty::{DegreesOfFreedom, Quantity};
 
 use super::Found;
-use crate::cli::quantity::{COVERAGE, measured_words, unexpandable};
+use crate::cli::quantity::{measured_words, unexpandable};
 use crate::io::Message;
 use crate::io::positioning::{AxisKind, PositioningSetup};
 use crate::io::units::{SECONDS_PER_HOUR, symbol};
@@ -102,7 +102,8 @@ pub(super) fn contents(found: &Found) -> String {
     .filter(|(_, u)| *u > 0.0)
     .map(|(name, u)| format!("{name} {} {unit}", number::plain(u, 3)))
     .collect();
-    let sampled = "U (95 %) holds what so few readings leave open of means and standard deviations";
+    let sampled = "U (95 %) takes readings as independent and holds what so few of them leave open of means and \
+                   standard deviations (rather too much where several targets are nearly extreme)";
     if given.is_empty() {
         format!(
             "{sampled}; nothing of device, misalignment, expansion and drift, which are not stated."
@@ -160,12 +161,11 @@ pub(super) fn drift(found: &Found) -> Result<Option<String>, Message> {
     let Some((drift, rate)) = rate(found)? else {
         return Ok(None);
     };
-    let expanded = rate.expanded(COVERAGE).map_err(unexpandable)?;
-    let shown = if rate.value.abs() > expanded.expanded_uncertainty {
+    let shown = if drift.shows() {
         let unit = symbol(found.setup.kind.deviation_unit());
         let change = number::plain(drift.rate * drift.duration, 2);
         format!(
-            "over the test {change} {unit}, which the standard deviations hold and which neighbouring readings share"
+            "over the test {change} {unit}, which the standard deviations hold: let the machine warm up and measure again"
         )
     } else {
         "none that shows".to_owned()

@@ -131,7 +131,7 @@ mod tests {
                 (x - 1.5).powi(2)
             })
         };
-        let least = least_between(0.0, 3.0, 1e-9, walled).unwrap();
+        let least = least_between(-3.0, 3.0, 1e-9, walled).unwrap();
         assert!((least - 1.5).abs() < 1e-7, "{least}");
     }
 

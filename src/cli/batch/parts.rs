@@ -16,6 +16,9 @@ use super::{Args, Shard, unwritable, work};
 use crate::io::Message;
 use crate::io::source::hexadecimal;
 
+/// Rows that are there: id and key, line and status.
+type Known = HashMap<(String, String), (String, Status)>;
+
 /// Campaigns of one part.
 const LENGTH: usize = 200;
 
@@ -166,11 +169,8 @@ impl<'a> Part<'a> {
     }
 
     /// The rows that are there, by id and key: of the part and of its journal.
-    fn known(
-        &self,
-        retry_failed: bool,
-    ) -> Result<HashMap<(String, String), (String, Status)>, Message> {
-        let mut known = HashMap::new();
+    fn known(&self, retry_failed: bool) -> Result<Known, Message> {
+        let mut known = Known::new();
         for place in [&self.place, &self.journal] {
             for (line, row) in rows_of(place)? {
                 if !(retry_failed && row.status == Status::Failed) {

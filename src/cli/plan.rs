@@ -319,7 +319,9 @@ fn answer(
         rows.len(),
         rows.len() - shown
     );
-    let bar = |row: &Diagnosability| Bar::new(row.effect.clone(), 100.0 * row.visible);
+    // To a hundredth of a per cent: below, it is rounding.
+    let percent = |row: &Diagnosability| (1e4 * row.visible).round() / 100.0;
+    let bar = |row: &Diagnosability| Bar::new(row.effect.clone(), percent(row));
     let visible = Bars::new(Axis::new("visible part", "%")).bars(rows.iter().map(bar));
     for row in rows {
         let (seen, told) = (

@@ -2,6 +2,9 @@
 
 use serde_json::Value;
 
+use crate::diagnosis::scaled;
+use crate::io::units::symbol;
+
 use super::plot::{Axis, Chart, Series};
 use super::{Cell, Figure, Page, Section, Standing, Table};
 
@@ -65,7 +68,12 @@ fn take(
         .iter()
         .find_map(|key| of(object.get(*key)?));
     if let (Some(cell), Some(unit)) = (sized, object.get("unit").and_then(Value::as_str)) {
-        numbers.push((name.to_owned(), cell, unit.to_owned()));
+        let (factor, people) = scaled(unit);
+        let told = match cell.value() {
+            Some(value) => (Cell::number(factor * value), people),
+            None => (cell, symbol(unit)),
+        };
+        numbers.push((name.to_owned(), told.0, told.1.to_owned()));
         return;
     }
     figures.extend(curves(object));

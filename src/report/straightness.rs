@@ -45,7 +45,7 @@ pub fn page(name: &str, x: &[f64], y: &[f64], results: &[Straightness]) -> Page 
     let section = match zone {
         Some(zone) => section.figure(Figure::new(
             "Deviation from the middle of the minimum zone",
-            "The two dashed lines are the closest parallels that hold all points.",
+            "The two dotted lines are the closest parallels that hold all points.",
             deviations(zone, x, y),
         )),
         None => section,

@@ -8,8 +8,9 @@ use serde_json::Value;
 use super::parts::rows_of;
 use super::row::{Row, Status};
 use super::unwritable;
+use crate::diagnosis::scaled;
 use crate::io::Message;
-use crate::report::{Cell, Order, Page, Section, Standing, Table};
+use crate::report::{Cell, Order, Page, Provenance, Section, Standing, Table};
 
 /// Failures that are listed.
 const LISTED: usize = 100;
@@ -81,9 +82,10 @@ impl Seen {
             object.get("value").and_then(Value::as_f64),
             object.get("unit").and_then(Value::as_str),
         ) {
+            let (factor, unit) = scaled(unit);
             let key = (schema.to_owned(), name.to_owned(), unit.to_owned());
             let range = self.quantities.entry(key).or_default();
-            range.values.push((value, id.to_owned()));
+            range.values.push((factor * value, id.to_owned()));
             return;
         }
         for (key, inner) in object {
@@ -110,7 +112,14 @@ impl Seen {
         } else {
             Standing::Caution
         };
-        let mut page = Page::new("Batch", list.display().to_string()).summary(standing, sentence);
+        let origin = Provenance {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            command: format!("errsep batch {}", list.display()),
+            ..Provenance::default()
+        };
+        let mut page = Page::new("Batch", list.display().to_string())
+            .summary(standing, sentence)
+            .provenance(origin);
         if failed > 0 {
             let rows = self.failures.iter().take(LISTED);
             let rows = rows.map(|(id, why)| [Cell::Text(id.clone()), Cell::Text(why.clone())]);
@@ -186,8 +195,6 @@ impl Seen {
                 Cell::Text(most.1.clone()),
             ]);
         }
-        Section::new("Range of every quantity")
-            .paragraph("Units as in the JSON of the commands.")
-            .table(table)
+        Section::new("Range of every quantity").table(table)
     }
 }

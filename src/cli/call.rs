@@ -31,19 +31,6 @@ use crate::io::source::{InMemory, begin_record_with};
 /// # Ok::<(), errsep::io::Message>(())
 /// ```
 pub fn call<S: AsRef<str>>(arguments: &[S], in_memory: Vec<InMemory>) -> Result<Traced, Message> {
-    called(arguments, in_memory, true)
-}
-
-/// As [`call`], for the JSON alone: the page and the tables may be empty.
-pub(super) fn call_for_json(arguments: &[String]) -> Result<Traced, Message> {
-    called(arguments, Vec::new(), false)
-}
-
-fn called<S: AsRef<str>>(
-    arguments: &[S],
-    in_memory: Vec<InMemory>,
-    whole: bool,
-) -> Result<Traced, Message> {
     let arguments: Vec<String> = arguments.iter().map(|a| a.as_ref().to_owned()).collect();
     let words = std::iter::once("errsep").chain(arguments.iter().map(String::as_str));
     let mut cli = Cli::try_parse_from(words).map_err(|error| not_understood(&error))?;
@@ -52,7 +39,7 @@ fn called<S: AsRef<str>>(
             .remedy("call one that does, such as `reversal`"));
     };
     if let Answering::Reversal(args) = command {
-        args.whole = whole;
+        args.whole = true;
     }
     begin_record_with(true, in_memory);
     let _silent = common::Silent::begin();

@@ -10,7 +10,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::campaigns::Campaign;
 use super::row::Row;
-use crate::cli::call::call_for_json;
+use crate::cli::call::call;
 use crate::io::{Message, Status};
 
 /// A campaign that was worked out.
@@ -73,7 +73,7 @@ pub(super) fn all(
 /// One campaign: whatever happens to it, it is a row.
 fn one(campaign: &Campaign, key: &str) -> Row {
     let known = (campaign.id.clone(), key.to_owned());
-    let called = catch_unwind(AssertUnwindSafe(|| call_for_json(&campaign.arguments)));
+    let called = catch_unwind(AssertUnwindSafe(|| call(&campaign.arguments, Vec::new())));
     match called {
         Ok(Ok(traced)) => {
             let answer = traced.answer;

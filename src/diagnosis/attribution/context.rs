@@ -170,7 +170,15 @@ impl<'a, M: FittedModel> Context<'a, M> {
 
     /// Greatest score of a family beside what the remainder is beside, and the entry where it is.
     pub fn best(&self, remainder: &Remainder, family: usize) -> (f64, Option<usize>) {
-        *remainder.best[family].get_or_init(|| self.greatest(remainder, family))
+        let known = &remainder.best[family];
+        if let Some(best) = known.get() {
+            return *best;
+        }
+        // Not held locked meanwhile: a thread that waits for the others' share of the search may be given
+        // a task that asks for the same.
+        let best = self.greatest(remainder, family);
+        let _ = known.set(best);
+        best
     }
 
     fn surprises(&self, remainder: &Remainder) -> Vec<f64> {

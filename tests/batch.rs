@@ -149,7 +149,11 @@ fn what_is_done_is_skipped_until_something_changes() {
     let bench = Bench::new(20);
     bench.run("out", &[]);
     let before = bench.parts("out");
+    let place = bench.folder.path().join("out").join(&before[0].0);
+    let written = fs::metadata(&place).unwrap().modified().unwrap();
     let again = bench.run("out", &[]);
+    // What is complete is not even written again.
+    assert_eq!(fs::metadata(&place).unwrap().modified().unwrap(), written);
     assert!(told(&again).starts_with("20 campaigns: 0 worked out now, 20 done before; 2 failed"));
     let verified = bench.run("out", &["--verify"]);
     assert!(told(&verified).starts_with("20 campaigns: 0 worked out now"));

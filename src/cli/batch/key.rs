@@ -20,7 +20,7 @@ pub(super) struct Input {
     /// Bytes.
     pub size: u64,
     /// Time of change, nanoseconds since 1970.
-    pub changed: u128,
+    pub changed: u64,
     /// SHA-256 in hexadecimal digits.
     pub sha256: String,
 }
@@ -87,10 +87,10 @@ impl Inputs {
 }
 
 /// Size and time of change.
-pub(super) fn state(path: &Path) -> io::Result<(u64, u128)> {
+pub(super) fn state(path: &Path) -> io::Result<(u64, u64)> {
     let about = std::fs::metadata(path)?;
     let changed = about.modified()?.duration_since(UNIX_EPOCH);
-    Ok((about.len(), changed.map_or(0, |t| t.as_nanos())))
+    Ok((about.len(), changed.map_or(0, |t| t.as_nanos() as u64)))
 }
 
 fn sha256(path: &Path) -> io::Result<String> {

@@ -19,7 +19,7 @@ pub(super) struct PartDone {
     pub part: String,
     /// Its size and time of change when it was written.
     pub size: u64,
-    pub changed: u128,
+    pub changed: u64,
     /// SHA-256 over ids and keys of its rows.
     pub rows: String,
     /// How many of them failed.

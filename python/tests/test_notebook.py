@@ -15,7 +15,7 @@ def test_the_notebook_runs() -> None:
     done = NotebookClient(notebook, timeout=600, kernel_name="python3").execute()
     shown = [output for cell in done.cells for output in cell.get("outputs", [])]
     pages = [output["data"]["text/html"] for output in shown if "text/html" in output.get("data", {})]
-    assert sum("data:image/svg+xml" in page for page in pages) == 2
+    assert sum("data:image/svg+xml" in page for page in pages) == 3
     assert sum("image/png" in output.get("data", {}) for output in shown) == 2
     told = "".join(output.get("text", "") for output in shown if output["output_type"] == "stream")
     assert "zero-jump" in told and not [o for o in shown if o.get("name") == "stderr"]

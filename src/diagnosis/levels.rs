@@ -1,9 +1,10 @@
 //! Every threshold that decides what a diagnosis says, in one table.
 //!
 //! Kinds: a *quantile* follows from a probability; a *tuned* one was chosen on cases that were looked
-//! at (development seeds of `examples/blind_campaign.rs` and `examples/independent_maker`) and then
-//! judged on seeds that no version had seen (`docs/validation/diagnosis.md` says which); a *limit* keeps
-//! work finite and costs power where it binds; a *reckoned* one follows from a model's own arithmetic.
+//! at, development seeds of `examples/blind_campaign.rs` and `examples/independent_maker`
+//! (`docs/validation/diagnosis.md` and `independent.md` say which figures are of seeds that no version had
+//! seen, and of which version); a *limit* keeps work finite and costs power where it binds; a *reckoned*
+//! one follows from a model's own arithmetic.
 //! How many draws stand behind a figure is told where they are drawn.
 
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -27,8 +28,8 @@ pub(in crate::diagnosis) const FEWEST_CONTRASTS: usize = 8;
 pub(in crate::diagnosis) const LONG_TRACE: usize = 20;
 /// *Quantile*, 6 · 10⁻⁵ of normal readings: standard deviations to which a single reading is pulled in.
 pub(in crate::diagnosis) const SPIKE: f64 = 4.0;
-/// *Tuned* on normal noise (0.003 expected) and Student's with three degrees of freedom (0.014): part of
-/// the readings beyond three standard deviations that makes tails heavy.
+/// *Tuned*, between normal noise (0.003) and Student's with three degrees of freedom (0.042): part of the
+/// readings beyond three standard deviations, as their median tells it, that makes tails heavy.
 pub(in crate::diagnosis) const HEAVY_TAILS: f64 = 0.01;
 /// *Reckoned.* Repeats without which a spike cannot be told from a form.
 pub(in crate::diagnosis) const SPIKE_REPEATS: usize = 3;
@@ -51,8 +52,7 @@ pub(in crate::diagnosis) const STAYS_FREEDOM: usize = 5;
 
 // Detection.
 
-/// *Reckoned.* A signature of which less than this part is visible is not looked for: rounding and what
-/// linearising leaves are as great.
+/// *Limit.* A signature of which less than this part is visible is not looked for.
 pub(in crate::diagnosis) const INVISIBLE: f64 = 1e-4;
 
 // Attribution.
@@ -83,7 +83,7 @@ pub(in crate::diagnosis) const NEAR: f64 = 0.7;
 /// *Tuned.* A size counts from this many of its standard uncertainties on: that of the only cause, and
 /// those of several, which may imitate what another leaves.
 pub(in crate::diagnosis) const STANDS: [f64; 2] = [1.0, 2.0];
-/// *Quantile*, odds of 1 to 22 000. An effect that was given more amplitudes than the dictionary looks for,
+/// *Tuned*, odds of 1 to 22 000. An effect that was given more amplitudes than the dictionary looks for,
 /// and has more unknowns than that of greatest evidence, stands in its place by its freedom alone where its
 /// log-evidence is less by this.
 pub(in crate::diagnosis) const OUTDONE: f64 = 10.0;

@@ -7,6 +7,7 @@ use clap::CommandFactory;
 
 use crate::cli::Cli;
 use crate::io::message::nearest;
+use crate::io::source::STANDARD_INPUT;
 use crate::io::{Message, Row, TableReader};
 
 /// Commands that are no campaign: they make no answer from data.
@@ -80,6 +81,13 @@ impl Campaigns {
                 as_listed: Vec::new(),
             };
             campaign.word(word);
+            for column in [&data, &setup].into_iter().flatten() {
+                if row.text(column) == STANDARD_INPUT {
+                    return Err(row
+                        .error(column, "standard input cannot be shared by campaigns")
+                        .remedy("write it to a file, and name that"));
+                }
+            }
             if !text(&data).is_empty() {
                 campaign.file(&folder, text(&data));
             }
@@ -133,12 +141,15 @@ impl Campaign {
         self.files.push(place);
     }
 
-    /// An option that names a file beside the list stands for that file.
+    /// An option that names a file beside the list stands for that file, `--option=FILE` too.
     fn word_or_file(&mut self, folder: &Path, word: &str) {
-        if !word.starts_with('-') && folder.join(word).is_file() {
-            self.file(folder, word);
-        } else {
-            self.word(word);
+        match word.split_once('=') {
+            _ if !word.starts_with('-') && folder.join(word).is_file() => self.file(folder, word),
+            Some((option, name)) if option.starts_with("--") && folder.join(name).is_file() => {
+                self.word(option);
+                self.file(folder, name);
+            }
+            _ => self.word(word),
         }
     }
 }

@@ -90,6 +90,7 @@ pub fn run(args: &Args) -> Result<Status, Message> {
     let _alone = alone(&args.out, shard)?;
     let mut log = Log::open(&args.out, args.verify)?;
     let parts = Part::of(&campaigns, shard, &args.out);
+    Part::clear(&parts, shard, &args.out)?;
     let total = parts.iter().map(|part| part.campaigns.len() as u64).sum();
     let bar = if args.quiet {
         indicatif::ProgressBar::hidden()
@@ -123,7 +124,8 @@ impl Outcome {
             failed,
         } = *self;
         let mut text = format!(
-            "{campaigns} campaigns: {worked_out} worked out now, {} done before; {} failed\n",
+            "{campaigns} campaign{}: {worked_out} worked out now, {} done before; {} failed\n",
+            if campaigns == 1 { "" } else { "s" },
             campaigns - worked_out,
             if failed == 0 {
                 "none".to_owned()

@@ -5,9 +5,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::parts::rows_of;
+use super::parts::{part_files, rows_of};
 use super::row::{Row, Status};
-use super::unwritable;
 use crate::diagnosis::scaled;
 use crate::io::Message;
 use crate::report::{Cell, Order, Page, Provenance, Section, Standing, Table};
@@ -37,15 +36,8 @@ struct Seen {
 /// # Errors
 /// The parts cannot be read.
 pub(super) fn of(list: &Path, folder: &Path) -> Result<String, Message> {
-    let entries = std::fs::read_dir(folder).map_err(|e| unwritable(folder, &e))?;
-    let mut parts: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
-    parts.retain(|path| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        name.starts_with("part-") && name.ends_with(".ndjson")
-    });
-    parts.sort();
     let mut seen = Seen::default();
-    for part in parts {
+    for part in part_files(folder)? {
         for (_, row) in rows_of(&part)? {
             seen.take(row);
         }

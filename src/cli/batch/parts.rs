@@ -30,6 +30,29 @@ pub(super) struct Part<'a> {
     journal: PathBuf,
 }
 
+/// A share in the names of its files.
+fn share(shard: Shard) -> String {
+    match shard.of {
+        1 => "1".to_owned(),
+        n => format!("{}of{n}", shard.index),
+    }
+}
+
+/// The part files of a folder, by name.
+///
+/// # Errors
+/// It cannot be read.
+pub(super) fn part_files(folder: &Path) -> Result<Vec<PathBuf>, Message> {
+    let entries = std::fs::read_dir(folder).map_err(|e| unreadable(folder, &e))?;
+    let mut parts: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    parts.retain(|path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("part-") && name.ends_with(".ndjson")
+    });
+    parts.sort();
+    Ok(parts)
+}
+
 /// What became of a part.
 #[derive(Debug, Default)]
 pub(super) struct Done {
@@ -46,10 +69,7 @@ impl<'a> Part<'a> {
             .skip(shard.index - 1)
             .step_by(shard.of)
             .collect();
-        let name = match shard.of {
-            1 => "1".to_owned(),
-            n => format!("{}of{n}", shard.index),
-        };
+        let name = share(shard);
         let chunks = own.chunks(LENGTH).enumerate();
         chunks
             .map(|(k, campaigns)| Self {
@@ -58,6 +78,46 @@ impl<'a> Part<'a> {
                 journal: folder.join(format!(".journal-{name}-{:05}.ndjson", k + 1)),
             })
             .collect()
+    }
+
+    /// Parts that a folder holds of other shares than these, or of more campaigns than the list has now.
+    fn strange(parts: &[Self], shard: Shard, folder: &Path) -> Result<Vec<PathBuf>, Message> {
+        let own = format!("part-{}-", share(shard));
+        let of = if shard.of == 1 {
+            None
+        } else {
+            Some(format!("of{}-", shard.of))
+        };
+        let mut left = Vec::new();
+        for place in part_files(folder)? {
+            let name = place.file_name().unwrap_or_default().to_string_lossy();
+            let same = match &of {
+                None => !name.contains("of"),
+                Some(of) => name.contains(of.as_str()),
+            };
+            if !same {
+                return Err(
+                    Message::bad_input("these answers were shared out otherwise")
+                        .in_file(&place)
+                        .remedy("give --shard with the same number of shares, or another folder"),
+                );
+            }
+            if name.starts_with(&own) && parts.iter().all(|part| part.place != place) {
+                left.push(place);
+            }
+        }
+        Ok(left)
+    }
+
+    /// Takes away the parts beyond a list that has become shorter.
+    ///
+    /// # Errors
+    /// The folder holds answers that were shared out otherwise, or cannot be written.
+    pub fn clear(parts: &[Self], shard: Shard, folder: &Path) -> Result<(), Message> {
+        for place in Self::strange(parts, shard, folder)? {
+            std::fs::remove_file(&place).map_err(|e| unwritable(&place, &e))?;
+        }
+        Ok(())
     }
 
     /// Works out what is not done, and puts the part in place.

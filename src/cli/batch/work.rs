@@ -77,8 +77,8 @@ fn one(campaign: &Campaign, key: &str) -> Row {
     match called {
         Ok(Ok(traced)) => {
             let answer = traced.answer;
-            let text = || answer.text.lines().next().unwrap_or_default().to_owned();
-            let message = (answer.status != Status::Done).then(text);
+            let sentence = || answer.page.told().1.to_owned();
+            let message = (answer.status != Status::Done).then(sentence);
             Row::new(known, answer.status.code(), message, Some(answer.json))
         }
         Ok(Err(message)) => Row::new(known, message.status().code(), Some(told(&message)), None),

@@ -2,7 +2,7 @@
 
 use errsep_models::model::FittedModel;
 use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder, NotDiagnosable};
-use errsep_models::reversal::simultaneous::effects::CATALOGUE;
+use errsep_models::reversal::effects::joins_the_fit;
 use serde_json::Value;
 
 use super::Args;
@@ -32,7 +32,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         inputs: Vec::new(),
     }
     .answer(args)?;
-    if let Some(command) = with_command(args, &answer.json["verdict"]["effects"]) {
+    if let Some(command) = with_command(args, &answer.json) {
         answer.text += &format!(
             "\nFor the answer with it, and its uncertainty, fit it along with tilts and forms: {command}\n"
         );
@@ -57,14 +57,19 @@ pub fn assumptions(setup: &ReversalSetup) -> Assumptions {
 
 /// The command that fits the effects that were named along with tilts and forms, where all of them can
 /// be.
-fn with_command(args: &Args, effects: &Value) -> Option<String> {
-    let names: Vec<&str> = effects
+fn with_command(args: &Args, diagnosis: &Value) -> Option<String> {
+    let names: Vec<&str> = diagnosis["verdict"]["effects"]
         .as_array()?
         .iter()
         .filter_map(Value::as_str)
         .collect();
-    let known = |name: &&str| CATALOGUE.iter().any(|effect| effect.name == *name);
-    if names.is_empty() || !names.iter().all(known) {
+    let candidates = diagnosis["candidates"].as_array()?;
+    let variant = |name: &str| {
+        let own = candidates.iter().find(|c| c["effect"] == name);
+        own.and_then(|c| c["variant"].as_str())
+    };
+    let joins = |name: &&str| joins_the_fit(name, variant(name));
+    if names.is_empty() || !names.iter().all(joins) {
         return None;
     }
     let mut command = format!("errsep reversal {}", args.data.display());

@@ -12,6 +12,9 @@ pub(super) struct AxisBacklash;
 /// Variant of a lost motion that grows along the travel.
 const WORN: usize = 1;
 
+/// That variant in words.
+pub(super) const GROWS: &str = "growing along the travel";
+
 impl Effect<FirstOrder> for AxisBacklash {
     fn name(&self) -> &str {
         "axis-backlash"
@@ -88,7 +91,7 @@ impl Effect<FirstOrder> for AxisBacklash {
     }
 
     fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
-        (shape.variant == WORN).then(|| "growing along the travel".to_owned())
+        (shape.variant == WORN).then(|| GROWS.to_owned())
     }
 }
 

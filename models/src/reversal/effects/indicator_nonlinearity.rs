@@ -16,6 +16,9 @@ pub(super) struct IndicatorNonlinearity;
 /// Powers of the reading, by the kind of a variant.
 const KINDS: [&[i32]; 3] = [&[2], &[3], &[2, 3]];
 
+/// The last of them in words.
+pub(super) const MIXED: &str = "quadratic and cubic";
+
 impl Effect<FirstOrder> for IndicatorNonlinearity {
     fn name(&self) -> &str {
         "indicator-nonlinearity"
@@ -131,7 +134,7 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
         let kind = match powers(shape) {
             [2] => "quadratic",
             [3] => "cubic",
-            _ => "quadratic and cubic",
+            _ => MIXED,
         };
         Some(format!("{kind}, {}", words(shape.variant)))
     }

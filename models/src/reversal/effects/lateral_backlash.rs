@@ -21,6 +21,11 @@ const FORMS: std::ops::RangeInclusive<usize> = 1..=3;
 /// Variant of a slide that leans over some way after it has turned round.
 const LEANING: usize = 4;
 
+/// The variants in words.
+pub(super) const OWN_FORMS: &str = "each direction with a form of its own";
+/// See [`OWN_FORMS`].
+pub(super) const LEANS: &str = "leaning over after it has turned round";
+
 impl Effect<FirstOrder> for LateralBacklash {
     fn name(&self) -> &str {
         "lateral-backlash"
@@ -96,7 +101,8 @@ impl Effect<FirstOrder> for LateralBacklash {
         shape.values.iter().all(|v| (0.01..1.0).contains(&part(v)))
     }
 
-    /// Of forms their root mean square over the travel in place of each term: ∫ Pₖ² = 1/(2k + 1).
+    /// Of forms their root mean square over the travel in place of each term, the mean of Pₖ² being
+    /// 1/(2k + 1), less what the noise of the terms adds to its square.
     fn estimates(
         &self,
         shape: &Shape,
@@ -114,8 +120,10 @@ impl Effect<FirstOrder> for LateralBacklash {
             told.truncate(2);
             let weight = |k: usize| 1.0 / (2.0 * k as f64 + 1.0);
             let form = amplitudes.iter().enumerate().skip(2);
-            let square: f64 = form.clone().map(|(k, a)| a * a * weight(k)).sum();
-            let size = square.sqrt().max(f64::MIN_POSITIVE);
+            let variance = |k: usize| covariance.get((k, k)).copied().unwrap_or(f64::NAN);
+            let own = |(k, a): (usize, &f64)| (a * a - variance(k)) * weight(k);
+            let square: f64 = form.clone().map(own).sum();
+            let size = square.max(0.0).sqrt().max(f64::MIN_POSITIVE);
             let along: Vec<(usize, f64)> = form.map(|(k, a)| (k, a * weight(k) / size)).collect();
             told.push(Estimate {
                 name: "rms-of-form".to_owned(),
@@ -130,8 +138,8 @@ impl Effect<FirstOrder> for LateralBacklash {
     fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
         match shape.variant {
             0 => None,
-            LEANING => Some("leaning over after it has turned round".to_owned()),
-            _ => Some("each direction with a form of its own".to_owned()),
+            LEANING => Some(LEANS.to_owned()),
+            _ => Some(OWN_FORMS.to_owned()),
         }
     }
 }

@@ -27,6 +27,7 @@ mod zero_jump;
 use nalgebra::DMatrix;
 
 use super::diagnosable::FirstOrder;
+use super::simultaneous;
 use crate::model::{Effect, Estimate, Parameter, Shape};
 
 /// The catalogue.
@@ -52,6 +53,21 @@ pub fn all() -> Vec<Box<dyn Effect<FirstOrder>>> {
         Box::new(tip_radius::TipRadius),
         Box::new(zero_jump::ZeroJump),
     ]
+}
+
+/// Whether `simultaneous::effects` has an effect too, in the variant that a diagnosis tells in words: a
+/// lost motion that grows along the screw, lines of the slide with forms of their own and curves of two
+/// powers are diagnosed, but are no unknowns of the fit.
+pub fn joins_the_fit(effect: &str, variant: Option<&str>) -> bool {
+    const APART: [&str; 4] = [
+        axis_backlash::GROWS,
+        indicator_nonlinearity::MIXED,
+        lateral_backlash::LEANS,
+        lateral_backlash::OWN_FORMS,
+    ];
+    let known = simultaneous::effects::CATALOGUE.iter();
+    known.into_iter().any(|entry| entry.name == effect)
+        && !variant.is_some_and(|words| APART.iter().any(|apart| words.starts_with(apart)))
 }
 
 /// The start of an effect whose signature depends on its own size: infinitely small.

@@ -1,0 +1,8 @@
+//! The reversal, staged and simultaneous, against known truth.
+
+#[path = "../faulty_machine/mod.rs"]
+mod faulty_machine;
+mod left_out;
+mod simultaneous;
+mod staged;
+mod turning;

@@ -1,0 +1,8 @@
+//! The simultaneous solution against known truth, against the staged solution, and against itself.
+
+mod effects;
+mod minimum;
+mod noise;
+mod plan;
+mod refusals;
+mod uncertainty;

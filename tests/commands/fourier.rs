@@ -1,0 +1,388 @@
+//! `errsep fourier` and `errsep simulate fourier` as people and programs use them.
+
+use crate::command::{Folder, bad_input, run};
+use serde_json::Value;
+
+fn simulated(arguments: &[&str]) -> String {
+    let folder = Folder::with(&[]);
+    let all = [&["simulate", "fourier", "--samples", "200"], arguments].concat();
+    let made = run(&folder, &all);
+    assert_eq!(made.status, 0, "{}", made.stderr);
+    made.stdout
+}
+
+fn json(folder: &Folder, arguments: &[&str]) -> Value {
+    let out = run(folder, arguments);
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    serde_json::from_str(&out.stdout).unwrap()
+}
+
+fn numbers(value: &Value, pointer: &str) -> Vec<f64> {
+    let list = value.pointer(pointer).and_then(Value::as_array).unwrap();
+    list.iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn simulated_profile_is_found_within_its_uncertainty() {
+    let setup = "[section]\nlength = 100.0\n[method]\ncompensation = \"none\"\n";
+    let folder = Folder::with(&[("s.toml", setup)]);
+    let arguments = [
+        "simulate",
+        "fourier",
+        "--samples",
+        "200",
+        "--slope",
+        "0",
+        "--repeats",
+        "2",
+    ];
+    let made = json(&folder, &[&arguments[..], &["--format", "json"]].concat());
+    folder.write("scans.csv", &run(&folder, &arguments).stdout);
+    let answer = json(
+        &folder,
+        &[
+            "fourier",
+            "scans.csv",
+            "--setup",
+            "s.toml",
+            "--format",
+            "json",
+        ],
+    );
+    assert_eq!(answer["schema"], "errsep.fourier/1");
+    assert_eq!(answer["noise"]["source"], "repeats");
+    // Tolerance: k·u of a standard deviation with 591 degrees of freedom.
+    let noise = answer["noise"]["value"].as_f64().unwrap();
+    assert!(
+        (noise / 2.0 - 1.0).abs() < 3.0 / 1182.0_f64.sqrt(),
+        "{noise}"
+    );
+    // Three spacings of 99 orders, two repeats, less a step each; the factor is that of Student's
+    // distribution. Tolerance: digits in print (1.964 for 591 degrees of freedom).
+    assert_eq!(answer["uncertainty"]["degrees_of_freedom"], 591.0);
+    let k = answer["uncertainty"]["coverage_factor"].as_f64().unwrap();
+    assert!((k - 1.964).abs() < 5e-4, "{k}");
+    let truth = numbers(&made, "/truth/profiles/workpiece");
+    let found = numbers(&answer, "/profiles/workpiece");
+    let std = numbers(&answer, "/profiles/workpiece_std");
+    let squares: f64 = found
+        .iter()
+        .zip(&truth)
+        .zip(&std)
+        .map(|((f, t), u)| ((f - t) / u).powi(2))
+        .sum();
+    // Tolerance: mean square of 60 coefficients' worth of normal deviates, k·u = 3 √(2/60).
+    let mean = squares / found.len() as f64;
+    assert!((mean - 1.0).abs() < 0.55, "{mean}");
+    assert!(answer["repeatability"]["value"].as_f64().unwrap() > 0.0);
+    crate::command::documented(&answer, "docs/json/fourier.md");
+}
+
+#[test]
+fn height_difference_and_rise_are_given_beside_the_profile() {
+    let table = simulated(&["--noise", "0", "--slope", "2", "--height-difference", "20"]);
+    let folder = Folder::with(&[("scans.csv", &table)]);
+    let answer = json(
+        &folder,
+        &[
+            "fourier",
+            "scans.csv",
+            "--length",
+            "100",
+            "--format",
+            "json",
+        ],
+    );
+    // Tolerance: epsilons of 40 µm times the condition of the fitted step.
+    let value = |key: &str| answer[key]["value"].as_f64().unwrap();
+    assert!((value("height_difference") - 20.0).abs() < 1e-9);
+    assert!((value("rise") - 4.0 * std::f64::consts::PI).abs() < 1e-9);
+}
+
+#[test]
+fn one_file_a_spacing_with_a_set_up() {
+    let setup = "[section]\nlength = 100.0\norders = 20\n[probe]\nspacing = [48.5, 34.1]\nnoise = 2.0\n[method]\ncombination = \"hybrid\"\ncompensation = \"none\"\n";
+    let folder = Folder::with(&[("s.toml", setup)]);
+    for (name, spacing) in [("a.csv", "48.5"), ("b.csv", "34.1")] {
+        let table = simulated(&["--spacing", spacing]);
+        let kept: Vec<String> = table
+            .lines()
+            .filter(|l| !l.starts_with('#'))
+            .map(|l| l.split_once(',').unwrap().1.to_owned())
+            .collect();
+        folder.write(name, &kept.join("\n"));
+    }
+    let answer = json(
+        &folder,
+        &[
+            "fourier", "a.csv", "b.csv", "--setup", "s.toml", "--format", "json",
+        ],
+    );
+    assert_eq!(answer["combination"], "hybrid");
+    assert_eq!(answer["orders"].as_array().unwrap().len(), 20);
+    assert_eq!(answer["scans"][1]["spacing"], 34.1);
+    assert_eq!(answer["methods"].as_array().unwrap().len(), 5);
+    bad_input(
+        &folder,
+        &["fourier", "a.csv", "--setup", "s.toml", "--out", "out"],
+        &["2 probe spacings for 1 files"],
+    );
+}
+
+#[test]
+fn lost_orders_are_named_and_the_report_is_written() {
+    let folder = Folder::with(&[("scans.csv", &simulated(&["--spacing", "25"]))]);
+    let out = run(
+        &folder,
+        &["fourier", "scans.csv", "--length", "100", "--out", "out"],
+    );
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    assert!(
+        out.stdout.contains("4, 8, 12, 16, 20, 24, 28"),
+        "{}",
+        out.stdout
+    );
+    let page = folder.read("out/report.html");
+    for part in ["<svg", "Lost orders: 4, 8", "determinant"] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert_eq!(folder.read("out/orders.csv").lines().count(), 31);
+    assert_eq!(folder.read("out/profiles.csv").lines().count(), 201);
+}
+
+#[test]
+fn two_probes_are_enough_for_a_profile_that_repeats() {
+    let folder = Folder::with(&[(
+        "scans.csv",
+        &simulated(&["--two-probes", "--spacing", "34.1"]),
+    )]);
+    let answer = json(
+        &folder,
+        &[
+            "fourier",
+            "scans.csv",
+            "--length",
+            "100",
+            "--format",
+            "json",
+        ],
+    );
+    assert_eq!(answer["scans"][0]["probes"], 2);
+    assert!(answer["height_difference"].is_null());
+}
+
+#[test]
+fn bad_scans_are_refused() {
+    let header = "spacing,x,m1,m2,m3\n";
+    let rows = |from: usize, skip: usize| -> String {
+        (from..=100)
+            .filter(|i| *i != skip)
+            .map(|i| format!("34.1,{i},0.1,0.2,0.3\n"))
+            .collect()
+    };
+    for (name, content, expected) in [
+        ("gap.csv", format!("{header}{}", rows(0, 50)), "even grid"),
+        ("late.csv", format!("{header}{}", rows(5, 200)), "even grid"),
+        (
+            "short.csv",
+            format!("{header}34.1,0,0,0,0\n34.1,1,0,0,0\n"),
+            "grid must fill",
+        ),
+        (
+            "text.csv",
+            format!("{header}34.1,0,zero,0,0\n"),
+            "not a number",
+        ),
+        ("empty.csv", String::new(), "empty"),
+        ("none.csv", header.to_owned(), "no row"),
+        (
+            "column.csv",
+            format!("{}34.1,0,0,0,0\n", header.replace("m3", "m4")),
+            "unknown column",
+        ),
+        (
+            "missing.csv",
+            "spacing,x,m1\n34.1,0,0\n".to_owned(),
+            "`m2` is missing",
+        ),
+        (
+            "spacing.csv",
+            "x,m1,m2\n0,0,0\n".to_owned(),
+            "probe spacing is not known",
+        ),
+        (
+            "far.csv",
+            format!("{header}134.1,0,0,0,0\n134.1,1,0,0,0\n"),
+            "between 0 and",
+        ),
+        (
+            "twice.csv",
+            format!("{header}{}34.1,7,0.1,0.2,0.3\n", rows(0, 200)),
+            "twice.csv:103",
+        ),
+    ] {
+        let folder = Folder::with(&[(name, &content)]);
+        bad_input(
+            &folder,
+            &["fourier", name, "--length", "100", "--out", "out"],
+            &[name, expected],
+        );
+    }
+    // The joint lies between 65 and 66 mm; the published way needs both probes there.
+    let joint = rows(0, 200).replace("34.1,65,0.1,0.2,0.3", "34.1,65,0.1,0.2,");
+    let chord = "[section]\nlength = 100\n[method]\ncompensation = \"chord\"\n";
+    let folder = Folder::with(&[("j.csv", &format!("{header}{joint}")), ("s.toml", chord)]);
+    bad_input(
+        &folder,
+        &["fourier", "j.csv", "--setup", "s.toml"],
+        &["j.csv:67", "height difference", "fitted"],
+    );
+    let folder = Folder::with(&[
+        ("d.csv", &format!("{header}{}", rows(0, 200))),
+        ("s.toml", "[section]\nlenght = 100\n"),
+    ]);
+    bad_input(
+        &folder,
+        &["fourier", "d.csv", "--out", "out"],
+        &["length of the section"],
+    );
+    bad_input(
+        &folder,
+        &["fourier", "d.csv", "--setup", "s.toml"],
+        &["s.toml:2", "did you mean `length`"],
+    );
+    bad_input(
+        &folder,
+        &["simulate", "fourier", "--spacing", "200"],
+        &["spacing"],
+    );
+}
+
+#[test]
+fn numbers_of_the_set_up_are_refused_where_they_stand() {
+    let folder = Folder::with(&[("d.csv", &simulated(&[]))]);
+    for (key, line, values) in [
+        ("noise", 4, &["-1", "0", "nan", "inf"][..]),
+        ("length", 2, &["-100", "0", "nan", "inf"]),
+        ("spacing", 4, &["[-1]", "[0]", "[nan]", "[inf]"]),
+        ("orders", 3, &["0", "-3"]),
+    ] {
+        for value in values {
+            let stated = format!("{key} = {value}\n");
+            let setup = match key {
+                "length" => format!("[section]\n{stated}"),
+                "orders" => format!("[section]\nlength = 100\n{stated}"),
+                _ => format!("[section]\nlength = 100\n[probe]\n{stated}"),
+            };
+            folder.write("s.toml", &setup);
+            bad_input(
+                &folder,
+                &["fourier", "d.csv", "--setup", "s.toml", "--out", "out"],
+                &[&format!("s.toml:{line}:")],
+            );
+        }
+    }
+    bad_input(
+        &folder,
+        &["fourier", "d.csv", "--length=-100"],
+        &["--length -100"],
+    );
+}
+
+#[test]
+fn messages_give_the_line_of_the_file() {
+    // Rows from the end of the section to its start: the place in the sorted scan is not the line.
+    let rows: String = (0..=100)
+        .rev()
+        .map(|i| {
+            let x = if i == 8 { 8.4 } else { f64::from(i) };
+            format!("34.1,{x},0.1,0.2,0.3\n")
+        })
+        .collect();
+    let folder = Folder::with(&[("d.csv", &format!("# a comment\nspacing,x,m1,m2,m3\n{rows}"))]);
+    let arguments = ["fourier", "d.csv", "--length", "100"];
+    bad_input(&folder, &arguments, &["d.csv:95:", "x = 8.4 mm"]);
+    folder.write("s.toml", "[section]\nlength = 100\n");
+    let arguments = [
+        "diagnose", "d.csv", "--setup", "s.toml", "--model", "fourier",
+    ];
+    bad_input(&folder, &arguments, &["d.csv:95:"]);
+}
+
+#[test]
+fn form_beyond_the_orders_is_told_with_what_it_does_to_the_joint() {
+    // A wave of 45 undulations: 3 µm from peak to mean, beyond the 30 orders kept by default.
+    let rows: String = (0..=200)
+        .map(|k| {
+            let x = 0.5 * f64::from(k);
+            let f = |x: f64| 3.0 * (std::f64::consts::TAU * 45.0 * x / 100.0).sin();
+            let jitter =
+                |i: f64| ((12.9898 * f64::from(k) + 78.233 * i).sin() * 43_758.545).fract();
+            let (m1, m2, m3) = (
+                f(x) + jitter(1.0),
+                f(x + 34.0) + jitter(2.0),
+                f(x - 66.0) + jitter(3.0),
+            );
+            format!("34,{x},{m1},{m2},{m3}\n")
+        })
+        .collect();
+    let folder = Folder::with(&[("d.csv", &format!("spacing,x,m1,m2,m3\n{rows}"))]);
+    let arguments = ["fourier", "d.csv", "--length", "100"];
+    let answer = json(&folder, &[&arguments[..], &["--format", "json"]].concat());
+    // Tolerance: truncation; 3/√2 µm rms and what order 45 passes at d = 34, |T|²/2 = 1.31.
+    let rms = answer["beyond_orders"]["rms"].as_f64().unwrap();
+    let passed = 3.0 * (1.0 - (std::f64::consts::TAU * 45.0 * 0.34).cos()).sqrt() / 2f64.sqrt();
+    assert!((rms / passed - 1.0).abs() < 0.1, "{rms} {passed}");
+    assert_eq!(answer["compensation"], "chord");
+    let text = run(&folder, &arguments).stdout;
+    for part in ["finer than the 30 orders", "not fitted"] {
+        assert!(text.contains(part), "{text}");
+    }
+    folder.write("s.toml", "[section]\nlength = 100\norders = 50\n");
+    let arguments = ["fourier", "d.csv", "--setup", "s.toml", "--format", "json"];
+    let answer = json(&folder, &arguments);
+    assert!(answer["beyond_orders"].is_null());
+    assert_eq!(answer["compensation"], "fitted");
+    crate::command::documented(&answer, "docs/json/fourier.md");
+}
+
+/// What a simulation writes can be worked with as it stands, by the command that it names; without noise
+/// none is told.
+#[test]
+fn a_simulation_writes_its_set_up() {
+    for (noise, stated) in [("0.7", true), ("0", false)] {
+        let folder = Folder::with(&[]);
+        let out = run(
+            &folder,
+            &[
+                "simulate",
+                "fourier",
+                "--samples",
+                "200",
+                "--length",
+                "120",
+                "--noise",
+                noise,
+                "--out",
+                "made",
+            ],
+        );
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        let next = "errsep fourier made/scans.csv --setup made/setup.toml";
+        assert!(out.stdout.contains(next), "{}", out.stdout);
+        assert_eq!(folder.read("made/setup.toml").contains("noise"), stated);
+        let arguments: Vec<&str> = next
+            .split(' ')
+            .skip(1)
+            .chain(["--format", "json"])
+            .collect();
+        let answer = json(&folder, &arguments);
+        let positions = numbers(&answer, "/profiles/x");
+        assert_eq!(positions.len(), 200);
+        assert!((positions[199] - 120.0 * 199.0 / 200.0).abs() < 1e-9);
+        if stated {
+            assert_eq!(answer["noise"]["source"], "given");
+            assert_eq!(answer["noise"]["value"], 0.7);
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! Every command as a person runs it: answers, figures of papers and certificates, files.
+
+mod anova;
+mod batch;
+mod circle;
+#[path = "../command/mod.rs"]
+mod command;
+mod diagnose;
+mod export;
+#[path = "../../models/tests/faulty_machine/mod.rs"]
+#[allow(dead_code, reason = "each test file uses its part")]
+mod faulty_machine;
+mod four_sensor;
+mod fourier;
+mod machine;
+mod measured_reversals;
+mod parts_of_nistir;
+mod positioning;
+mod report;
+mod reversal;
+mod spindle_bar;
+mod step_diagonal;
+mod with_effects;

@@ -1,0 +1,19 @@
+//! The diagnosis, on data whose cause is known and withheld.
+
+mod agreement;
+#[path = "../command/mod.rs"]
+mod command;
+mod effect_signatures;
+mod invariance;
+mod models;
+mod noise;
+#[path = "../other_models/mod.rs"]
+mod other_models;
+mod positions;
+#[path = "../realisations/mod.rs"]
+mod realisations;
+#[path = "../scene/mod.rs"]
+mod scene;
+mod several_ways;
+mod single_effects;
+mod together;

@@ -1,0 +1,122 @@
+//! The diagnosis of a reversal against effects as machines have them: amplitudes by indicator, jumps
+//! that last, curvature of one, fast cycles, bumps of either sign.
+
+use crate::realisations::{measured, nothing};
+use errsep::diagnosis::{Diagnosis, Kind, Options, diagnose};
+use errsep_models::model::FittedModel;
+use errsep_models::reversal::Observations;
+use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use rayon::prelude::*;
+
+const POSITIONS: usize = 60;
+
+fn diagnosed(readings: &Observations) -> Diagnosis {
+    let model = FirstOrder::new(readings, Assumptions::default()).unwrap();
+    let options = Options {
+        draws: 200,
+        ..Options::default()
+    };
+    diagnose(&model, &options)
+}
+
+/// Every cause that is named has a size beyond twice its standard uncertainty.
+fn stands(diagnosis: &Diagnosis) {
+    let model = FirstOrder::new(&nothing(1, 20), Assumptions::default()).unwrap();
+    let catalogue = model.effects();
+    for name in &diagnosis.verdict.effects {
+        let cause = diagnosis.candidates.iter().find(|c| c.effect == *name);
+        let effect = catalogue.iter().find(|e| e.name() == name).unwrap();
+        let shapes = effect.shape_parameters();
+        let sizes = &cause.unwrap().parameters;
+        assert!(
+            sizes
+                .iter()
+                .filter(|size| shapes.iter().all(|shape| shape.name != size.name))
+                .any(|size| size.value.abs() > 2.0 * size.std),
+            "{name}: {sizes:?}"
+        );
+    }
+}
+
+/// Named, alone or in a group of what these readings cannot tell from it, and nothing beside it.
+#[test]
+fn effects_as_machines_have_them_are_named() {
+    let cases = [
+        ("thermal-drift", 0),
+        ("thermal-drift", 1),
+        ("thermal-drift", 3),
+        ("indicator-nonlinearity", 0),
+        ("indicator-nonlinearity", 1),
+        ("indicator-nonlinearity", 2),
+        ("zero-jump", 0),
+        ("zero-jump", 2),
+        ("cyclic-error", 0),
+        ("cyclic-error", 1),
+        ("cyclic-error", 2),
+        ("local-contamination", 1),
+        ("local-contamination", 2),
+        ("hysteresis", 1),
+        ("hysteresis", 2),
+        ("lateral-backlash", 1),
+        ("ambient-cycle", 1),
+        ("off-crest", 0),
+        ("indicator-nonlinearity", 4),
+        ("lateral-backlash", 4),
+        ("lateral-backlash", 5),
+        ("off-crest", 4),
+        ("axis-backlash", 1),
+    ];
+    let told: Vec<String> = cases
+        .par_iter()
+        .filter_map(|&(effect, way)| {
+            // Times alternate between the spindle positions where the seed is even.
+            let readings = measured(effect, way, 1.5, 4, POSITIONS).unwrap();
+            let diagnosis = diagnosed(&readings);
+            stands(&diagnosis);
+            let verdict = &diagnosis.verdict;
+            let groups = verdict.causes();
+            let right =
+                verdict.kind == Kind::Effect && groups.len() == 1 && groups[0].contains(&effect);
+            (!right).then(|| format!("{effect} {way}: {}", verdict.statement))
+        })
+        .collect();
+    assert!(told.is_empty(), "{told:#?}");
+}
+
+/// One reading position that differs in one channel is a bump of unknown width, or a bump between two
+/// readings; whatever is said of it, no size within its own uncertainty is named.
+#[test]
+fn what_lies_within_its_own_uncertainty_is_not_named() {
+    (0..12u64).into_par_iter().for_each(|seed| {
+        let mut readings = nothing(seed, POSITIONS);
+        let places: Vec<f64> = readings.readings[..2 * POSITIONS]
+            .iter()
+            .map(|r| r.x)
+            .collect();
+        let at = places[2 * (10 + 3 * seed as usize)];
+        let beside = places[2 * (11 + 3 * seed as usize)];
+        for reading in &mut readings.readings {
+            if reading.channel.name() == "1A" {
+                let lift = 0.3 * f64::from(u8::from(reading.x == at));
+                let less = 0.1 * f64::from(u8::from(seed % 2 == 0 && reading.x == beside));
+                reading.value += lift + less;
+            }
+        }
+        stands(&diagnosed(&readings));
+    });
+}
+
+/// A half turn that is not quite half a turn goes into the parallelism, by half of what shows.
+#[test]
+fn the_harm_of_an_indexing_error_is_told() {
+    let hidden = diagnosed(&nothing(3, POSITIONS)).hidden;
+    let own = hidden
+        .iter()
+        .find(|h| h.effect == "indexing-error")
+        .unwrap();
+    assert!(own.detectable.is_none());
+    let harm = own.harm.as_ref().unwrap();
+    assert_eq!(harm.quantity, "alpha");
+    // Epsilons: sums over 60 positions of weights that are normed to one.
+    assert!((harm.per_unit + 0.5).abs() < 1e-12, "{harm:?}");
+}

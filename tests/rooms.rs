@@ -3,13 +3,14 @@
 use std::path::Path;
 
 /// In the order in which they work; what is on one level may not know each other either.
-const ORDER: [&[&str]; 6] = [
+const ORDER: [&[&str]; 7] = [
     &["search", "options", "levels"],
     &["noise"],
     &["detection"],
     &["attribution"],
     &["planning"],
     &["verdict", "catalogue"],
+    &["joined"],
 ];
 
 fn level(room: &str) -> Option<usize> {

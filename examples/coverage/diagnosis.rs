@@ -3,7 +3,7 @@
 //! from 1.5 to 6 times what such data show.
 
 #[path = "../../tests/other_models/mod.rs"]
-mod other_models;
+pub mod other_models;
 #[path = "../../tests/scene/mod.rs"]
 mod scene;
 

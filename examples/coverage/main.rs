@@ -12,6 +12,7 @@ mod circle;
 mod diagnosis;
 mod four_sensor;
 mod fourier;
+mod joined;
 mod machine;
 mod positioning;
 mod reversal;
@@ -31,6 +32,7 @@ type Room = (&'static str, u64, fn(u64) -> Vec<Row>);
 const ROOMS: &[Room] = &[
     ("reversal", 2000, reversal::rows),
     ("with", 200, with::rows),
+    ("joined", 400, joined::rows),
     ("staged", 2000, staged::rows),
     ("circle", 2000, circle::rows),
     ("four-sensor", 400, four_sensor::rows),

@@ -9,6 +9,7 @@ use errsep_models::circle::{
 };
 use serde_json::{Value, json};
 
+use super::diagnose::joined::{self, Given};
 use super::quantity::{measured_words, quantity_json, unexpandable};
 use super::{Answer, CommonArgs};
 use crate::io::circle::read_points;
@@ -36,6 +37,10 @@ pub struct Args {
     /// Adds the fit as NISTIR 6868, appendix F, makes it.
     #[arg(long)]
     nistir: bool,
+    /// Fit these effects along with the model, by the names of `errsep diagnose`: the answer is given without
+    /// and with them, with one covariance.
+    #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
+    with: Vec<String>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
@@ -83,7 +88,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             }),
         );
     }
-    Ok(Answer {
+    let answer = Answer {
         text: in_words(args, &points, &fit, form.as_deref(), &zones_found, &others)?,
         json,
         page: page(&CircleView {
@@ -107,7 +112,14 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         setup: None,
         seed: None,
         status: Status::Done,
-    })
+    };
+    joined::beside(
+        answer,
+        &Given {
+            noise: args.noise,
+            ..Given::to("circle", &args.points, &args.with, &args.common)
+        },
+    )
 }
 
 fn refused(error: &CircleError, args: &Args) -> Message {

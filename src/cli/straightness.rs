@@ -19,11 +19,17 @@ The file has the columns x (position, mm) and deviation (um):
     0,-0.3
     100,0.9
 
-Example: errsep straightness profile.csv --out straightness")]
+Other units stand beside the names: `x (inch)`, `deviation_mm`.
+
+Example: errsep straightness profile.csv --out straightness
+         errsep straightness report/profiles.csv --of M")]
 pub struct Args {
     /// The profile.
     #[arg(value_name = "PROFILE.csv")]
     profile: PathBuf,
+    /// The column with the deviations, where other columns stand beside it: a form of `profiles.csv`.
+    #[arg(long, value_name = "COLUMN")]
+    of: Option<String>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
@@ -33,7 +39,7 @@ pub struct Args {
 /// # Errors
 /// The file is no table of positions and deviations.
 pub fn run(args: &Args) -> Result<Answer, Message> {
-    let (x, y) = read(&args.profile)?;
+    let (x, y) = read(&args.profile, args.of.as_deref())?;
     let results = ReferenceLine::ALL
         .into_iter()
         .map(|reference| straightness(&x, &y, reference))
@@ -92,10 +98,15 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     })
 }
 
-fn read(path: &Path) -> Result<(Vec<f64>, Vec<f64>), Message> {
+fn read(path: &Path, of: Option<&str>) -> Result<(Vec<f64>, Vec<f64>), Message> {
     let mut table = TableReader::open(path)?;
-    table.only(&["x", "deviation"])?;
-    let (at, deviation) = (table.column("x")?, table.column("deviation")?);
+    if of.is_none() {
+        table.only(&["x", "deviation"]).map_err(|message| {
+            message.remedy("name the column of the deviations with --of, such as --of M")
+        })?;
+    }
+    let at = table.column("x")?.in_mm();
+    let deviation = table.column(of.unwrap_or("deviation"))?.in_um();
     let (mut x, mut y) = (Vec::new(), Vec::new());
     while let Some(row) = table.next_row()? {
         x.push(row.number(&at)?);

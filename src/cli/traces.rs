@@ -10,7 +10,7 @@ use serde_json::json;
 use super::{Answer, CommonArgs};
 use crate::io::reversal::ColumnMap;
 use crate::io::units::LengthUnit;
-use crate::io::{CsvTable, Message, Status, TableReader};
+use crate::io::{Column, CsvTable, Message, Status, TableReader};
 use crate::report::number::{measured, plain};
 use crate::report::plot::{Axis, Chart, Series};
 use crate::report::{Figure, KeyFigure, Page, Section, Standing};
@@ -101,9 +101,12 @@ fn read(path: &Path, map: &ColumnMap) -> Result<Vec<Sample>, Message> {
         table.only(&["time", "x", "reading"])?;
     }
     let needed = |role: &'static str| table.column(map.column(role).unwrap_or(role));
-    let (time, x, reading) = (needed("time")?, needed("x")?, needed("reading")?);
-    let x_mm = map.unit("x").unwrap_or(LengthUnit::Mm).in_mm();
-    let reading_um = map.unit("reading").unwrap_or(LengthUnit::Um).in_um();
+    let time = needed("time")?.in_s();
+    let (x, reading) = (needed("x")?, needed("reading")?);
+    let own = |role: &str, column: &Column| map.unit(role).or(column.length_unit());
+    let x_mm = own("x", &x).unwrap_or(LengthUnit::Mm).in_mm();
+    let reading_um = own("reading", &reading).unwrap_or(LengthUnit::Um).in_um();
+    let (x, reading) = (x.as_written(), reading.as_written());
     let mut samples: Vec<Sample> = Vec::new();
     while let Some(row) = table.next_row()? {
         let sample = Sample {

@@ -7,6 +7,7 @@
 mod attribution;
 mod catalogue;
 mod detection;
+mod joined;
 mod levels;
 mod noise;
 mod options;
@@ -23,6 +24,7 @@ pub use attribution::shrink::{HeldOut, Size};
 pub use catalogue::formula::{Circumstances, Formula};
 pub use catalogue::tabulated::{Tabulated, TabulatedEffects};
 use detection::estimate::estimate;
+pub use joined::{Joined, JoinedEffect, JoinedGap, JoinedProfile, NotJoined, joined};
 pub use noise::law::{NoiseLaw, NoiseSource};
 use noise::spikes::Spikes;
 pub use options::Options;

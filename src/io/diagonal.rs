@@ -10,7 +10,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::message::list;
-use super::{Message, SetupFile, TableReader};
+use super::{Column, Message, SetupFile, TableReader};
 
 /// The set-up of a step-diagonal test.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -142,9 +142,12 @@ pub fn read_readings(
     ])?;
     let diagonal = table.column("diagonal")?;
     let sequence = table.column("sequence")?;
-    let (x, y) = (table.column("x")?, table.column("y")?);
-    let reading = table.column("reading")?;
-    let (z, repeat) = (table.optional("z"), table.optional("repeat"));
+    let (x, y) = (table.column("x")?.in_mm(), table.column("y")?.in_mm());
+    let reading = table.column("reading")?.in_um();
+    let (z, repeat) = (
+        table.optional("z").map(Column::in_mm),
+        table.optional("repeat"),
+    );
     let own_target = table.optional("target");
     let direction = table.optional("direction");
     let mut rows = Vec::new();

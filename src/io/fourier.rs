@@ -10,7 +10,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::message::Place;
-use super::{Message, SetupFile, TableReader};
+use super::{Column, Message, SetupFile, TableReader};
 
 /// The set-up of a Fourier separation.
 #[derive(Debug, Clone, Default)]
@@ -220,9 +220,13 @@ pub fn told(error: &FourierError) -> Message {
 pub fn read_scans(path: &Path, given: Option<f64>) -> Result<Vec<LocatedScan>, Message> {
     let mut table = TableReader::open(path)?;
     table.only(&["x", "m1", "m2", "m3", "spacing", "repeat"])?;
-    let (x, m1, m2) = (table.column("x")?, table.column("m1")?, table.column("m2")?);
-    let (m3, repeat) = (table.optional("m3"), table.optional("repeat"));
-    let spacing = table.optional("spacing");
+    let x = table.column("x")?.in_mm();
+    let (m1, m2) = (table.column("m1")?.in_um(), table.column("m2")?.in_um());
+    let (m3, repeat) = (
+        table.optional("m3").map(Column::in_um),
+        table.optional("repeat"),
+    );
+    let spacing = table.optional("spacing").map(Column::in_mm);
     if spacing.is_none() && given.is_none() {
         return Err(table.in_header(0, "the probe spacing is not known").remedy(
             "add a column `spacing` (mm), or give [probe] spacing in the set-up, one number a file",

@@ -15,7 +15,7 @@ use toml::Spanned;
 
 use super::message::{Message, nearest};
 use super::setup::SetupFile;
-use super::table::TableReader;
+use super::table::{Column, TableReader};
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -382,10 +382,10 @@ pub fn read_points(path: &Path) -> Result<Vec<(String, Position)>, Message> {
     table.only(&["point", "x", "y", "z"])?;
     let (point, x, y) = (
         table.column("point")?,
-        table.column("x")?,
-        table.column("y")?,
+        table.column("x")?.in_mm(),
+        table.column("y")?.in_mm(),
     );
-    let z = table.optional("z");
+    let z = table.optional("z").map(Column::in_mm);
     let mut points: Vec<(String, Position)> = Vec::new();
     let mut names = std::collections::HashSet::new();
     while let Some(row) = table.next_row()? {

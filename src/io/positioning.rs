@@ -276,7 +276,19 @@ struct Columns {
 
 impl Columns {
     fn of(table: &TableReader, kind: AxisKind, unit: LengthUnit) -> Result<Self, Message> {
-        let (position, deviation) = (table.optional("position"), table.optional("deviation"));
+        // Degrees are not converted.
+        let length = |column: Column| match kind {
+            AxisKind::Linear => column.in_unit(unit),
+            AxisKind::Rotary => column,
+        };
+        let deviation = |column: Column| match kind {
+            AxisKind::Linear => column.in_um(),
+            AxisKind::Rotary => column,
+        };
+        let (position, deviation) = (
+            table.optional("position").map(length),
+            table.optional("deviation").map(deviation),
+        );
         let (value, is_position) = match (position, deviation) {
             (Some(position), None) => (position, true),
             (None, Some(deviation)) => (deviation, false),
@@ -285,14 +297,14 @@ impl Columns {
                     .at_column(&both, "there are both `position` and `deviation`")
                     .remedy("keep one of the two: a deviation is the position less its target"));
             }
-            (None, None) => (table.column("position")?, true),
+            (None, None) => (length(table.column("position")?), true),
         };
         let (position_scale, deviation_scale) = match kind {
             AxisKind::Linear => (unit.in_mm(), super::units::UM_PER_MM),
             AxisKind::Rotary => (1.0, ARCSEC_PER_DEG),
         };
         Ok(Self {
-            target: table.column("target")?,
+            target: length(table.column("target")?),
             value,
             is_position,
             run: table.optional("run"),

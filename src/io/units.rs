@@ -55,11 +55,13 @@ pub enum LengthUnit {
     M,
     /// Inch, 25.4 mm.
     Inch,
+    /// Millionth of an inch.
+    Microinch,
 }
 
 impl LengthUnit {
     /// The names that files and options may use.
-    pub const NAMES: [&'static str; 5] = ["nm", "um", "mm", "m", "inch"];
+    pub const NAMES: [&'static str; 6] = ["nm", "um", "mm", "m", "inch", "uinch"];
 
     /// The unit of a name (`um` and `µm` both mean micrometre).
     pub fn from_name(name: &str) -> Option<Self> {
@@ -69,6 +71,7 @@ impl LengthUnit {
             "mm" => Some(Self::Mm),
             "m" => Some(Self::M),
             "inch" | "in" => Some(Self::Inch),
+            "uinch" | "uin" | "µinch" | "µin" | "μinch" | "μin" => Some(Self::Microinch),
             _ => None,
         }
     }
@@ -81,6 +84,7 @@ impl LengthUnit {
             Self::Mm => 1.0,
             Self::M => 1e3,
             Self::Inch => 25.4,
+            Self::Microinch => 25.4e-6,
         }
     }
 
@@ -92,6 +96,7 @@ impl LengthUnit {
             Self::Mm => 1e3,
             Self::M => 1e6,
             Self::Inch => 25_400.0,
+            Self::Microinch => 0.0254,
         }
     }
 }

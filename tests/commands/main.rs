@@ -21,3 +21,4 @@ mod reversal;
 mod spindle_bar;
 mod step_diagonal;
 mod with_effects;
+mod with_other_models;

@@ -212,7 +212,7 @@ fn the_way_back_gives_the_reversals() {
     bad_input(
         &Folder::with(&[]),
         &["simulate", "step-diagonal", "--reversal", "1"],
-        &["--backward"],
+        &["--both-directions"],
     );
 }
 

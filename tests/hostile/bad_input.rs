@@ -168,8 +168,11 @@ fn wrong_fields() {
         ),
         (
             "1A,1,forward,2",
-            "1a,1,forward,2",
-            ["data.csv:5:1: unknown channel `1a`", "write `1A`"],
+            "3A,1,forward,2",
+            [
+                "data.csv:5:1: unknown channel `3A`",
+                "write 1A, 1B, 2A or 2B",
+            ],
         ),
         (
             "1A,1,forward,2",

@@ -14,3 +14,4 @@ mod not_solved;
 mod out_folder;
 mod refusal;
 mod refused_figures;
+mod units;

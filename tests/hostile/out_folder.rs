@@ -52,7 +52,7 @@ fn a_command_does_not_write_over_its_own_input() {
     assert_eq!(folder.read("d/readings.csv"), before);
     assert_eq!(
         names(&folder, "d"),
-        ["readings.csv", "report.html", "result.json"]
+        ["readings.csv", "report.html", "result.json", "setup.toml"]
     );
     // Asked to, it replaces the report and still keeps what it has read.
     done(&folder, &[&solve[..], &["--force"]].concat());

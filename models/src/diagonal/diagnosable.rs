@@ -1,16 +1,17 @@
 //! The regression of step-diagonal readings, laid open to the diagnosis.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DVector};
 
+use super::answers::Answers;
 use super::design::{Design, is_definition};
 use super::effects;
 use super::prediction::{Parameter, sensitivities};
 use super::readings::{DiagonalError, DiagonalReading, check, check_noise};
 use super::{Component, Diagonal, Sequence, Target, Travel, WorkZone};
-use crate::model::{Effect, FittedModel, Freedom, Place, Record};
+use crate::model::{Effect, FittedModel, Freedom, Place, Profile, Quantity, Record};
 
 /// Readings whose laser was on one diagonal with one target, in one order of motions.
 type Channel = (Diagonal, Target, Sequence);
@@ -25,6 +26,9 @@ pub struct DiagonalRuns {
     channels: Vec<Channel>,
     record: Record,
     columns: Arc<DMatrix<f64>>,
+    design: Arc<Design>,
+    /// Worked out when they are first asked for.
+    answers: Arc<OnceLock<Answers>>,
     terms: Arc<Vec<Terms>>,
     duration: f64,
     noise: Option<f64>,
@@ -90,6 +94,7 @@ impl DiagonalRuns {
         let unknowns = design.matrix.ncols();
         let mut columns = design
             .matrix
+            .clone()
             .resize_horizontally(unknowns + traces.len(), 0.0);
         for (k, trace) in traces.iter().enumerate() {
             for row in trace.clone() {
@@ -100,6 +105,8 @@ impl DiagonalRuns {
             zone: *zone,
             channels,
             columns: Arc::new(columns),
+            design: Arc::new(design),
+            answers: Arc::default(),
             terms: Arc::new(
                 ordered
                     .iter()
@@ -129,6 +136,12 @@ impl DiagonalRuns {
     /// Σ weight(parameter) · sensitivity of a reading, µm.
     pub(super) fn weighted(&self, row: usize, weight: impl Fn(&Parameter) -> f64) -> f64 {
         self.terms[row].iter().map(|(p, s)| weight(p) * s).sum()
+    }
+
+    /// What the readings determine; nothing where that cannot be worked out.
+    fn answers(&self) -> &Answers {
+        self.answers
+            .get_or_init(|| Answers::of(&self.zone, &self.design).unwrap_or_default())
     }
 
     /// Steps on each axis.
@@ -172,6 +185,30 @@ impl FittedModel for DiagonalRuns {
                     (true, Target::RetroReflector) => " retro-reflector",
                 };
                 format!("{} {}{on}", diagonal.name(), sequence.name())
+            })
+            .collect()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        let locations = self.answers().locations.iter();
+        locations
+            .map(|(location, weights)| Quantity {
+                name: location.name().to_owned(),
+                unit: "rad",
+                weights: weights.clone(),
+            })
+            .collect()
+    }
+
+    fn profiles(&self) -> Vec<Profile> {
+        let functions = self.answers().functions.iter();
+        functions
+            .map(|f| Profile {
+                name: f.component.name(),
+                unit: if f.component.rotation { "rad" } else { "um" },
+                positions: f.positions.clone(),
+                values: &f.weights * self.observed(),
+                noise_gain: f.weights.norm() / (f.positions.len() as f64).sqrt(),
             })
             .collect()
     }

@@ -8,6 +8,7 @@
 //!
 //! Positions are in mm from corner A of the work zone, readings and translations in µm, angles in rad.
 
+mod answers;
 mod closed_forms;
 mod components;
 mod design;

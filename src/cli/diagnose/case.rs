@@ -26,6 +26,9 @@ impl<M: FittedModel> Case<M> {
     /// Diagnoses the case.
     pub(super) fn answer(self, args: &Args) -> Result<Answer, Message> {
         within_reach_of(&self.model, self.along, &args.data)?;
+        if !args.with.is_empty() {
+            return self.with_effects(args);
+        }
         let catalogue = catalogue(args, &self.model)?;
         let known: Vec<String> = catalogue.iter().map(|e| e.name().to_owned()).collect();
         if let Some(name) = args.without.iter().find(|n| !known.contains(n)) {
@@ -96,7 +99,11 @@ impl<M: FittedModel> Case<M> {
             text,
             json,
             page: sheet::page(&view),
-            tables: vec![residuals(&self.model, &diagnosis)],
+            tables: vec![residuals(
+                &self.model,
+                &diagnosis.detail.before,
+                &diagnosis.detail.after,
+            )],
             inputs,
             setup: None,
             seed: Some(args.common.seed),
@@ -106,7 +113,10 @@ impl<M: FittedModel> Case<M> {
 }
 
 /// The model's effects and the user's own.
-fn catalogue<M: FittedModel>(args: &Args, model: &M) -> Result<Vec<Box<dyn Effect<M>>>, Message> {
+pub(super) fn catalogue<M: FittedModel>(
+    args: &Args,
+    model: &M,
+) -> Result<Vec<Box<dyn Effect<M>>>, Message> {
     let mut catalogue = model.effects();
     let Some(path) = &args.effects else {
         return Ok(catalogue);
@@ -136,7 +146,7 @@ fn catalogue<M: FittedModel>(args: &Args, model: &M) -> Result<Vec<Box<dyn Effec
 }
 
 /// What the fit leaves of every reading, without and with the effects.
-fn residuals<M: FittedModel>(model: &M, diagnosis: &Diagnosis) -> CsvTable {
+pub(super) fn residuals<M: FittedModel>(model: &M, before: &[f64], after: &[f64]) -> CsvTable {
     let places = model.places();
     let numbers = |value: fn(&Place) -> f64| -> Vec<f64> { places.iter().map(value).collect() };
     let suffix = |unit: &str| match unit {
@@ -156,6 +166,6 @@ fn residuals<M: FittedModel>(model: &M, diagnosis: &Diagnosis) -> CsvTable {
         .numbers("repeat", numbers(|p| f64::from(p.repeat)))
         .numbers("direction", numbers(|p| p.direction))
         .numbers(format!("x{x}"), numbers(|p| p.x))
-        .numbers(format!("before{reading}"), diagnosis.detail.before.clone())
-        .numbers(format!("after{reading}"), diagnosis.detail.after.clone())
+        .numbers(format!("before{reading}"), before.to_vec())
+        .numbers(format!("after{reading}"), after.to_vec())
 }

@@ -34,6 +34,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         None => Setup::default(),
     };
     super::positive(setup.circle.noise, "[circle] noise", args)?;
+    let noise = args.noise.or(setup.circle.noise);
     let points = read(&args.data)?;
     if points.len() > MOST {
         return Err(Message::bad_input(format!(
@@ -48,7 +49,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         super::within_reach("a coordinate", point.x, &at, args)?;
         super::within_reach("a coordinate", point.y, &at, args)?;
     }
-    let model = CirclePoints::new(&points, setup.circle.noise).map_err(|e| {
+    let model = CirclePoints::new(&points, noise).map_err(|e| {
         let message = match e {
             CircleError::StraighterThanAnyCircle => Message::not_determined(e.to_string()),
             CircleError::NotConverged { .. } => Message::not_converged(e.to_string()),
@@ -76,7 +77,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
 fn read(path: &Path) -> Result<Vec<(Point, u32)>, Message> {
     let mut table = TableReader::open(path)?;
     table.only(&["x", "y", "repeat"])?;
-    let (x, y) = (table.column("x")?, table.column("y")?);
+    let (x, y) = (table.column("x")?.in_mm(), table.column("y")?.in_mm());
     let repeat = table.optional("repeat");
     let mut points = Vec::new();
     while let Some(row) = table.next_row()? {

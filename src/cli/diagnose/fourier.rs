@@ -18,7 +18,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         None => FourierSetup::default(),
     };
     super::positive(setup.probe.noise, "[probe] noise", args)?;
-    let length = setup.section.length.ok_or_else(|| {
+    let length = args.length.or(setup.section.length).ok_or_else(|| {
         Message::bad_input("the length of the section is not known")
             .in_file(args.setup.as_ref().unwrap_or(&args.data))
             .remedy("give [section] length in the set-up, with --setup")

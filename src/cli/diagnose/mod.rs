@@ -8,6 +8,7 @@ mod case;
 mod circle;
 mod four_sensor;
 mod fourier;
+pub(in crate::cli) mod joined;
 mod machine;
 pub(super) mod page;
 mod recognise;
@@ -29,6 +30,7 @@ use crate::io::reversal::ColumnMap;
 #[command(after_help = "\
 Example: errsep diagnose readings.csv --out diagnosis
          errsep diagnose readings.csv --without taper --prove 200
+         errsep diagnose parts.csv --setup machine.toml --points points.csv --with temperature
 
 A file for --effects has one table an effect:
 
@@ -61,6 +63,14 @@ pub struct Args {
     /// Leave an effect out of the catalogue; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
+    /// Seek nothing: fit these effects along with the model, with one covariance, by their names.
+    #[arg(
+        long,
+        value_name = "EFFECT,...",
+        value_delimiter = ',',
+        conflicts_with_all = ["without", "prove", "false_alarm"]
+    )]
+    with: Vec<String>,
     /// Add the effects of this file (tables of signatures, formulas) to the catalogue.
     #[arg(long, value_name = "EFFECTS.toml")]
     effects: Option<PathBuf>,
@@ -71,6 +81,12 @@ pub struct Args {
     /// was right.
     #[arg(long, value_name = "N")]
     prove: Option<usize>,
+    /// Noise of a reading that an option of the model's own command states, µm.
+    #[arg(skip)]
+    noise: Option<f64>,
+    /// Length of a section, likewise, mm.
+    #[arg(skip)]
+    length: Option<f64>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }

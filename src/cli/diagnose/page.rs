@@ -3,7 +3,7 @@
 use errsep_models::model::{FittedModel, Place};
 
 use super::words::{harm_in_words, moved, shown};
-use crate::diagnosis::{Diagnosis, Kind, for_people};
+use crate::diagnosis::{Diagnosis, Joined, JoinedEffect, Kind, ParameterOut, for_people};
 use crate::report::diagnosis as sheet;
 
 pub fn view<M: FittedModel>(
@@ -16,9 +16,7 @@ pub fn view<M: FittedModel>(
         rms: s.rms,
         ci95: s.ci95,
     };
-    let channels = model.channel_names();
     let gap = &diagnosis.gap;
-    let rows = RowNames::of(model.places());
     let profiles = model.profiles();
     sheet::View {
         data,
@@ -40,18 +38,7 @@ pub fn view<M: FittedModel>(
         places: diagnosis.places.iter().map(place).collect(),
         candidates: diagnosis.candidates.iter().map(candidate).collect(),
         groups: groups(diagnosis),
-        residuals: model
-            .places()
-            .iter()
-            .zip(diagnosis.detail.before.iter().zip(&diagnosis.detail.after))
-            .map(|(p, (before, after))| sheet::Residual {
-                panel: channels.get(p.channel).cloned().unwrap_or_default(),
-                row: model.trace_name(p).unwrap_or_else(|| rows.name(p)),
-                x: p.x,
-                before: *before,
-                after: *after,
-            })
-            .collect(),
+        residuals: residuals(model, &diagnosis.detail.before, &diagnosis.detail.after),
         x: (along.to_owned(), model.position_unit().to_owned()),
         shifts: diagnosis.bias.iter().map(shift).collect(),
         profiles: diagnosis
@@ -70,6 +57,82 @@ pub fn view<M: FittedModel>(
         notes: diagnosis.notes.clone(),
         trials: None,
     }
+}
+
+/// What the page shows of a fit that effects have joined; the statement is the caller's.
+pub(super) fn of_fit<M: FittedModel>(
+    data: String,
+    model: &M,
+    along: &str,
+    fit: &Joined,
+) -> sheet::View {
+    let size = |s: crate::diagnosis::Size| sheet::Size {
+        rms: s.rms,
+        ci95: s.ci95,
+    };
+    let gap = &fit.gap;
+    sheet::View {
+        data,
+        finding: sheet::Finding::Effect,
+        taken_out: fit.effects.iter().map(|e| e.effect.clone()).collect(),
+        gap: sheet::Gap {
+            unit: for_people(gap.unit).to_owned(),
+            noise: gap.noise,
+            before: size(gap.before),
+            after: size(gap.after),
+            shrink: gap.shrink,
+            held_out: gap.held_out.map(|h| (h.before, h.after)),
+        },
+        candidates: fit.effects.iter().map(fitted).collect(),
+        residuals: residuals(model, &fit.before, &fit.after),
+        x: (along.to_owned(), model.position_unit().to_owned()),
+        shifts: fit.quantities.iter().map(shift).collect(),
+        profiles: fit
+            .profiles
+            .iter()
+            .map(|profile| sheet::Profile {
+                name: profile.name.clone(),
+                x: profile.x.clone(),
+                before: profile.before.clone(),
+                after: profile.after.clone(),
+            })
+            .collect(),
+        notes: fit.notes.clone(),
+        ..sheet::View::default()
+    }
+}
+
+/// An effect of a fit.
+fn fitted(effect: &JoinedEffect) -> sheet::Candidate {
+    let told = effect.parameters.iter().map(ParameterOut::told);
+    sheet::Candidate {
+        effect: effect.effect.clone(),
+        variant: effect.variant.clone(),
+        p_value: effect.p_value,
+        visible: effect.visible,
+        named: true,
+        parameters: told.map(|t| (t.name, t.value, t.std, t.unit)).collect(),
+        ..sheet::Candidate::default()
+    }
+}
+
+fn residuals<M: FittedModel>(model: &M, before: &[f64], after: &[f64]) -> Vec<sheet::Residual> {
+    let channels = model.channel_names();
+    let rows = RowNames::of(model.places());
+    let pairs = before.iter().zip(after);
+    model
+        .places()
+        .iter()
+        .zip(pairs)
+        .map(|(p, (before, after))| sheet::Residual {
+            panel: channels.get(p.channel).cloned().unwrap_or_default(),
+            row: model.trace_name(p).unwrap_or_else(|| rows.name(p)),
+            x: p.x,
+            time: p.time,
+            before: *before,
+            after: *after,
+        })
+        .collect()
 }
 
 /// Which of a trace's circumstances tell it from others.

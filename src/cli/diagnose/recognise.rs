@@ -90,7 +90,7 @@ pub(super) fn model(args: &Args) -> Result<&'static Model, Message> {
         return Ok(&MODELS[0]);
     }
     let table = TableReader::open(&args.data)?;
-    let found: Vec<&str> = table.names().collect();
+    let found: Vec<&str> = table.bare_names().collect();
     let tables = args
         .setup
         .as_deref()

@@ -147,7 +147,7 @@ pub(super) fn moved(bias: &Bias) -> Told {
 }
 
 /// Four digits with a hyphen for a minus, as terminals show it.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     plain(value, 4).replace('\u{2212}', "-")
 }
 

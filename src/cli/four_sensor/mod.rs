@@ -14,6 +14,7 @@ use errsep_models::four_sensor::{
 };
 use errsep_models::uncertainty::DegreesOfFreedom;
 
+use super::diagnose::joined::{self, Given};
 use super::{Answer, CommonArgs};
 use crate::io::{CsvTable, Message, SetupFile, Status};
 use read::Measured;
@@ -49,6 +50,10 @@ pub struct Args {
     /// The set-up.
     #[arg(long, value_name = "SETUP.toml")]
     setup: PathBuf,
+    /// Fit these effects along with the model, by the names of `errsep diagnose`: the answer is given without
+    /// and with them, with one covariance.
+    #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
+    with: Vec<String>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
@@ -169,7 +174,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         measured,
         setup,
     };
-    Ok(Answer {
+    let answer = Answer {
         text: words::text(&found, &args.data)?,
         json: json::json(&found)?,
         page: page::page(&found, &args.data)?,
@@ -178,7 +183,14 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         inputs: vec![args.data.clone(), args.setup.clone()],
         seed: None,
         status: Status::Done,
-    })
+    };
+    joined::beside(
+        answer,
+        &Given {
+            setup: Some(&args.setup),
+            ..Given::to("four-sensor", &args.data, &args.with, &args.common)
+        },
+    )
 }
 
 fn tables(found: &Found) -> Vec<CsvTable> {

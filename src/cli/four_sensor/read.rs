@@ -91,8 +91,8 @@ fn tidy(table: &mut TableReader) -> Result<Vec<Reading>, Message> {
     table.only(&["sensor", "x", "reading", "repeat"])?;
     let (sensor, at, value) = (
         table.column("sensor")?,
-        table.column("x")?,
-        table.column("reading")?,
+        table.column("x")?.in_mm(),
+        table.column("reading")?.in_um(),
     );
     let repeat = table.optional("repeat");
     let mut readings = Vec::new();
@@ -119,10 +119,10 @@ fn tidy(table: &mut TableReader) -> Result<Vec<Reading>, Message> {
 fn wide(table: &mut TableReader) -> Result<Vec<Reading>, Message> {
     const SENSORS: [&str; 4] = ["m1", "m2", "m3", "m4"];
     table.only(&["x", "m1", "m2", "m3", "m4", "repeat"])?;
-    let at = table.column("x")?;
+    let at = table.column("x")?.in_mm();
     let mut sensors = Vec::new();
     for name in SENSORS {
-        sensors.push(table.column(name)?);
+        sensors.push(table.column(name)?.in_um());
     }
     let repeat = table.optional("repeat");
     let mut readings = Vec::new();

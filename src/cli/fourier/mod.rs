@@ -13,6 +13,7 @@ use errsep_models::uncertainty::coverage_factor;
 use serde_json::{Value, json};
 
 use self::weighing::{methods, remarks};
+use super::diagnose::joined::{self, Given};
 use super::quantity::{COVERAGE, coverage_json, coverage_words, unexpandable};
 use super::{Answer, CommonArgs};
 use crate::io::fourier::{FourierSetup, read_scans, told};
@@ -57,6 +58,10 @@ pub struct Args {
     /// Length of the section, mm, instead of that of the set-up.
     #[arg(long, value_name = "MM")]
     length: Option<f64>,
+    /// Fit these effects along with the model, by the names of `errsep diagnose`: the answer is given without
+    /// and with them, with one covariance.
+    #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
+    with: Vec<String>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
@@ -116,7 +121,17 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         .map(|p| p.display().to_string())
         .collect::<Vec<_>>()
         .join(", ");
-    Ok(Answer {
+    let data = match (&args.data[..], args.with.is_empty()) {
+        ([data], _) | ([data, ..], true) => data,
+        _ => {
+            return Err(
+                Message::bad_input("--with takes the scans of one file").remedy(
+                    "put all scans into one file, with the spacing of the probes in a column `spacing`",
+                ),
+            );
+        }
+    };
+    let answer = Answer {
         text: in_words(&name, &scans, &answer, &methods, &remarks)?,
         json: as_json(&scans, section, &answer, &methods, &remarks)?,
         page: page(&FourierView {
@@ -136,7 +151,15 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         } else {
             Status::Done
         },
-    })
+    };
+    joined::beside(
+        answer,
+        &Given {
+            setup: args.setup.as_deref(),
+            length: args.length,
+            ..Given::to("fourier", data, &args.with, &args.common)
+        },
+    )
 }
 
 fn refused(error: &FourierError, args: &Args) -> Message {

@@ -29,6 +29,9 @@ its component errors under their ISO 230-1 names, in um and rad over mm:
     [errors.C0Y]
     readings = [-3.39e-5, -3.12e-5, -3.58e-5, -3.28e-5, -3.29e-5]
 
+An axis that carries the workpiece, before F, has the errors of its slide: what a laser reads between tool
+and workpiece changes its sign there.
+
 Example: errsep machine machine.toml length holes.csv --between 3:9 --out length")]
 pub struct Args {
     /// The machine.

@@ -9,7 +9,7 @@ use crate::io::{CsvTable, Message};
 /// Readings of a transducer against a straight line, in one or several sets.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Example: errsep simulate calibration-line --sets 3 --effect quadratic=0.02 > readings.csv")]
+Example: errsep simulate calibration-line --repeats 3 --effect quadratic=0.02 > readings.csv")]
 pub struct Args {
     /// Reading at zero load.
     #[arg(
@@ -31,11 +31,11 @@ pub struct Args {
     #[arg(long, default_value_t = 10.0, value_name = "X")]
     full_scale: f64,
     /// Loads of a set, even steps up to full scale.
-    #[arg(long, default_value_t = 20, value_name = "N")]
-    loads: usize,
+    #[arg(long, alias = "loads", default_value_t = 20, value_name = "N")]
+    positions: usize,
     /// Sets.
-    #[arg(long, default_value_t = 2, value_name = "N")]
-    sets: u32,
+    #[arg(long, alias = "sets", default_value_t = 2, value_name = "N")]
+    repeats: u32,
     /// Standard deviation of a reading.
     #[arg(long, default_value_t = 1e-3, value_name = "Y")]
     noise: f64,
@@ -52,12 +52,15 @@ pub struct Args {
 /// # Errors
 /// Figures that make no calibration, an unknown effect.
 pub fn run(args: &Args) -> Result<Answer, Message> {
-    super::few_enough(&[args.loads, args.sets as usize], "--loads or --sets")?;
+    super::few_enough(
+        &[args.positions, args.repeats as usize],
+        "--positions or --repeats",
+    )?;
     super::standard_deviations(&[("--noise", args.noise)])?;
     let sizes = [args.intercept, args.slope, args.full_scale];
-    if args.loads == 0 || args.sets == 0 || sizes.iter().any(|s| !s.is_finite()) {
+    if args.positions == 0 || args.repeats == 0 || sizes.iter().any(|s| !s.is_finite()) {
         return Err(Message::bad_input("these figures make no calibration")
-            .remedy("give one or more --loads and --sets, and finite sizes"));
+            .remedy("give one or more --positions and --repeats, and finite sizes"));
     }
     if args.full_scale <= 0.0 {
         return Err(
@@ -66,13 +69,13 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         );
     }
     let disturbances = super::effects(&args.effects, &Disturbance::NAMES, |name, size| {
-        Disturbance::named(name, size, args.sets)
+        Disturbance::named(name, size, args.repeats)
     })?;
     let what = CalibrationSimulation {
         line: [args.intercept, args.slope],
         full_scale: args.full_scale,
-        loads: args.loads,
-        sets: args.sets,
+        loads: args.positions,
+        sets: args.repeats,
         noise: args.noise,
         disturbances,
     };

@@ -31,8 +31,11 @@ pub struct Args {
     )]
     centre_y: f64,
     /// Number of points.
-    #[arg(long, default_value_t = 36, value_name = "N")]
-    points: usize,
+    #[arg(long, alias = "points", default_value_t = 36, value_name = "N")]
+    positions: usize,
+    /// How often the circle is passed over.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    repeats: usize,
     /// Arc covered, degrees.
     #[arg(long, default_value_t = 360.0, value_name = "DEG")]
     arc: f64,
@@ -61,12 +64,12 @@ fn parse_lobe(text: &str) -> Result<(u32, f64), String> {
 /// # Errors
 /// A radius that is not positive, fewer than three points.
 pub fn run(args: &Args) -> Result<Answer, Message> {
-    super::few_enough(&[args.points], "--points")?;
+    super::few_enough(&[args.positions, args.repeats], "--positions or --repeats")?;
     super::standard_deviations(&[("--noise", args.noise)])?;
     let what = CircleSimulation {
         centre: Point::new(args.centre_x, args.centre_y),
         radius: args.radius,
-        count: args.points,
+        count: args.positions,
         start: 0.0,
         arc: args.arc.to_radians(),
         noise_um: args.noise,
@@ -74,14 +77,24 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     };
     let seed = args.common.seed;
     let disturbances = super::effects(&args.effects, &Disturbance::NAMES, |name, size| {
-        Disturbance::named(name, size, args.points)
+        Disturbance::named(name, size, args.positions)
     })?;
-    let points = simulate_disturbed(&what, &disturbances, seed).map_err(|e| {
-        Message::bad_input(e.to_string()).remedy("change --radius, --points or --noise")
-    })?;
-    let table = CsvTable::new("points.csv")
+    let mut points = Vec::new();
+    let mut repeats = Vec::new();
+    for repeat in 0..args.repeats {
+        let pass = simulate_disturbed(&what, &disturbances, super::seed_of(seed, repeat));
+        let pass = pass.map_err(|e| {
+            Message::bad_input(e.to_string()).remedy("change --radius, --positions or --noise")
+        })?;
+        repeats.extend(pass.iter().map(|_| (repeat + 1) as f64));
+        points.extend(pass);
+    }
+    let mut table = CsvTable::new("points.csv")
         .numbers("x", points.iter().map(|p| p.x).collect::<Vec<_>>())
         .numbers("y", points.iter().map(|p| p.y).collect::<Vec<_>>());
+    if args.repeats > 1 {
+        table = table.numbers("repeat", repeats);
+    }
     super::answer(
         "circle",
         table,

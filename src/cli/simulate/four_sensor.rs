@@ -1,7 +1,7 @@
 //! `errsep simulate four-sensor`: outputs of four sensors over a known surface, slide and zero.
 
 use errsep_models::four_sensor::simulate::{Disturbances, Example, Truth, simulate};
-use errsep_models::four_sensor::{FourSensorError, Geometry};
+use errsep_models::four_sensor::{FourSensorError, Geometry, Outputs};
 use serde_json::json;
 
 use super::super::{Answer, CommonArgs};
@@ -17,14 +17,23 @@ writes data.csv, setup.toml and truth.csv.
 Example: errsep simulate four-sensor --noise 0.1 --seed 7 > data.csv")]
 pub struct Args {
     /// Number of points of the surface, N.
-    #[arg(long, value_name = "N", default_value_t = 69)]
-    points: usize,
+    #[arg(long, alias = "points", value_name = "N", default_value_t = 69)]
+    positions: usize,
+    /// How often the surface is passed over.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    repeats: usize,
     /// Sampling interval, mm.
     #[arg(long, value_name = "MM", default_value_t = 5.0)]
     step: f64,
     /// Spacings D2, D3, D4 of the sensors in steps.
-    #[arg(long, value_name = "S2,S3,S4", value_delimiter = ',', default_values_t = [1, 1, 5])]
-    spacing: Vec<usize>,
+    #[arg(
+        long,
+        alias = "spacing",
+        value_name = "S2,S3,S4",
+        value_delimiter = ',',
+        default_values_t = [1, 1, 5]
+    )]
+    spacing_in_steps: Vec<usize>,
     /// Standard deviation of one reading, um.
     #[arg(long, value_name = "UM", default_value_t = 0.1)]
     noise: f64,
@@ -73,14 +82,17 @@ pub struct Args {
 /// # Errors
 /// A geometry without room for the sensors; a disturbance that is not finite or has the wrong count.
 pub fn run(args: &Args) -> Result<Answer, Message> {
-    super::few_enough(&[4, args.points], "--points")?;
+    super::few_enough(
+        &[4, args.positions, args.repeats],
+        "--positions or --repeats",
+    )?;
     super::standard_deviations(&[("--noise", args.noise)])?;
-    let spacing: [usize; 3] = exactly(&args.spacing, "--spacing")?;
+    let spacing: [usize; 3] = exactly(&args.spacing_in_steps, "--spacing-in-steps")?;
     let reach = spacing
         .iter()
         .fold(0_usize, |sum, s| sum.saturating_add(*s));
     let geometry =
-        Geometry::new(args.step, spacing, args.points.saturating_sub(reach)).map_err(refuse)?;
+        Geometry::new(args.step, spacing, args.positions.saturating_sub(reach)).map_err(refuse)?;
     let truth = Example::of(&geometry);
     let mut disturbances = Disturbances::noise(args.noise);
     if !args.sensor_position.is_empty() {
@@ -95,15 +107,28 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     super::effects(&args.effects, &Disturbances::NAMES, |name, size| {
         disturbances.add(name, size).then_some(())
     })?;
-    let outputs = simulate(&geometry, &truth, &disturbances, args.common.seed).map_err(refuse)?;
+    let passes: Vec<Outputs> = (0..args.repeats.max(1))
+        .map(|repeat| {
+            let seed = super::seed_of(args.common.seed, repeat);
+            simulate(&geometry, &truth, &disturbances, seed)
+        })
+        .collect::<Result<_, _>>()
+        .map_err(refuse)?;
+    let outputs = &passes[0];
 
     let x = outputs.slide_positions();
-    let sensor =
-        |index: usize| -> Vec<f64> { outputs.readings().iter().map(|row| row[index]).collect() };
-    let data = (0..4).fold(
-        CsvTable::new("data.csv").numbers("x", x.clone()),
-        |table, index| table.numbers(format!("m{}", index + 1), sensor(index)),
-    );
+    let sensor = |index: usize| -> Vec<f64> {
+        let rows = passes.iter().flat_map(|pass| pass.readings());
+        rows.map(|row| row[index]).collect()
+    };
+    let all = CsvTable::new("data.csv").numbers("x", x.repeat(passes.len()));
+    let mut data = (0..4).fold(all, |table, index| {
+        table.numbers(format!("m{}", index + 1), sensor(index))
+    });
+    if passes.len() > 1 {
+        let numbers = (1..=passes.len()).flat_map(|k| vec![k as f64; x.len()]);
+        data = data.numbers("repeat", numbers.collect::<Vec<_>>());
+    }
     let surface_x = outputs.surface_positions();
     let of = |f: &dyn Fn(f64) -> f64, x: &[f64]| -> Vec<f64> { x.iter().map(|x| f(*x)).collect() };
     let surface = of(&|x| truth.surface(x), &surface_x);

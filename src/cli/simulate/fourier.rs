@@ -19,8 +19,8 @@ pub struct Args {
     #[arg(long, default_value_t = 100.0, value_name = "MM")]
     length: f64,
     /// Grid points on the section.
-    #[arg(long, default_value_t = 1000, value_name = "N")]
-    samples: usize,
+    #[arg(long, alias = "samples", default_value_t = 1000, value_name = "N")]
+    positions: usize,
     /// Probe spacing, mm; may be given several times (default 48.5, 34.1, 78.6).
     #[arg(long, value_name = "MM")]
     spacing: Vec<f64>,
@@ -65,13 +65,13 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let defaults = FourierSimulation::default();
     let spacings = args.spacing.len().max(defaults.spacings.len());
     super::few_enough(
-        &[3, spacings, args.samples, args.repeats as usize],
-        "--samples or --repeats",
+        &[3, spacings, args.positions, args.repeats as usize],
+        "--positions or --repeats",
     )?;
     super::standard_deviations(&[("--noise", args.noise)])?;
     let what = FourierSimulation {
         length: args.length,
-        samples: args.samples,
+        samples: args.positions,
         spacings: if args.spacing.is_empty() {
             defaults.spacings.clone()
         } else {
@@ -89,7 +89,8 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         Disturbance::named(name, size, what.spacings.len())
     })?;
     let (scans, truth) = simulate_disturbed(&what, &disturbances, seed).map_err(|e| {
-        Message::bad_input(e.to_string()).remedy("change --spacing, --length, --samples or --noise")
+        Message::bad_input(e.to_string())
+            .remedy("change --spacing, --length, --positions or --noise")
     })?;
     let column = |of: &dyn Fn(&Scan, &ScanReading) -> f64| -> Vec<f64> {
         scans

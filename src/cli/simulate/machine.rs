@@ -18,7 +18,7 @@ const MOST_READINGS: usize = 10_000_000;
 /// Readings of the components of a known machine and, with --points, of parts made on it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Example: errsep simulate machine machine.toml --from 0 --to 177.8 --stations 8 --repeats 10 \\
+Example: errsep simulate machine machine.toml --from 0 --to 177.8 --positions 8 --repeats 10 \\
            --points holes.csv --out simulated")]
 pub struct Args {
     /// The machine whose errors are the truth; its standard uncertainties are the scatter.
@@ -41,8 +41,8 @@ pub struct Args {
     )]
     to: f64,
     /// Number of stations.
-    #[arg(long, value_name = "N", default_value_t = 8)]
-    stations: usize,
+    #[arg(long, alias = "stations", value_name = "N", default_value_t = 8)]
+    positions: usize,
     /// Readings at each station.
     #[arg(long, value_name = "N", default_value_t = 10)]
     repeats: usize,
@@ -82,7 +82,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         .unwrap_or_default();
     let of_parts = points.len().saturating_mul(2).saturating_mul(args.parts);
     let readings = [
-        args.stations
+        args.positions
             .saturating_mul(args.repeats)
             .saturating_mul(machine.errors().len()),
         of_parts.saturating_mul(args.replicates as usize),
@@ -91,12 +91,12 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         return Err(Message::bad_input("that many readings are not simulated")
             .remedy("give at most ten million readings"));
     }
-    if !(args.from.is_finite() && args.to.is_finite()) || args.stations == 0 {
+    if !(args.from.is_finite() && args.to.is_finite()) || args.positions == 0 {
         return Err(Message::bad_input("the stations are not a finite row")
-            .remedy("give --from, --to and --stations 1 or more"));
+            .remedy("give --from, --to and --positions 1 or more"));
     }
-    let step = (args.to - args.from) / args.stations.saturating_sub(1).max(1) as f64;
-    let stations = (0..args.stations)
+    let step = (args.to - args.from) / args.positions.saturating_sub(1).max(1) as f64;
+    let stations = (0..args.positions)
         .map(|i| args.from + step * i as f64)
         .collect();
     let plan = Characterization {

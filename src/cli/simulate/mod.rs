@@ -143,6 +143,11 @@ pub(super) fn standard_deviations(sizes: &[(&str, f64)]) -> Result<(), Message> 
     Ok(())
 }
 
+/// The seed of one repeat: that of the command for the first.
+pub(super) fn seed_of(seed: u64, repeat: usize) -> u64 {
+    seed ^ ((repeat as u64) << 40)
+}
+
 /// Refuses more readings than are simulated: their number is the product of `counts`, which
 /// `options` set.
 pub(super) fn few_enough(counts: &[usize], options: &str) -> Result<(), Message> {

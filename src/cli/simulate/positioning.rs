@@ -49,11 +49,11 @@ pub struct Args {
     )]
     to: f64,
     /// Number of targets.
-    #[arg(long, default_value_t = 11, value_name = "N")]
-    targets: usize,
+    #[arg(long, alias = "targets", default_value_t = 11, value_name = "N")]
+    positions: usize,
     /// Runs.
-    #[arg(long, default_value_t = 5, value_name = "N")]
-    runs: u32,
+    #[arg(long, alias = "runs", default_value_t = 5, value_name = "N")]
+    repeats: u32,
     /// Deviation gained from the first to the last target, um (arcsec).
     #[arg(
         long,
@@ -105,13 +105,13 @@ pub struct Args {
 /// Fewer than two targets, no run, a travel or period without length, a noise below zero.
 pub fn run(args: &Args) -> Result<Answer, Message> {
     super::few_enough(
-        &[args.targets, args.runs as usize, 2],
-        "--targets or --runs",
+        &[args.positions, args.repeats as usize, 2],
+        "--positions or --repeats",
     )?;
     super::standard_deviations(&[("--noise", args.noise), ("--interval", args.interval)])?;
-    if args.targets < 2 || args.runs == 0 {
+    if args.positions < 2 || args.repeats == 0 {
         return Err(Message::bad_input("a test needs two targets and a run")
-            .remedy("give --targets 2 or more and --runs 1 or more"));
+            .remedy("give --positions 2 or more and --repeats 1 or more"));
     }
     let sizes = [args.gain, args.periodic, args.lost_motion, args.drift];
     let finite = sizes.iter().all(|v| v.is_finite()) && (args.to - args.from).is_finite();
@@ -122,8 +122,8 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let what = PositioningSimulation {
         from: args.from,
         to: args.to,
-        targets: args.targets,
-        runs: args.runs,
+        targets: args.positions,
+        runs: args.repeats,
         gain: args.gain,
         periodic: args.periodic,
         period: args.period,

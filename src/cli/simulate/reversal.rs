@@ -140,12 +140,25 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         .numbers("time", column(&|r| r.time.unwrap_or(f64::NAN)))
         .numbers("x", column(&|r| r.x))
         .numbers("reading", column(&|r| r.value));
-    super::answer(
+    let answer = super::answer(
         "reversal",
         table,
         known(args, &truth, &effects),
         args.common.seed,
-    )
+    )?;
+    Ok(Answer {
+        setup: Some(setup(args)),
+        ..answer
+    })
+}
+
+/// What a person would know beside the readings.
+fn setup(args: &Args) -> String {
+    let mut setup = String::new();
+    if args.thickness > 0.0 {
+        setup += &format!("[artefact]\nthickness = {:?}  # mm\n\n", args.thickness);
+    }
+    setup + "[model]\nconvention = \"seed\"\n"
 }
 
 fn plan(args: &Args) -> Result<Plan, Message> {

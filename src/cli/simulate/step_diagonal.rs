@@ -66,18 +66,26 @@ pub struct Args {
     /// several times. Sizes are in um or rad.
     #[arg(long = "effect", value_name = "NAME=VALUE")]
     effects: Vec<String>,
+    /// How often each run is made.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    repeats: u32,
     /// Each run goes back to its start, without zeroing the laser.
-    #[arg(long)]
-    backward: bool,
+    #[arg(long, alias = "backward")]
+    both_directions: bool,
     /// Size of the reversal of the translational errors, um.
-    #[arg(long, default_value_t = 1.0, value_name = "UM", requires = "backward")]
+    #[arg(
+        long,
+        default_value_t = 1.0,
+        value_name = "UM",
+        requires = "both_directions"
+    )]
     reversal: f64,
     /// Size of the reversal of the angular errors, rad.
     #[arg(
         long,
         default_value_t = 5e-6,
         value_name = "RAD",
-        requires = "backward"
+        requires = "both_directions"
     )]
     reversal_rotation: f64,
     #[command(flatten)]
@@ -100,7 +108,10 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let travel = [x, y, z];
     // Three moves a step, four diagonals, two targets, both directions.
     let sequences = args.sequence.len().max(Sequence::STEPS.len());
-    super::few_enough(&[3, 4, 2, 2, sequences, args.steps], "--steps")?;
+    super::few_enough(
+        &[3, 4, 2, 2, sequences, args.steps, args.repeats as usize],
+        "--steps or --repeats",
+    )?;
     super::standard_deviations(&[
         ("--translation", args.translation),
         ("--rotation", args.rotation),
@@ -108,7 +119,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         ("--noise", args.noise),
     ])?;
     let sizes = [args.reversal, args.reversal_rotation];
-    let back = |size: f64| if args.backward { size } else { 0.0 };
+    let back = |size: f64| if args.both_directions { size } else { 0.0 };
     if args.steps == 0
         || travel.iter().any(|t| !(*t > 0.0 && t.is_finite()))
         || sizes.iter().any(|s| !s.is_finite())
@@ -137,12 +148,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             ([], Which::Face) => vec![Sequence::XYZ, Sequence::YXZ],
             (some, _) => some.to_vec(),
         },
-        repeats: 1,
+        repeats: args.repeats.max(1),
         translation: args.translation,
         rotation: args.rotation,
         mirror: args.mirror,
         noise: args.noise,
-        backward: args.backward,
+        backward: args.both_directions,
         reversal: back(args.reversal),
         reversal_rotation: back(args.reversal_rotation),
     };
@@ -158,7 +169,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             .collect()
     };
     let text = |of: &dyn Fn(usize) -> String| (0..readings.len()).map(of).collect::<Vec<_>>();
-    let table = CsvTable::new("readings.csv")
+    let mut table = CsvTable::new("readings.csv")
         .texts(
             "diagonal",
             text(&|i| readings[i].diagonal.name().to_owned()),
@@ -182,6 +193,10 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             "reading",
             readings.iter().map(|r| r.value).collect::<Vec<_>>(),
         );
+    if args.repeats > 1 {
+        let numbers = readings.iter().map(|r| f64::from(r.repeat));
+        table = table.numbers("repeat", numbers.collect::<Vec<_>>());
+    }
     let tabulated = |of: &dyn Fn(Component) -> Value| -> serde_json::Map<String, Value> {
         Component::all().map(|c| (c.name(), of(c))).collect()
     };

@@ -13,6 +13,7 @@ use errsep_models::diagonal::{
 };
 use errsep_models::uncertainty::DegreesOfFreedom;
 
+use super::diagnose::joined::{self, Given};
 use super::{Answer, CommonArgs};
 use crate::io::diagonal::{DiagonalSetup, read_readings};
 use crate::io::{Message, Status};
@@ -58,6 +59,10 @@ pub struct Args {
     /// Adds which sets of sequences would determine which angular errors.
     #[arg(long)]
     choose: bool,
+    /// Fit these effects along with the model, by the names of `errsep diagnose`: the answer is given without
+    /// and with them, with one covariance.
+    #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
+    with: Vec<String>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
@@ -118,7 +123,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         found.choices = choose_sequences(&found.zone, &diagonals, &targets).map_err(refused)?;
     }
     let name = args.data.display().to_string();
-    Ok(Answer {
+    let answer = Answer {
         text: text::in_words(&name, &found)?,
         json: json::as_json(&found, &assumptions)?,
         page: page(&StepDiagonalView {
@@ -136,7 +141,14 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         setup: None,
         seed: None,
         status: Status::Done,
-    })
+    };
+    joined::beside(
+        answer,
+        &Given {
+            setup: args.setup.as_deref(),
+            ..Given::to("step-diagonal", &args.data, &args.with, &args.common)
+        },
+    )
 }
 
 fn used(readings: &[DiagonalReading]) -> (Vec<Diagonal>, Vec<Target>) {

@@ -99,7 +99,7 @@ pub(in crate::diagnosis) fn candidates<M: FittedModel>(
 
 /// The variants of a named cause that fit as well: which sensor, which channel may be open where
 /// the effect is not.
-fn elsewhere<M: FittedModel>(
+pub(in crate::diagnosis) fn elsewhere<M: FittedModel>(
     context: &Context<'_, M>,
     readings: &DVector<f64>,
     causes: &[Cause],

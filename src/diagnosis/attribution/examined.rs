@@ -1,12 +1,13 @@
 //! Detection and attribution in their order, and what they come to before it is put in words.
 
 use errsep_models::model::FittedModel;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::attribution::attribute::{attribute, roughly};
 use crate::diagnosis::attribution::confidence::Answer;
-use crate::diagnosis::attribution::context::{Context, Remainder};
+use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
 use crate::diagnosis::detection::estimate::estimate;
+use crate::diagnosis::noise::law::NoiseLaw;
 
 /// What a diagnosis has come to before it is put in words.
 pub(in crate::diagnosis) struct Examined<'a, M: FittedModel> {
@@ -38,27 +39,9 @@ pub(in crate::diagnosis) fn examined<M: FittedModel, R>(
         });
     }
     let found = roughly(context, readings, &first);
-    let none = || {
-        (
-            DVector::zeros(readings.len()),
-            context.model.refit(context.model.observed().clone()),
-        )
-    };
-    let (change, state) = context
-        .changes(readings, &found)
-        .map(|changes| {
-            let clean = context.without(context.model.observed(), &found, &changes);
-            (changes.column_sum(), context.model.refit(clean))
-        })
-        .unwrap_or_else(none);
-    // The readings themselves keep what an effect had hidden of the state.
-    let clean = context
-        .model
-        .refit(context.model.observed() - &change)
-        .linearised();
-    let law = estimate(&state, &clean);
+    let changes = context.changes(readings, &found);
+    let (state, law, readings) = afresh(context, &found, changes.as_ref());
     let context = context.moved(&state, law);
-    let readings = clean + change;
     let first = context.remainder(&readings, &[]);
     let found = attribute(&context, &readings, &first);
     then(Examined {
@@ -68,4 +51,28 @@ pub(in crate::diagnosis) fn examined<M: FittedModel, R>(
         detected,
         found,
     })
+}
+
+/// State and noise without what causes change in the readings, readings × causes, and the readings seen
+/// from there. `context` is that of the readings as they came.
+pub(in crate::diagnosis) fn afresh<M: FittedModel>(
+    context: &Context<'_, M>,
+    found: &[Cause],
+    changes: Option<&DMatrix<f64>>,
+) -> (M, NoiseLaw, DVector<f64>) {
+    let observed = context.model.observed();
+    let (change, state) = match changes {
+        Some(changes) => {
+            let clean = context.without(observed, found, changes);
+            (changes.column_sum(), context.model.refit(clean))
+        }
+        None => (
+            DVector::zeros(observed.len()),
+            context.model.refit(observed.clone()),
+        ),
+    };
+    // The readings themselves keep what an effect had hidden of the state.
+    let clean = context.model.refit(observed - &change).linearised();
+    let law = estimate(&state, &clean);
+    (state, law, clean + change)
 }

@@ -6,7 +6,7 @@ use errsep_models::reversal::{Channel, Direction, Observations, Reading};
 
 use super::columns::{ColumnMap, ROLES};
 use crate::io::dialect::Dialect;
-use crate::io::message::{Place, list, nearest};
+use crate::io::message::{Place, list};
 use crate::io::units::LengthUnit;
 use crate::io::{Column, Message, Row, TableReader};
 
@@ -170,20 +170,41 @@ pub(super) fn find_columns(table: &TableReader, map: &ColumnMap) -> Result<Colum
             reading: needed("reading")?,
         },
     };
-    let reading_unit = |role: &str| map.unit(role).unwrap_or(LengthUnit::Um).in_um();
+    let x = needed("x")?;
+    let reading_unit = |role: &str, column: &Column| {
+        let own = map.unit(role).or(column.length_unit());
+        own.unwrap_or(LengthUnit::Um).in_um()
+    };
+    let mut reading_um = [1.0; 4];
+    match &readings {
+        Readings::Tidy { reading, .. } => reading_um = [reading_unit("reading", reading); 4],
+        Readings::Wide(wide) => {
+            for (channel, column) in wide {
+                reading_um[channel.index()] = reading_unit(channel.name(), column);
+            }
+        }
+    }
+    let x_mm = map.unit("x").or(x.length_unit());
     Ok(Columns {
-        x: needed("x")?,
         repeat: optional("repeat"),
         direction: optional("direction"),
-        time: optional("time"),
+        time: optional("time").map(Column::in_s),
         scales: Scales {
-            x_mm: map.unit("x").unwrap_or(LengthUnit::Mm).in_mm(),
-            reading_um: match readings {
-                Readings::Tidy { .. } => [reading_unit("reading"); 4],
-                Readings::Wide(_) => Channel::ALL.map(|c| reading_unit(c.name())),
-            },
+            x_mm: x_mm.unwrap_or(LengthUnit::Mm).in_mm(),
+            reading_um,
         },
-        readings,
+        x: x.as_written(),
+        readings: match readings {
+            Readings::Tidy { channel, reading } => Readings::Tidy {
+                channel,
+                reading: reading.as_written(),
+            },
+            Readings::Wide(wide) => Readings::Wide(
+                wide.into_iter()
+                    .map(|(channel, column)| (channel, column.as_written()))
+                    .collect(),
+            ),
+        },
     })
 }
 
@@ -247,21 +268,17 @@ fn read_row(row: Row<'_>, columns: &Columns, data: &mut ReversalData) -> Result<
 pub(super) fn channel_of(row: Row<'_>, column: &Column) -> Result<Channel, Message> {
     let text = row.text(column);
     let names = Channel::ALL.map(Channel::name);
-    Channel::from_name(text).ok_or_else(|| {
+    Channel::from_name(&text.to_ascii_uppercase()).ok_or_else(|| {
         if text.is_empty() {
             return row
                 .error(column, "channel is missing: the field is empty")
                 .remedy(format!("write {}", list(&names)));
         }
-        let remedy = match nearest(text, names) {
-            Some(near) if near.eq_ignore_ascii_case(text) => format!("write `{near}`"),
-            _ => format!(
+        row.error(column, format!("unknown channel `{text}`"))
+            .remedy(format!(
                 "write {}: position 1 is 0°, 2 is 180°; A is the side that the near indicator sees at 0°",
                 list(&names)
-            ),
-        };
-        row.error(column, format!("unknown channel `{text}`"))
-            .remedy(remedy)
+            ))
     })
 }
 

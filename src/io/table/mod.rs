@@ -3,6 +3,7 @@
 //! Lines are read here and fields split by `csv-core`, so that the line at hand, its number and the
 //! place of every field are known whatever comments and blank lines came before. Memory is one line.
 
+mod column;
 mod lines;
 mod row;
 mod trouble;
@@ -14,30 +15,13 @@ use std::path::{Path, PathBuf};
 use super::dialect::{BYTE_ORDER_MARK, Decimal, Delimiter, Dialect, NotATable};
 use super::message::{Message, Place, list, nearest};
 use super::source::Source;
+pub use column::Column;
+use column::Heading;
 pub use row::Row;
 use trouble::{cannot_read, count, not_a_table, place_of_field};
 
 /// What is read ahead to detect the dialect, in bytes.
 const HEAD: u64 = 1 << 16;
-
-/// A column of a table, found by its name.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Column {
-    index: usize,
-    name: String,
-}
-
-impl Column {
-    /// Its name in the file.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// Its place among the fields of a row.
-    pub fn index(&self) -> usize {
-        self.index
-    }
-}
 
 /// A table being read, row by row.
 pub struct TableReader {
@@ -52,6 +36,7 @@ pub struct TableReader {
     ends: Vec<usize>,
     field_count: usize,
     names: Vec<String>,
+    headings: Vec<Heading>,
     header: String,
     header_number: usize,
 }
@@ -89,6 +74,7 @@ impl TableReader {
             ends: Vec::new(),
             field_count: 0,
             names: Vec::new(),
+            headings: Vec::new(),
             header: String::new(),
             header_number: 0,
         };
@@ -132,6 +118,7 @@ impl TableReader {
         }
         self.header = String::from_utf8_lossy(&self.line).into_owned();
         self.header_number = self.line_number;
+        self.headings = names.iter().map(|name| Heading::of(name)).collect();
         self.names = names;
         Ok(())
     }
@@ -159,13 +146,17 @@ impl TableReader {
         self.names.iter().map(String::as_str)
     }
 
-    /// A column that may be absent.
+    /// The names of the columns without the units that some of them carry.
+    pub fn bare_names(&self) -> impl Iterator<Item = &str> {
+        self.headings.iter().map(|heading| heading.name.as_str())
+    }
+
+    /// A column that may be absent: one of this name, or of this name with a unit, `x (mm)`, `x [mm]` or
+    /// `x_mm`.
     pub fn optional(&self, name: &str) -> Option<Column> {
-        let index = self.names.iter().position(|n| n == name)?;
-        Some(Column {
-            index,
-            name: name.to_owned(),
-        })
+        let as_written = self.names.iter().position(|n| n == name);
+        let index = as_written.or_else(|| self.bare_names().position(|n| n == name))?;
+        Some(Column::new(index, name, self.headings.get(index)?.unit))
     }
 
     /// A column that must be there.
@@ -191,8 +182,13 @@ impl TableReader {
     /// # Errors
     /// A column that is none of `known`; the message names the nearest that is.
     pub fn only(&self, known: &[&str]) -> Result<(), Message> {
-        for (i, name) in self.names().enumerate() {
-            if !known.contains(&name) {
+        for (i, (name, bare)) in self.names().zip(self.bare_names()).enumerate() {
+            if self.bare_names().take(i).any(|before| before == bare) && known.contains(&bare) {
+                return Err(self
+                    .in_header(i, format!("column `{bare}` is named twice"))
+                    .remedy("keep one of the two, or rename one"));
+            }
+            if !known.contains(&name) && !known.contains(&bare) {
                 let remedy = match nearest(name, known.iter().copied()) {
                     Some(near) => {
                         format!("did you mean `{near}`? Columns may be {}", list(known))
@@ -221,7 +217,7 @@ impl TableReader {
 
     /// A message about a column.
     pub fn at_column(&self, column: &Column, what: impl Into<String>) -> Message {
-        self.in_header(column.index, what)
+        self.in_header(column.index(), what)
     }
 
     /// A message about a row that was read before, known by its line number alone.

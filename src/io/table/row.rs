@@ -38,7 +38,7 @@ impl<'a> Row<'a> {
 
     /// The text of a field, without the blanks around it.
     pub fn text(self, column: &Column) -> &'a str {
-        self.field(column.index)
+        self.field(column.index())
     }
 
     /// The finite number in a field.
@@ -46,14 +46,20 @@ impl<'a> Row<'a> {
     /// # Errors
     /// The field is empty, is no number, or is not finite.
     pub fn number(self, column: &Column) -> Result<f64, Message> {
-        let text = self.field(column.index);
-        let name = &column.name;
+        let text = self.field(column.index());
+        let name = column.name();
         if text.is_empty() {
             return Err(self
                 .error(column, format!("{name} is missing: the field is empty"))
                 .remedy("write the number, or remove the row"));
         }
-        let value = self.parse(column, text)?;
+        let Some(scale) = column.scale() else {
+            return Err(self
+                .table
+                .at_column(column, format!("`{name}` is not taken in other units"))
+                .remedy(format!("convert it, and name the column `{name}`")));
+        };
+        let value = scale * self.parse(column, text)?;
         if value.is_finite() {
             return Ok(value);
         }
@@ -63,7 +69,7 @@ impl<'a> Row<'a> {
     }
 
     fn parse(self, column: &Column, text: &str) -> Result<f64, Message> {
-        let name = &column.name;
+        let name = column.name();
         let decimal = self.table.decimal.get();
         if self.table.dialect.delimiter == Delimiter::Comma {
             if let Ok(value) = text.parse() {
@@ -107,13 +113,13 @@ impl<'a> Row<'a> {
     /// # Errors
     /// The field holds something else.
     pub fn count(self, column: &Column) -> Result<u32, Message> {
-        let text = self.field(column.index);
+        let text = self.field(column.index());
         match text.parse() {
             Ok(n) if n > 0 => Ok(n),
             _ => Err(self
                 .error(
                     column,
-                    format!("{} \"{text}\" is not a whole number from 1", column.name),
+                    format!("{} \"{text}\" is not a whole number from 1", column.name()),
                 )
                 .remedy("write 1, 2, 3, …")),
         }
@@ -121,12 +127,12 @@ impl<'a> Row<'a> {
 
     /// A message about a field of this row.
     pub fn error(self, column: &Column, what: impl Into<String>) -> Message {
-        self.bad(column.index, what)
+        self.bad(column.index(), what)
     }
 
     /// Where a field of this row stands.
     pub fn place(self, column: &Column) -> Place {
-        self.place_of(column.index)
+        self.place_of(column.index())
     }
 
     fn place_of(self, index: usize) -> Place {

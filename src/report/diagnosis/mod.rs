@@ -28,6 +28,32 @@ pub fn page(view: &View) -> Page {
         .section(trials(view))
 }
 
+/// The page of a fit that effects have joined: nothing is sought, so that there is no verdict and no
+/// ladder of evidence.
+pub fn with_effects(view: &View) -> Page {
+    let mut effects = Section::new("Effects in the fit");
+    for effect in &view.candidates {
+        let variant = effect.variant.as_deref();
+        effects = effects.paragraph(format!(
+            "{}{}: {} of it cannot be absorbed by the fit; p {}.",
+            effect.effect,
+            variant.map_or(String::new(), |variant| format!(" ({variant})")),
+            number::percent(effect.visible),
+            number::probability(effect.p_value)
+        ));
+        let parameters = effect.parameters.iter();
+        effects = effects.key_figures(parameters.map(|(name, value, std, unit)| {
+            KeyFigure::new(name.clone(), *value, unit.clone()).std(*std)
+        }));
+    }
+    Page::new("Fit with effects", view.data.clone())
+        .summary(Standing::Neutral, view.statement.clone())
+        .section(effects)
+        .section(gap(view))
+        .section(residuals(view))
+        .section(shifts(view))
+}
+
 fn gap(view: &View) -> Section {
     let gap = &view.gap;
     let noted = view
@@ -101,16 +127,11 @@ fn residuals(view: &View) -> Section {
     let maps = unique(view.residuals.iter().map(|r| r.panel.as_str()))
         .into_iter()
         .flat_map(|panel| {
-            let rows = unique(
-                view.residuals
-                    .iter()
-                    .filter(|r| r.panel == panel)
-                    .map(|r| r.row.as_str()),
-            );
+            let rows = in_time(view.residuals.iter().filter(|r| r.panel == panel));
             let mut before = HeatMap::new(format!("{panel} before"), rows.iter().copied());
             let mut after = HeatMap::new(format!("{panel} after"), rows.iter().copied());
             for r in view.residuals.iter().filter(|r| r.panel == panel) {
-                if let Ok(row) = rows.binary_search(&r.row.as_str()) {
+                if let Some(row) = rows.iter().position(|row| *row == r.row) {
                     before.add(row, r.x, r.before);
                     after.add(row, r.x, r.after);
                 }
@@ -123,7 +144,7 @@ fn residuals(view: &View) -> Section {
         });
     section.figure(Figure::new(
         "Residuals, all on one scale",
-        "Each row is one trace. Negative values are hatched. What is left after looks like noise \
+        "Each row is one trace, in the order in which they were read. Negative values are hatched. What is left after looks like noise \
          if the effects are right.",
         HeatMaps::new(
             Axis::new(quantity, unit),
@@ -132,6 +153,19 @@ fn residuals(view: &View) -> Section {
             maps,
         ),
     ))
+}
+
+/// The rows of a panel, the first that was read first.
+fn in_time<'a>(residuals: impl Iterator<Item = &'a Residual>) -> Vec<&'a str> {
+    let mut begun: Vec<(&str, f64)> = Vec::new();
+    for r in residuals {
+        match begun.iter_mut().find(|(row, _)| *row == r.row) {
+            Some((_, time)) => *time = time.min(r.time),
+            None => begun.push((&r.row, r.time)),
+        }
+    }
+    begun.sort_by(|a, b| a.1.total_cmp(&b.1));
+    begun.into_iter().map(|(row, _)| row).collect()
 }
 
 fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {

@@ -127,10 +127,12 @@ pub struct Group {
 pub struct Residual {
     /// The map it belongs to, such as the channel.
     pub panel: String,
-    /// The row in the map, such as repeat and direction; rows are ordered by this name.
+    /// The row in the map, such as repeat and direction.
     pub row: String,
     /// Position along the axis of the view.
     pub x: f64,
+    /// Time of the reading, in any unit: traces stand in its order.
+    pub time: f64,
     /// Without the effects.
     pub before: f64,
     /// With them.

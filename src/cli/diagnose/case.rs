@@ -95,8 +95,10 @@ impl<M: FittedModel> Case<M> {
         Ok(Answer {
             text,
             json,
-            page: sheet::page(&view),
-            tables: vec![residuals(&self.model, &diagnosis)],
+            page: args.common.page(|| sheet::page(&view)),
+            tables: args
+                .common
+                .tables(|| vec![residuals(&self.model, &diagnosis)]),
             inputs,
             setup: None,
             seed: Some(args.common.seed),

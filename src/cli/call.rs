@@ -3,7 +3,8 @@
 
 use clap::Parser;
 
-use super::{Answering, Cli, Command, Traced, common};
+use super::common::{Called, Wanted};
+use super::{Answer, Cli, Command, Traced};
 use crate::io::Message;
 use crate::io::source::{InMemory, begin_record_with};
 
@@ -32,18 +33,27 @@ use crate::io::source::{InMemory, begin_record_with};
 /// ```
 pub fn call<S: AsRef<str>>(arguments: &[S], in_memory: Vec<InMemory>) -> Result<Traced, Message> {
     let arguments: Vec<String> = arguments.iter().map(|a| a.as_ref().to_owned()).collect();
+    answer(&arguments, in_memory, Wanted::Everything)?.traced(&arguments)
+}
+
+/// As [`call`], but only what is wanted is worked out, and where it comes from is not told.
+///
+/// # Errors
+/// Those of [`call`].
+pub(super) fn answer(
+    arguments: &[String],
+    in_memory: Vec<InMemory>,
+    wanted: Wanted,
+) -> Result<Answer, Message> {
     let words = std::iter::once("errsep").chain(arguments.iter().map(String::as_str));
-    let mut cli = Cli::try_parse_from(words).map_err(|error| not_understood(&error))?;
-    let Command::Answer(command) = &mut cli.command else {
+    let cli = Cli::try_parse_from(words).map_err(|error| not_understood(&error))?;
+    let Command::Answer(command) = &cli.command else {
         return Err(Message::bad_input("this command answers no question")
             .remedy("call one that does, such as `reversal`"));
     };
-    if let Answering::Reversal(args) = command {
-        args.whole = true;
-    }
     begin_record_with(true, in_memory);
-    let _silent = common::Silent::begin();
-    command.run()?.traced(&arguments)
+    let _called = Called::begin(wanted);
+    command.run()
 }
 
 /// What is wrong with the arguments, and the hint that comes with it.
@@ -107,5 +117,25 @@ mod tests {
         assert!(!called.answer.tables.is_empty());
         assert!(called.answer.page.render().contains("<svg"));
         assert_eq!(called.provenance.command, ["reversal", "<data>"]);
+    }
+
+    #[test]
+    fn where_the_json_is_wanted_nothing_else_is_made() {
+        let arguments = ["straightness".to_owned(), "<data>".to_owned()];
+        let text = "x,deviation\n0,0\n1,2\n2,0\n";
+        let lean = answer(&arguments, profile(text), Wanted::Json).unwrap();
+        let whole = answer(&arguments, profile(text), Wanted::Everything).unwrap();
+        assert_eq!(lean.json, whole.json);
+        assert_eq!(lean.page.figures().count(), 0);
+        assert!(whole.page.figures().count() > 0);
+        // What a thread is called for does not outlive the call.
+        let page = crate::cli::common::CommonArgs {
+            format: Default::default(),
+            out: None,
+            force: false,
+            quiet: false,
+            seed: 1,
+        };
+        assert!(!page.wants_folder());
     }
 }

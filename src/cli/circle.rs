@@ -91,16 +91,18 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let answer = Answer {
         text: in_words(args, &points, &fit, form.as_deref(), &zones_found, &others)?,
         json,
-        page: page(&CircleView {
-            data: &args.points.display().to_string(),
-            points: &points,
-            circle: fit.circle,
-            std: fit.standard_uncertainties(),
-            residuals_um: &fit.residuals_um,
-            noise: (fit.noise_um, fit.noise_given),
-            form: form.as_deref(),
-            circularity: &zones_found,
-            others: &others,
+        page: args.common.page(|| {
+            page(&CircleView {
+                data: &args.points.display().to_string(),
+                points: &points,
+                circle: fit.circle,
+                std: fit.standard_uncertainties(),
+                residuals_um: &fit.residuals_um,
+                noise: (fit.noise_um, fit.noise_given),
+                form: form.as_deref(),
+                circularity: &zones_found,
+                others: &others,
+            })
         }),
         tables: vec![
             CsvTable::new("deviations.csv")

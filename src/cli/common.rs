@@ -7,6 +7,9 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::io::CsvTable;
+use crate::report::Page;
+
 /// How the answer is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Format {
@@ -37,28 +40,87 @@ pub struct CommonArgs {
     pub seed: u64,
 }
 
-thread_local! {
-    static SILENT: Cell<bool> = const { Cell::new(false) };
+/// What a program that calls a command wants of its answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wanted {
+    /// Text, JSON, page and tables.
+    Everything,
+    /// The JSON; text, page and tables may be empty.
+    Json,
 }
 
-/// While it lives, what this thread works out shows no progress.
-pub(super) struct Silent(bool);
+thread_local! {
+    static CALLED: Cell<Option<Wanted>> = const { Cell::new(None) };
+}
 
-impl Silent {
-    pub(super) fn begin() -> Self {
-        Self(SILENT.replace(true))
+/// While it lives, what this thread works out is for a program: no progress is shown.
+pub(super) struct Called(Option<Wanted>);
+
+impl Called {
+    pub(super) fn begin(wanted: Wanted) -> Self {
+        Self(CALLED.replace(Some(wanted)))
     }
 }
 
-impl Drop for Silent {
+impl Drop for Called {
     fn drop(&mut self) {
-        SILENT.set(self.0);
+        CALLED.set(self.0);
+    }
+}
+
+impl CommonArgs {
+    /// Whether the text is wanted.
+    fn wants_text(&self) -> bool {
+        match CALLED.get() {
+            Some(wanted) => wanted == Wanted::Everything,
+            None => self.format == Format::Text && !self.quiet,
+        }
+    }
+
+    /// Whether page and tables are wanted.
+    pub(super) fn wants_folder(&self) -> bool {
+        match CALLED.get() {
+            Some(wanted) => wanted == Wanted::Everything,
+            None => self.out.is_some(),
+        }
+    }
+
+    /// Whether the JSON is wanted.
+    pub(super) fn wants_json(&self) -> bool {
+        CALLED.get().is_some() || self.out.is_some() || self.format == Format::Json
+    }
+
+    /// The text, where it is wanted.
+    pub(super) fn text(&self, make: impl FnOnce() -> String) -> String {
+        if self.wants_text() {
+            make()
+        } else {
+            String::new()
+        }
+    }
+
+    /// The page, where it is wanted.
+    pub(super) fn page(&self, make: impl FnOnce() -> Page) -> Page {
+        if self.wants_folder() {
+            make()
+        } else {
+            Page::new("", String::new())
+        }
+    }
+
+    /// The tables, where they are wanted.
+    pub(super) fn tables(&self, make: impl FnOnce() -> Vec<CsvTable>) -> Vec<CsvTable> {
+        if self.wants_folder() {
+            make()
+        } else {
+            Vec::new()
+        }
     }
 }
 
 /// Progress on standard error, and only when that is a terminal. `total` where the end is known.
 pub fn progress(what: &'static str, total: Option<u64>) -> ProgressBar {
-    if SILENT.get() {
+    if CALLED.get().is_some() {
         return ProgressBar::hidden();
     }
     let bar = match total {

@@ -89,7 +89,9 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             "reference_lines": results.iter().map(as_json).collect::<Vec<_>>(),
             "profile": profile(&x, &y, &results),
         }),
-        page: report::straightness::page(&args.profile.display().to_string(), &x, &y, &results),
+        page: args.common.page(|| {
+            report::straightness::page(&args.profile.display().to_string(), &x, &y, &results)
+        }),
         tables: vec![table],
         inputs: vec![args.profile.clone()],
         setup: None,

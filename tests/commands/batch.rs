@@ -320,3 +320,33 @@ fn a_wrong_list_is_told_where() {
         assert!(!folder.path().join("out").exists());
     }
 }
+
+#[test]
+fn parquet_stands_beside_each_part_or_it_is_told_how_to_get_it() {
+    let bench = Bench::new(10);
+    let output = bench.command("p", &["--parquet"]).output().unwrap();
+    if !cfg!(feature = "parquet") {
+        assert_eq!(output.status.code(), Some(2));
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(told.contains("--features parquet"), "{told}");
+        assert!(!bench.folder.path().join("p").exists());
+        return;
+    }
+    assert!(output.status.success(), "{output:?}");
+    let place = bench.folder.path().join("p/part-1-00001.parquet");
+    let first = fs::read(&place).unwrap();
+    assert!(first.starts_with(b"PAR1") && first.ends_with(b"PAR1"));
+    // Lost, it is made anew of the rows; of other rows it does not stay.
+    fs::remove_file(&place).unwrap();
+    let output = bench.run("p", &["--parquet"]);
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("0 worked out now"), "{told}");
+    assert_eq!(fs::read(&place).unwrap(), first);
+    fs::write(
+        bench.folder.path().join("p0.csv"),
+        "x,deviation\n0,0\n1,5\n2,0\n",
+    )
+    .unwrap();
+    bench.run("p", &[]);
+    assert!(!place.exists());
+}

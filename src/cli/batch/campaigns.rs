@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use clap::CommandFactory;
+use serde::{Deserialize, Serialize};
 
+use super::selection::Selection;
 use crate::cli::Cli;
 use crate::io::message::nearest;
 use crate::io::source::STANDARD_INPUT;
@@ -16,7 +18,7 @@ const NOT_HERE: [&str; 5] = ["batch", "completions", "export", "man", "help"];
 const DECIDED: [&str; 5] = ["--out", "--format", "--force", "--quiet", "-q"];
 
 /// One campaign.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Campaign {
     /// Its name, no other's.
     pub id: String,
@@ -24,6 +26,8 @@ pub(super) struct Campaign {
     pub arguments: Vec<String>,
     /// The files among them.
     pub files: Vec<PathBuf>,
+    /// The rows of a Parquet file that are its data; `files` has their name.
+    pub selection: Option<Selection>,
     /// The arguments as the list has them: what they are called does not hang on where the list lies.
     pub as_listed: Vec<String>,
 }
@@ -38,10 +42,10 @@ impl Campaigns {
     /// It is no such list: the message says where.
     pub fn read(path: &Path) -> Result<Self, Message> {
         let mut table = TableReader::open(path)?;
-        table.only(&["id", "command", "data", "setup", "options"])?;
+        table.only(&["id", "command", "data", "key", "setup", "options"])?;
         let (id, command) = (table.column("id")?, table.column("command")?);
         let (data, setup) = (table.optional("data"), table.optional("setup"));
-        let options = table.optional("options");
+        let (selects, options) = (table.optional("key"), table.optional("options"));
         let known: Vec<String> = Cli::command()
             .get_subcommands()
             .map(|c| c.get_name().to_owned())
@@ -78,6 +82,7 @@ impl Campaigns {
                 id: name,
                 arguments: Vec::new(),
                 files: Vec::new(),
+                selection: None,
                 as_listed: Vec::new(),
             };
             campaign.word(word);
@@ -88,8 +93,12 @@ impl Campaigns {
                         .remedy("write it to a file, and name that"));
                 }
             }
-            if !text(&data).is_empty() {
-                campaign.file(&folder, text(&data));
+            match selects.as_ref().filter(|c| !row.text(c).is_empty()) {
+                Some(key) => campaign
+                    .select(&folder, text(&data), row.text(key))
+                    .map_err(|(what, remedy)| row.error(key, what).remedy(remedy))?,
+                None if !text(&data).is_empty() => campaign.file(&folder, text(&data)),
+                None => {}
             }
             if !text(&setup).is_empty() {
                 campaign.word("--setup");
@@ -139,6 +148,41 @@ impl Campaign {
         self.arguments.push(place.to_string_lossy().into_owned());
         self.as_listed.push(name.to_owned());
         self.files.push(place);
+    }
+
+    /// The rows of a Parquet file that a key selects are the data.
+    fn select(
+        &mut self,
+        folder: &Path,
+        data: &str,
+        key: &str,
+    ) -> Result<(), (&'static str, &'static str)> {
+        if !cfg!(feature = "parquet") {
+            return Err((
+                "a key selects rows of a Parquet file, and this errsep was built without Parquet",
+                "give every campaign a CSV of its own; or build errsep with it: \
+                 cargo install --path . --features parquet",
+            ));
+        }
+        let selection = Selection::of(folder.join(data), key).filter(|_| !data.is_empty());
+        let selection = selection.ok_or((
+            "a key selects rows of `data`",
+            "name a Parquet file in data, and write the key as COLUMN=VALUE, such as campaign=m1",
+        ))?;
+        self.as_listed.push(format!("{data}[{key}]"));
+        let name = selection.name();
+        self.arguments.push(name.to_string_lossy().into_owned());
+        self.files.push(name);
+        self.selection = Some(selection);
+        Ok(())
+    }
+
+    /// The file on the disk in which one of `files` is.
+    pub fn place<'c>(&'c self, file: &'c Path) -> &'c Path {
+        match &self.selection {
+            Some(selection) if selection.name() == file => &selection.file,
+            _ => file,
+        }
     }
 
     /// An option that names a file beside the list stands for that file, `--option=FILE` too.

@@ -26,6 +26,16 @@ pub(super) struct PartDone {
     pub failed: usize,
 }
 
+/// What working out a part came to.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Report {
+    pub part: PartDone,
+    /// Campaigns that were worked out now, with the seconds of each.
+    pub seconds: Vec<(String, f64)>,
+    /// Files that were read for their keys.
+    pub inputs: Vec<Input>,
+}
+
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "lowercase")]
 enum Line {
@@ -85,9 +95,11 @@ impl Log {
     ///
     /// # Errors
     /// The log cannot be written.
-    pub fn tell(&mut self, part: PartDone, seconds: Vec<(String, f64)>) -> Result<(), Message> {
-        let inputs = self.inputs.take_fresh().into_iter().map(Line::Input);
-        let times = seconds
+    pub fn tell(&mut self, report: Report) -> Result<(), Message> {
+        let part = report.part;
+        let inputs = report.inputs.into_iter().map(Line::Input);
+        let times = report
+            .seconds
             .into_iter()
             .map(|(id, seconds)| Line::Campaign { id, seconds });
         let mut text = Vec::new();

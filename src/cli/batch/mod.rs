@@ -2,10 +2,15 @@
 
 mod campaigns;
 mod key;
+mod lean;
 mod log;
 mod page;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod parts;
 mod row;
+mod selection;
+pub mod shared;
 mod work;
 
 use std::fs::File;
@@ -13,8 +18,8 @@ use std::path::{Path, PathBuf};
 
 use crate::io::{Message, Status};
 use campaigns::Campaigns;
-use log::Log;
-use parts::Part;
+use log::{Log, Report};
+use parts::{How, Part};
 
 /// Many campaigns from one list: the answers row by row, failures among them, resumed after a stop.
 #[derive(Debug, clap::Args)]
@@ -26,7 +31,7 @@ The list has a row a campaign; paths are relative to its folder, options as on t
     m1-gap,diagnose,m1/monday.csv,m1/setup.toml,
 
 DIR gets part-<shard>-<k>.ndjson, one JSON object a campaign in the order of the list, log.ndjson and
-index.html. Killed anywhere and run again, it goes on: what is done is skipped as long as data, set-up,
+index.html; with --parquet also part-<shard>-<k>.parquet. Killed anywhere and run again, it goes on: what is done is skipped as long as data, set-up,
 options and version are the same.
 
 Example: errsep batch campaigns.csv --out answers")]
@@ -49,6 +54,9 @@ pub struct Args {
     /// Read every input again in place of trusting its size and time of change.
     #[arg(long)]
     verify: bool,
+    /// Write every part as Parquet too, with a column for every number of the answers.
+    #[arg(long)]
+    parquet: bool,
     /// Print nothing but errors.
     #[arg(long, short)]
     quiet: bool,
@@ -84,36 +92,113 @@ struct Outcome {
 /// # Errors
 /// The list is wrong, or the folder cannot be written. A campaign that fails is a row, no error.
 pub fn run(args: &Args) -> Result<Status, Message> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let how = How {
+        out: args.out.clone(),
+        jobs: args.jobs.map_or(cores, usize::from),
+        retry_failed: args.retry_failed,
+        verify: args.verify,
+        parquet: args.parquet,
+    };
     let shard = args.shard.unwrap_or(Shard { index: 1, of: 1 });
-    let campaigns = Campaigns::read(&args.list)?;
-    std::fs::create_dir_all(&args.out).map_err(|e| unwritable(&args.out, &e))?;
-    let _alone = alone(&args.out, shard)?;
-    let mut log = Log::open(&args.out, args.verify)?;
-    let parts = Part::of(&campaigns, shard, &args.out);
-    Part::clear(&parts, shard, &args.out)?;
-    let total = parts.iter().map(|part| part.campaigns.len() as u64).sum();
+    let mut batch = Batch::open(&args.list, how, shard)?;
     let bar = if args.quiet {
         indicatif::ProgressBar::hidden()
     } else {
-        super::progress("campaigns", Some(total))
+        super::progress("campaigns", Some(batch.outcome.campaigns as u64))
     };
-    let mut outcome = Outcome::default();
-    for part in &parts {
-        let done = part.work(&mut log, args, &bar)?;
-        outcome.campaigns += part.campaigns.len();
-        outcome.worked_out += done.worked_out;
-        outcome.failed += done.failed;
+    bar.inc(batch.done_before() as u64);
+    for part in std::mem::take(&mut batch.waiting) {
+        let report = part.work(&batch.log.inputs, &batch.how, &bar)?;
+        batch.take(report)?;
     }
     bar.finish_and_clear();
-    let page = args.out.join("index.html");
-    if outcome.worked_out > 0 || !page.exists() {
-        let html = page::of(&args.list, &args.out)?;
-        parts::replace(&page, html.as_bytes())?;
-    }
+    let outcome = batch.finish()?;
     if !args.quiet {
         super::answer::print(&outcome.told(args))?;
     }
     Ok(Status::Done)
+}
+
+/// A batch: its list is read, its folder locked, and what is done already is known.
+struct Batch {
+    list: PathBuf,
+    how: How,
+    log: Log,
+    /// The parts that are not complete.
+    waiting: Vec<Part>,
+    outcome: Outcome,
+    _alone: File,
+}
+
+impl Batch {
+    /// Reads the list and the log.
+    ///
+    /// # Errors
+    /// The list is wrong, or the folder cannot be written.
+    fn open(list: &Path, how: How, shard: Shard) -> Result<Self, Message> {
+        if how.parquet && !cfg!(feature = "parquet") {
+            return Err(
+                Message::bad_input("this errsep was built without Parquet").remedy(
+                    "leave --parquet out, the .ndjson parts hold the same; or build errsep with it: \
+                     cargo install --path . --features parquet",
+                ),
+            );
+        }
+        let parts = Part::of(Campaigns::read(list)?, shard);
+        std::fs::create_dir_all(&how.out).map_err(|e| unwritable(&how.out, &e))?;
+        let alone = alone(&how.out, shard)?;
+        let log = Log::open(&how.out, how.verify)?;
+        Part::clear(&parts, shard, &how.out)?;
+        let mut outcome = Outcome::default();
+        let mut waiting = Vec::new();
+        for part in parts {
+            outcome.campaigns += part.campaigns.len();
+            match part.complete(&log, &how) {
+                Some(done) if !(how.retry_failed && done.failed > 0) => {
+                    outcome.failed += done.failed;
+                }
+                _ => waiting.push(part),
+            }
+        }
+        Ok(Self {
+            list: list.to_owned(),
+            how,
+            log,
+            waiting,
+            outcome,
+            _alone: alone,
+        })
+    }
+
+    /// Campaigns of the parts that are complete.
+    fn done_before(&self) -> usize {
+        let waiting: usize = self.waiting.iter().map(|part| part.campaigns.len()).sum();
+        self.outcome.campaigns - waiting
+    }
+
+    /// Takes a part that has been put in place.
+    ///
+    /// # Errors
+    /// The log cannot be written.
+    fn take(&mut self, report: Report) -> Result<(), Message> {
+        self.outcome.worked_out += report.seconds.len();
+        self.outcome.failed += report.part.failed;
+        self.log.tell(report)
+    }
+
+    /// Writes the page.
+    ///
+    /// # Errors
+    /// The folder cannot be read or written.
+    fn finish(self) -> Result<Outcome, Message> {
+        let page = self.how.out.join("index.html");
+        if self.outcome.worked_out > 0 || !page.exists() {
+            let html = page::of(&self.list, &self.how.out)?;
+            parts::replace(&page, html.as_bytes())?;
+        }
+        Ok(self.outcome)
+    }
 }
 
 impl Outcome {
@@ -137,8 +222,9 @@ impl Outcome {
             text += "Their rows say why; --retry-failed tries them again.\n";
         }
         text += &format!(
-            "\nWritten to {}: part-*.ndjson, log.ndjson, index.html\n",
-            args.out.display()
+            "\nWritten to {}: part-*.ndjson,{} log.ndjson, index.html\n",
+            args.out.display(),
+            if args.parquet { " part-*.parquet," } else { "" }
         );
         text
     }

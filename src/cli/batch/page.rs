@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde_json::Value;
-
+use super::lean::Lean;
 use super::parts::{part_files, rows_of};
-use super::row::{Row, Status};
+use super::row::{LeanRow, Status};
 use crate::diagnosis::scaled;
 use crate::io::Message;
 use crate::report::{Cell, Order, Page, Provenance, Section, Standing, Table};
@@ -38,7 +37,7 @@ struct Seen {
 pub(super) fn of(list: &Path, folder: &Path) -> Result<String, Message> {
     let mut seen = Seen::default();
     for part in part_files(folder)? {
-        for (_, row) in rows_of(&part)? {
+        for (_, row) in rows_of::<LeanRow>(&part)? {
             seen.take(row);
         }
     }
@@ -46,33 +45,37 @@ pub(super) fn of(list: &Path, folder: &Path) -> Result<String, Message> {
 }
 
 impl Seen {
-    fn take(&mut self, row: Row) {
+    fn take(&mut self, row: LeanRow) {
         self.campaigns += 1;
         if row.status == Status::Failed {
             let why = row.message.clone().unwrap_or_default();
             self.failures.push((row.id.clone(), why));
         }
         let Some(result) = row.result else { return };
-        let verdict = match &result["verdict"] {
-            Value::Null => &result["diagnosis"]["verdict"],
+        let of_diagnosis = || result.get("diagnosis")?.get("verdict");
+        let verdict = match result.get("verdict") {
+            None | Some(Lean::Nothing) => of_diagnosis(),
             own => own,
         };
-        if let Some(effects) = verdict["effects"].as_array() {
+        if let Some(Lean::Texts(effects)) = verdict.and_then(|v| v.get("effects")) {
             self.verdicts += 1;
-            for effect in effects.iter().filter_map(Value::as_str) {
-                *self.effects.entry(effect.to_owned()).or_default() += 1;
+            for effect in effects {
+                *self.effects.entry(effect.clone()).or_default() += 1;
             }
         }
-        let schema = result["schema"].as_str().unwrap_or_default().to_owned();
-        self.quantities_of(&schema, "", &result, &row.id);
+        let schema = result
+            .get("schema")
+            .and_then(Lean::text)
+            .unwrap_or_default();
+        self.quantities_of(schema, "", &result, &row.id);
     }
 
     /// Everything with a value and a unit, by its name in the answer.
-    fn quantities_of(&mut self, schema: &str, name: &str, value: &Value, id: &str) {
-        let Value::Object(object) = value else { return };
+    fn quantities_of(&mut self, schema: &str, name: &str, value: &Lean, id: &str) {
+        let Lean::Object(members) = value else { return };
         if let (Some(value), Some(unit)) = (
-            object.get("value").and_then(Value::as_f64),
-            object.get("unit").and_then(Value::as_str),
+            value.get("value").and_then(Lean::number),
+            value.get("unit").and_then(Lean::text),
         ) {
             let (factor, unit) = scaled(unit);
             let key = (schema.to_owned(), name.to_owned(), unit.to_owned());
@@ -80,7 +83,7 @@ impl Seen {
             range.values.push((factor * value, id.to_owned()));
             return;
         }
-        for (key, inner) in object {
+        for (key, inner) in members {
             let name = if name.is_empty() {
                 key.clone()
             } else {

@@ -6,13 +6,15 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use indicatif::ProgressBar;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::campaigns::{Campaign, Campaigns};
-use super::key::state;
-use super::log::{Log, PartDone};
-use super::row::{Row, Status};
-use super::{Args, Shard, unwritable, work};
+use super::key::{Inputs, state};
+use super::log::{Log, PartDone, Report};
+use super::row::{Head, Status};
+use super::{Shard, selection, unwritable, work};
 use crate::io::Message;
 use crate::io::source::hexadecimal;
 
@@ -22,12 +24,26 @@ type Known = HashMap<(String, String), (String, Status)>;
 /// Campaigns of one part.
 const LENGTH: usize = 200;
 
-/// The campaigns of one part and its place.
-pub(super) struct Part<'a> {
-    pub campaigns: Vec<&'a Campaign>,
-    place: PathBuf,
-    /// Rows of a part that is not complete: what a kill leaves to be taken up.
-    journal: PathBuf,
+/// The campaigns of one part.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Part {
+    pub campaigns: Vec<Campaign>,
+    /// Share and number, as its files are called by.
+    name: String,
+}
+
+/// How parts are worked out.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct How {
+    /// The folder of the answers.
+    pub out: PathBuf,
+    /// Campaigns at the same time.
+    pub jobs: usize,
+    pub retry_failed: bool,
+    /// Whether every input is read again.
+    pub verify: bool,
+    /// Whether every part is written as Parquet too.
+    pub parquet: bool,
 }
 
 /// A share in the names of its files.
@@ -53,31 +69,39 @@ pub(super) fn part_files(folder: &Path) -> Result<Vec<PathBuf>, Message> {
     Ok(parts)
 }
 
-/// What became of a part.
-#[derive(Debug, Default)]
-pub(super) struct Done {
-    pub worked_out: usize,
-    pub failed: usize,
-}
-
-impl<'a> Part<'a> {
+impl Part {
     /// The parts of a shard: campaigns i, i + n, i + 2n …, so that a list may grow at its end.
-    pub fn of(campaigns: &'a Campaigns, shard: Shard, folder: &Path) -> Vec<Self> {
-        let own: Vec<&Campaign> = campaigns
-            .0
-            .iter()
-            .skip(shard.index - 1)
-            .step_by(shard.of)
-            .collect();
-        let name = share(shard);
-        let chunks = own.chunks(LENGTH).enumerate();
-        chunks
-            .map(|(k, campaigns)| Self {
-                campaigns: campaigns.to_vec(),
-                place: folder.join(format!("part-{name}-{:05}.ndjson", k + 1)),
-                journal: folder.join(format!(".journal-{name}-{:05}.ndjson", k + 1)),
+    pub fn of(campaigns: Campaigns, shard: Shard) -> Vec<Self> {
+        let own = campaigns.0.into_iter().skip(shard.index - 1);
+        let mut own = own.step_by(shard.of);
+        let share = share(shard);
+        let next = |k: usize| {
+            let campaigns: Vec<Campaign> = own.by_ref().take(LENGTH).collect();
+            (!campaigns.is_empty()).then(|| Self {
+                campaigns,
+                name: format!("{share}-{k:05}"),
             })
-            .collect()
+        };
+        (1..).map_while(next).collect()
+    }
+
+    fn file_name(&self) -> String {
+        format!("part-{}.ndjson", self.name)
+    }
+
+    /// Its answers.
+    fn place(&self, folder: &Path) -> PathBuf {
+        folder.join(self.file_name())
+    }
+
+    /// The same as Parquet.
+    fn parquet(&self, folder: &Path) -> PathBuf {
+        self.place(folder).with_extension("parquet")
+    }
+
+    /// Rows of a part that is not complete: what a kill leaves to be taken up.
+    fn journal(&self, folder: &Path) -> PathBuf {
+        folder.join(format!(".journal-{}.ndjson", self.name))
     }
 
     /// Parts that a folder holds of other shares than these, or of more campaigns than the list has now.
@@ -102,7 +126,7 @@ impl<'a> Part<'a> {
                         .remedy("give --shard with the same number of shares, or another folder"),
                 );
             }
-            if name.starts_with(&own) && parts.iter().all(|part| part.place != place) {
+            if name.starts_with(&own) && parts.iter().all(|part| part.file_name() != name) {
                 left.push(place);
             }
         }
@@ -115,99 +139,102 @@ impl<'a> Part<'a> {
     /// The folder holds answers that were shared out otherwise, or cannot be written.
     pub fn clear(parts: &[Self], shard: Shard, folder: &Path) -> Result<(), Message> {
         for place in Self::strange(parts, shard, folder)? {
+            let parquet = place.with_extension("parquet");
+            if parquet.exists() {
+                std::fs::remove_file(&parquet).map_err(|e| unwritable(&parquet, &e))?;
+            }
             std::fs::remove_file(&place).map_err(|e| unwritable(&place, &e))?;
         }
         Ok(())
     }
 
-    /// Works out what is not done, and puts the part in place.
+    /// What the log says of the part, where it is complete: there as it was written, and about these
+    /// campaigns, whose inputs are as they were.
+    pub fn complete<'l>(&self, log: &'l Log, how: &How) -> Option<&'l PartDone> {
+        let done = log.part(&self.file_name())?;
+        let there = state(&self.place(&how.out)).ok()?;
+        let lacks = how.parquet && !self.parquet(&how.out).exists();
+        if lacks || there != (done.size, done.changed) {
+            return None;
+        }
+        let keys = self.campaigns.iter().map(|c| log.inputs.known_key(c));
+        let keys: Vec<String> = keys.collect::<Option<_>>()?;
+        (done.rows == self.digest(&keys)).then_some(done)
+    }
+
+    /// Works out what is not done, and puts the part in place. Where another process is at the same part,
+    /// its end is waited for.
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub fn work(&self, log: &mut Log, args: &Args, bar: &ProgressBar) -> Result<Done, Message> {
-        let keys: Vec<String> = self.campaigns.iter().map(|c| log.inputs.key(c)).collect();
-        let rows = self.digest(&keys);
-        if let Some(done) = self.complete(log, &rows)
-            && !(args.retry_failed && done.failed > 0)
-        {
-            bar.inc(self.campaigns.len() as u64);
-            return Ok(Done {
-                worked_out: 0,
-                failed: done.failed,
-            });
-        }
-        let mut known = self.known(args.retry_failed)?;
+    pub fn work(&self, inputs: &Inputs, how: &How, bar: &ProgressBar) -> Result<Report, Message> {
+        let (place, journal) = (self.place(&how.out), self.journal(&how.out));
+        let open = OpenOptions::new().create(true).append(true).open(&journal);
+        let mut kept = open.map_err(|e| unwritable(&journal, &e))?;
+        kept.lock().map_err(|e| unwritable(&journal, &e))?;
+        let held = selection::read(&self.campaigns);
+        let keys = work::keys(&self.campaigns, (inputs, &held), how.jobs)?;
+        let mut known = known(&[&place, &journal], how.retry_failed)?;
         let mut lines: Vec<Option<(String, Status)>> = Vec::new();
         let mut waiting = Vec::new();
         for (at, (campaign, key)) in self.campaigns.iter().zip(&keys).enumerate() {
             let line = known.remove(&(campaign.id.clone(), key.clone()));
             if line.is_none() {
-                waiting.push((at, *campaign, key.clone()));
+                waiting.push((at, campaign, key.clone()));
             }
             lines.push(line);
         }
         bar.inc((self.campaigns.len() - waiting.len()) as u64);
-        let seconds = self.work_out(&waiting, &mut lines, args, bar)?;
+        let mut seconds = Vec::new();
+        work::all(&waiting, (inputs, &held), how.jobs, bar, |worked| {
+            let failed = |e: std::io::Error| unwritable(&journal, &e);
+            let line = serde_json::to_string(&worked.row).map_err(|e| failed(e.into()))?;
+            // A line that a kill has cut off ends before this one.
+            kept.write_all(format!("\n{line}\n").as_bytes())
+                .map_err(failed)?;
+            seconds.push((worked.row.id.clone(), worked.seconds));
+            lines[worked.at] = Some((line, worked.row.status));
+            Ok(())
+        })?;
         let (mut text, mut failed) = (String::new(), 0);
         for (line, status) in lines.into_iter().flatten() {
             text += &line;
             text.push('\n');
             failed += usize::from(status == Status::Failed);
         }
-        replace(&self.place, text.as_bytes())?;
-        let (size, changed) = state(&self.place).map_err(|e| unwritable(&self.place, &e))?;
+        self.beside(&text, how)?;
+        replace(&place, text.as_bytes())?;
+        let (size, changed) = state(&place).map_err(|e| unwritable(&place, &e))?;
         let part = PartDone {
-            part: self.name(),
+            part: self.file_name(),
             size,
             changed,
-            rows,
+            rows: self.digest(&keys),
             failed,
         };
-        log.tell(part, seconds)?;
         // It is in the part now.
-        let _ = std::fs::remove_file(&self.journal);
-        Ok(Done {
-            worked_out: waiting.len(),
-            failed,
+        let _ = std::fs::remove_file(&journal);
+        Ok(Report {
+            part,
+            seconds,
+            inputs: inputs.take_fresh(),
         })
     }
 
-    /// Works out campaigns; each row goes to the journal at once. Returns the seconds of each.
-    fn work_out(
-        &self,
-        waiting: &[(usize, &Campaign, String)],
-        lines: &mut [Option<(String, Status)>],
-        args: &Args,
-        bar: &ProgressBar,
-    ) -> Result<Vec<(String, f64)>, Message> {
-        if waiting.is_empty() {
-            return Ok(Vec::new());
+    /// The rows as Parquet, where that is asked for; else what is there of other rows goes.
+    fn beside(&self, text: &str, how: &How) -> Result<(), Message> {
+        let place = self.parquet(&how.out);
+        #[cfg(feature = "parquet")]
+        if how.parquet {
+            let bytes = super::parquet::of(text.lines())
+                .map_err(|e| unwritable(&place, &std::io::Error::other(e)))?;
+            return replace(&place, &bytes);
         }
-        let open = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&self.journal);
-        let mut journal = open.map_err(|e| unwritable(&self.journal, &e))?;
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let jobs = args.jobs.map_or(cores, usize::from);
-        let mut seconds = Vec::new();
-        work::all(waiting, jobs, bar, |worked| {
-            let failed = |e: std::io::Error| unwritable(&self.journal, &e);
-            let line = serde_json::to_string(&worked.row).map_err(|e| failed(e.into()))?;
-            // A line that a kill has cut off ends before this one.
-            journal
-                .write_all(format!("\n{line}\n").as_bytes())
-                .map_err(failed)?;
-            seconds.push((worked.row.id.clone(), worked.seconds));
-            lines[worked.at] = Some((line, worked.row.status));
-            Ok(())
-        })?;
-        Ok(seconds)
-    }
-
-    fn name(&self) -> String {
-        let name = self.place.file_name().unwrap_or_default();
-        name.to_string_lossy().into_owned()
+        let same = || std::fs::read_to_string(self.place(&how.out)).is_ok_and(|old| old == text);
+        if place.exists() && !same() {
+            std::fs::remove_file(&place).map_err(|e| unwritable(&place, &e))?;
+        }
+        Ok(())
     }
 
     /// Digest of what the rows are about.
@@ -220,31 +247,24 @@ impl<'a> Part<'a> {
         }
         hexadecimal(hash)
     }
+}
 
-    /// Whether the part is there with just these rows, as the log has it.
-    fn complete<'l>(&self, log: &'l Log, rows: &str) -> Option<&'l PartDone> {
-        let done = log.part(&self.name())?;
-        let there = state(&self.place).ok()?;
-        (done.rows == rows && there == (done.size, done.changed)).then_some(done)
-    }
-
-    /// The rows that are there, by id and key: of the part and of its journal.
-    fn known(&self, retry_failed: bool) -> Result<Known, Message> {
-        let mut known = Known::new();
-        for place in [&self.place, &self.journal] {
-            for (line, row) in rows_of(place)? {
-                if !(retry_failed && row.status == Status::Failed) {
-                    known.insert((row.id, row.key), (line, row.status));
-                }
+/// The rows that are there, by id and key.
+fn known(places: &[&Path], retry_failed: bool) -> Result<Known, Message> {
+    let mut known = Known::new();
+    for place in places {
+        for (line, row) in rows_of::<Head>(place)? {
+            if !(retry_failed && row.status == Status::Failed) {
+                known.insert((row.id, row.key), (line, row.status));
             }
         }
-        Ok(known)
     }
+    Ok(known)
 }
 
 /// The rows of a file that may not be there, with their lines; what is no row, as a kill leaves it, is
 /// passed over.
-pub(super) fn rows_of(place: &Path) -> Result<Vec<(String, Row)>, Message> {
+pub(super) fn rows_of<T: DeserializeOwned>(place: &Path) -> Result<Vec<(String, T)>, Message> {
     let file = match File::open(place) {
         Ok(file) => file,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),

@@ -3,13 +3,15 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::lean::Lean;
+
 /// The schema of a row.
 const SCHEMA: &str = "errsep.batch/1";
 
 /// What a campaign came to.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Row {
-    schema: String,
+    schema: &'static str,
     /// Id of the campaign.
     pub id: String,
     /// SHA-256 of files, options and version.
@@ -22,6 +24,25 @@ pub(super) struct Row {
     pub message: Option<String>,
     /// The command's JSON without times and provenance.
     pub result: Option<Value>,
+}
+
+/// What a row is about, as it is read back.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub(super) struct Head {
+    pub id: String,
+    pub key: String,
+    pub status: Status,
+}
+
+/// A row without its lists of numbers, as it is read back.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub(super) struct LeanRow {
+    pub id: String,
+    pub key: String,
+    pub status: Status,
+    pub exit: u8,
+    pub message: Option<String>,
+    pub result: Option<Lean>,
 }
 
 /// Whether there is an answer.
@@ -44,7 +65,7 @@ impl Row {
             without_times(result);
         }
         Self {
-            schema: SCHEMA.to_owned(),
+            schema: SCHEMA,
             id,
             key,
             status: if exit == 0 {

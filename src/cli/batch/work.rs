@@ -2,15 +2,20 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use indicatif::ProgressBar;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use super::campaigns::Campaign;
+use super::key::Inputs;
 use super::row::Row;
-use crate::cli::call::call;
+use super::selection::{Held, Selection};
+use crate::cli::call::answer;
+use crate::cli::common::Wanted;
+use crate::io::source::InMemory;
 use crate::io::{Message, Status};
 
 /// A campaign that was worked out.
@@ -30,6 +35,7 @@ pub(super) struct Worked {
 /// No thread can be had, or `done` failed.
 pub(super) fn all(
     waiting: &[(usize, &Campaign, String)],
+    (inputs, held): (&Inputs, &Held),
     jobs: usize,
     bar: &ProgressBar,
     done: impl FnMut(Worked) -> Result<(), Message> + Send,
@@ -39,9 +45,7 @@ pub(super) fn all(
     let pools = (0..jobs.min(waiting.len()).max(1))
         .map(|_| ThreadPoolBuilder::new().num_threads(1).build())
         .collect::<Result<Vec<ThreadPool>, _>>()
-        .map_err(|e| {
-            Message::bad_input(format!("no thread can be started: {e}")).remedy("give fewer --jobs")
-        })?;
+        .map_err(|e| no_thread(&e))?;
     std::thread::scope(|scope| {
         for pool in &pools {
             scope.spawn(|| {
@@ -49,7 +53,7 @@ pub(super) fn all(
                     waiting.get(next.fetch_add(1, Ordering::Relaxed))
                 {
                     let begin = Instant::now();
-                    let row = pool.install(|| one(campaign, key));
+                    let row = pool.install(|| one(campaign, key, inputs, held));
                     let seconds = begin.elapsed().as_secs_f64();
                     bar.inc(1);
                     let mut outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner);
@@ -70,13 +74,50 @@ pub(super) fn all(
     ended
 }
 
+/// The keys of campaigns.
+///
+/// # Errors
+/// No thread can be had.
+pub(super) fn keys(
+    campaigns: &[Campaign],
+    (inputs, held): (&Inputs, &Held),
+    jobs: usize,
+) -> Result<Vec<String>, Message> {
+    let pool = ThreadPoolBuilder::new().num_threads(jobs).build();
+    let pool = pool.map_err(|e| no_thread(&e))?;
+    Ok(pool.install(|| campaigns.par_iter().map(|c| inputs.key(c, held)).collect()))
+}
+
+fn no_thread(error: &ThreadPoolBuildError) -> Message {
+    Message::bad_input(format!("no thread can be started: {error}")).remedy("give fewer --jobs")
+}
+
 /// One campaign: whatever happens to it, it is a row.
-fn one(campaign: &Campaign, key: &str) -> Row {
+fn one(campaign: &Campaign, key: &str, inputs: &Inputs, held: &Held) -> Row {
     let known = (campaign.id.clone(), key.to_owned());
-    let called = catch_unwind(AssertUnwindSafe(|| call(&campaign.arguments, Vec::new())));
+    let name = campaign.selection.as_ref().map(Selection::name);
+    let selected = name.and_then(|name| Some((held.get(&name)?, name)));
+    let in_memory = match selected {
+        None => Vec::new(),
+        Some((Ok(rows), name)) => vec![InMemory {
+            name: name.to_string_lossy().into_owned(),
+            bytes: Arc::clone(rows),
+        }],
+        Some((Err(why), _)) => {
+            return Row::new(known, why.status().code(), Some(told(why)), None);
+        }
+    };
+    let called = catch_unwind(AssertUnwindSafe(|| {
+        answer(&campaign.arguments, in_memory, Wanted::Json)
+    }));
+    if let Some(file) = inputs.changed_since(campaign) {
+        let why = Message::bad_input("the file changed while the campaign was worked out")
+            .in_file(file)
+            .remedy("run the batch again when nothing writes to it");
+        return Row::new(known, why.status().code(), Some(told(&why)), None);
+    }
     match called {
-        Ok(Ok(traced)) => {
-            let answer = traced.answer;
+        Ok(Ok(answer)) => {
             let sentence = || answer.page.told().1.to_owned();
             let message = (answer.status != Status::Done).then(sentence);
             Row::new(known, answer.status.code(), message, Some(answer.json))

@@ -98,12 +98,14 @@ impl<M: FittedModel> Case<M> {
         Ok(Answer {
             text,
             json,
-            page: sheet::page(&view),
-            tables: vec![residuals(
-                &self.model,
-                &diagnosis.detail.before,
-                &diagnosis.detail.after,
-            )],
+            page: args.common.page(|| sheet::page(&view)),
+            tables: args.common.tables(|| {
+                vec![residuals(
+                    &self.model,
+                    &diagnosis.detail.before,
+                    &diagnosis.detail.after,
+                )]
+            }),
             inputs,
             setup: None,
             seed: Some(args.common.seed),

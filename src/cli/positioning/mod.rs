@@ -100,16 +100,18 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     Ok(Answer {
         text: words::in_words(&name, &found, drift.as_deref()),
         json: json::as_json(&found)?,
-        page: page(&PositioningView {
-            data: &name,
-            axis: found.setup.name.as_deref(),
-            position_unit: found.setup.kind.position_unit(),
-            deviation_unit: found.setup.kind.deviation_unit(),
-            result: &found.result,
-            contents: &words::contents(&found),
-            withheld: &words::withheld(&found.result),
-            drift: drift.as_deref(),
-            warnings: &found.warnings,
+        page: args.common.page(|| {
+            page(&PositioningView {
+                data: &name,
+                axis: found.setup.name.as_deref(),
+                position_unit: found.setup.kind.position_unit(),
+                deviation_unit: found.setup.kind.deviation_unit(),
+                result: &found.result,
+                contents: &words::contents(&found),
+                withheld: &words::withheld(&found.result),
+                drift: drift.as_deref(),
+                warnings: &found.warnings,
+            })
         }),
         tables: vec![points(&found)],
         inputs: std::iter::once(&args.data)

@@ -6,8 +6,8 @@ use errsep_models::reversal::diagnosable::FirstOrder;
 use errsep_models::reversal::simultaneous::Simultaneous;
 use serde_json::Value;
 
-use crate::cli::Answer;
 use crate::cli::diagnose::{page, reversal, within_reach_of, words};
+use crate::cli::{Answer, CommonArgs};
 use crate::diagnosis::{Diagnosis, Options, diagnose};
 use crate::io::Message;
 use crate::io::reversal::{ReversalData, ReversalSetup};
@@ -50,17 +50,21 @@ impl Diagnosed {
 
     /// The answer with the diagnosis behind it: in the text, as `diagnosis` in the JSON, as sections of
     /// the page.
-    pub fn beside(self, mut answer: Answer, seed: u64) -> Result<Answer, Message> {
-        answer.text += &format!("\n{HEADING}\n\n{}", words::in_words(&self.diagnosis));
+    pub fn beside(self, mut answer: Answer, common: &CommonArgs) -> Result<Answer, Message> {
+        answer.text +=
+            &common.text(|| format!("\n{HEADING}\n\n{}", words::in_words(&self.diagnosis)));
         if let Value::Object(object) = &mut answer.json {
             let own = serde_json::to_value(&self.diagnosis).map_err(|e| {
                 Message::bad_input(format!("the diagnosis cannot be written as JSON: {e}"))
             })?;
             object.insert("diagnosis".to_owned(), own);
         }
-        let view = page::view(self.data, &self.model, reversal::ALONG, &self.diagnosis);
-        answer.page = answer.page.followed_by(HEADING, sheet::page(&view));
-        answer.seed = Some(seed);
+        let page = answer.page;
+        answer.page = common.page(|| {
+            let view = page::view(self.data, &self.model, reversal::ALONG, &self.diagnosis);
+            page.followed_by(HEADING, sheet::page(&view))
+        });
+        answer.seed = Some(common.seed);
         Ok(answer)
     }
 }

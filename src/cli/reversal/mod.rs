@@ -20,10 +20,9 @@ use errsep_models::reversal::simultaneous::Simultaneous;
 use errsep_models::reversal::staged::Removal;
 use serde_json::Value;
 
-use super::{Answer, CommonArgs, Format};
+use super::{Answer, CommonArgs};
 use crate::io::reversal::{ColumnMap, ReversalData, ReversalSetup, read};
 use crate::io::{Message, OutFile, Status};
-use crate::report::Page;
 use diagnosed::Diagnosed;
 use outcome::Outcome;
 
@@ -75,9 +74,6 @@ pub struct Args {
     columns: Option<ColumnMap>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
-    /// Page, tables and JSON are wanted whatever the other arguments say.
-    #[arg(skip)]
-    pub(super) whole: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -132,31 +128,23 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let mut inputs = vec![args.data.clone()];
     inputs.extend(args.setup.clone());
     // Of a million readings each of these is as large as the data: made only where asked for.
-    let folder = args.common.out.is_some() || args.whole;
-    let (page, tables) = if folder {
-        (
-            page::page(&args.data, &data, &setup, &outcome),
-            tables::tables(&outcome),
-        )
-    } else {
-        (Page::new("Reversal", String::new()), Vec::new())
-    };
+    let common = &args.common;
     let answer = Answer {
-        text: text::text(&args.data, &data, &outcome),
-        json: if folder || args.common.format == Format::Json {
+        text: common.text(|| text::text(&args.data, &data, &outcome)),
+        json: if common.wants_json() {
             json::json(&data, &outcome)?
         } else {
             Value::Null
         },
-        page,
-        tables,
+        page: common.page(|| page::page(&args.data, &data, &setup, &outcome)),
+        tables: common.tables(|| tables::tables(&outcome)),
         inputs,
         setup: None,
         seed: None,
         status: Status::Done,
     };
     match diagnosed {
-        Some(diagnosed) => diagnosed.beside(answer, args.common.seed),
+        Some(diagnosed) => diagnosed.beside(answer, common),
         None => Ok(answer),
     }
 }

@@ -126,12 +126,14 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let answer = Answer {
         text: text::in_words(&name, &found)?,
         json: json::as_json(&found, &assumptions)?,
-        page: page(&StepDiagonalView {
-            data: &name,
-            fit: &found.fit,
-            forms: &found.forms,
-            totals: &found.totals,
-            choices: &found.choices,
+        page: args.common.page(|| {
+            page(&StepDiagonalView {
+                data: &name,
+                fit: &found.fit,
+                forms: &found.forms,
+                totals: &found.totals,
+                choices: &found.choices,
+            })
         }),
         tables: vec![tables::components(&found.fit), tables::residuals(&found)],
         inputs: std::iter::once(&args.data)

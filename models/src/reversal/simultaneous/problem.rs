@@ -4,6 +4,8 @@
 //! reading sees (slide's form at x, artefact's form at u) is that cell. Both are monotone in x, so
 //! a task is a run of the sorted readings, and its ends are found by bisection.
 
+use std::cell::RefCell;
+
 use errsep_solvers::linear::banded::Tall;
 use errsep_solvers::linear::bordered::{Constraints, Share};
 use errsep_solvers::loss::Loss;
@@ -363,6 +365,12 @@ pub struct Prepared {
     pub(super) placed: Option<Placed>,
 }
 
+thread_local! {
+    // Seven kilobytes, of which a short run fills a few: clearing them anew for every cell would take
+    // as long as the readings.
+    static POINTS: RefCell<Points> = RefCell::default();
+}
+
 impl StructuredProblem for Reversal<'_> {
     type Prepared = Prepared;
 
@@ -463,28 +471,30 @@ impl StructuredProblem for Reversal<'_> {
             return Ok(());
         }
         let channel = &self.channels[c];
-        let mut points = Points::default();
-        self.runs(prepared, c, cell, |from, to, side, slide| {
-            let run = self.run(prepared, c, side, slide);
-            sink.open(run.columns());
-            for first in (from..to).step_by(Tall::CAPACITY) {
-                let last = to.min(first + Tall::CAPACITY);
-                let x = &channel.x[first..last];
-                points.locate(&run, x, &channel.value[first..last])?;
-                if self.loss == Loss::Quadratic {
-                    points.fill(&run, x, None, sink.batch(last - first));
-                    sink.push();
-                } else {
-                    let robust = Robust::of(self.loss, self.far, &points.residual[..last - first]);
-                    let batch = sink.batch(last - first);
-                    points.fill(&run, x, Some(&robust.rows), batch);
-                    robust.replace_residuals(batch);
-                    sink.push_with_cost(robust.cost);
+        POINTS.with_borrow_mut(|points| {
+            self.runs(prepared, c, cell, |from, to, side, slide| {
+                let run = self.run(prepared, c, side, slide);
+                sink.open(run.columns());
+                for first in (from..to).step_by(Tall::CAPACITY) {
+                    let last = to.min(first + Tall::CAPACITY);
+                    let x = &channel.x[first..last];
+                    points.locate(&run, x, &channel.value[first..last])?;
+                    if self.loss == Loss::Quadratic {
+                        points.fill(&run, x, None, sink.batch(last - first));
+                        sink.push();
+                    } else {
+                        let residual = &points.residual[..last - first];
+                        let robust = Robust::of(self.loss, self.far, residual);
+                        let batch = sink.batch(last - first);
+                        points.fill(&run, x, Some(&robust.rows), batch);
+                        robust.replace_residuals(batch);
+                        sink.push_with_cost(robust.cost);
+                    }
                 }
-            }
-            let band = self.band_columns(c, side, slide);
-            sink.close(band, self.shares(c, side, slide), c);
-            Ok(())
+                let band = self.band_columns(c, side, slide);
+                sink.close(band, self.shares(c, side, slide), c);
+                Ok(())
+            })
         })
     }
 

@@ -4,6 +4,7 @@
 mod cells;
 mod combinations;
 mod convention;
+pub mod designs;
 pub mod diagnosable;
 pub mod effects;
 mod exact_form;

@@ -1,5 +1,6 @@
 //! The reversal, staged and simultaneous, against known truth.
 
+mod designs;
 #[path = "../faulty_machine/mod.rs"]
 mod faulty_machine;
 mod left_out;

@@ -35,7 +35,11 @@ pub struct FittedKnots {
 const SUSPICIOUS_Z: f64 = 4.0;
 
 impl FittedKnots {
-    pub(super) fn new(breaks: Vec<f64>, table: Vec<KnotTrial>, residuals: &[Vec<f64>]) -> Self {
+    pub(in crate::reversal) fn new(
+        breaks: Vec<f64>,
+        table: Vec<KnotTrial>,
+        residuals: &[Vec<f64>],
+    ) -> Self {
         let sums: Vec<[f64; 3]> = residuals
             .par_iter()
             .map(|channel| {

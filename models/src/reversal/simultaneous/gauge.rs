@@ -89,7 +89,7 @@ pub fn constraints(
 }
 
 /// The two rows of G⁻¹XᵀW B for growing positions.
-fn line_of_spline(basis: &CubicBSpline, places: &[f64], axis: Axis) -> [Vec<f64>; 2] {
+pub fn line_of_spline(basis: &CubicBSpline, places: &[f64], axis: Axis) -> [Vec<f64>; 2] {
     let starts = starts(places, basis.breaks());
     // Moments Σ w tᵖ, Σ w ξ tᵖ and Σ w ξ² of the positions of each cell of the spline.
     let moments: Vec<[f64; 9]> = (0..basis.cell_count())

@@ -38,13 +38,13 @@ pub struct KnotTrial {
 }
 
 /// Rungs after the best one before the ladder is left.
-const PATIENCE: usize = 3;
+pub const PATIENCE: usize = 3;
 
 /// Readings' positions a cell must have on average, so that the table never ends in interpolation.
-const POSITIONS_A_CELL: usize = 3;
+pub const POSITIONS_A_CELL: usize = 3;
 
 /// Cell counts of the ladder: a factor of about √2 apart.
-fn ladder(most: usize) -> impl Iterator<Item = usize> {
+pub fn ladder(most: usize) -> impl Iterator<Item = usize> {
     (2..)
         .map(|k: u32| {
             let power = 1_usize << (k / 2);
@@ -211,7 +211,7 @@ impl Choice<'_> {
     }
 }
 
-fn trial(cells: usize, readings: usize, unknowns: usize, squares: f64) -> KnotTrial {
+pub fn trial(cells: usize, readings: usize, unknowns: usize, squares: f64) -> KnotTrial {
     let (m, p) = (readings as f64, unknowns as f64);
     // Noise-free readings leave rounding only: keep the logarithm finite.
     let log = (squares / m).max(f64::MIN_POSITIVE).ln();

@@ -69,8 +69,8 @@ fn every_table_takes_the_units_that_stand_beside_its_names() {
             "fourier",
             &["--setup", "s/setup.toml"],
             "scans.csv",
-            "spacing_m,repeat,x (inch),m1_mm,m2 (µm),m3 [nm]",
-            &[1e-3, 1.0, INCH, 1e-3, 1.0, 1e3],
+            "spacing_mm,repeat,x (inch),m1_mm,m2 (µm),m3 [nm]",
+            &[1.0, 1.0, INCH, 1e-3, 1.0, 1e3],
         ),
         (
             "reversal",

@@ -255,7 +255,7 @@ fn warnings(fit: &DesignFit, data: &DesignData) -> Vec<String> {
             .map(|r| (r / fit.noise_um).powi(2))
             .sum();
         let freedom = fit.degrees_of_freedom;
-        if exceeds(squares, freedom) {
+        if freedom > 0.0 && exceeds(squares, freedom) {
             warnings.push(format!(
                 "the readings scatter {} times as much as the declared noise: model and readings disagree, \
                  and the uncertainties are too small",

@@ -9,6 +9,7 @@
 mod anova;
 mod calibration_line;
 mod circle;
+mod designs;
 mod diagnosis;
 mod four_sensor;
 mod fourier;
@@ -31,6 +32,7 @@ type Room = (&'static str, u64, fn(u64) -> Vec<Row>);
 /// One line a model.
 const ROOMS: &[Room] = &[
     ("reversal", 2000, reversal::rows),
+    ("designs", 400, designs::rows),
     ("with", 200, with::rows),
     ("joined", 400, joined::rows),
     ("staged", 2000, staged::rows),

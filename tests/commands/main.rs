@@ -5,6 +5,7 @@ mod batch;
 mod circle;
 #[path = "../command/mod.rs"]
 mod command;
+mod designs;
 mod diagnose;
 mod export;
 #[path = "../../models/tests/faulty_machine/mod.rs"]

@@ -1,5 +1,6 @@
 //! `errsep reversal`: from the readings of a reversal to tilts and forms with their uncertainty.
 
+mod designs;
 mod diagnosed;
 mod effects;
 mod json;
@@ -21,7 +22,7 @@ use errsep_models::reversal::staged::Removal;
 use serde_json::Value;
 
 use super::{Answer, CommonArgs};
-use crate::io::reversal::{ColumnMap, ReversalData, ReversalSetup, read};
+use crate::io::reversal::{ColumnMap, Readings, ReversalData, ReversalSetup, read_any};
 use crate::io::{Message, OutFile, Status};
 use diagnosed::Diagnosed;
 use outcome::Outcome;
@@ -32,11 +33,15 @@ use outcome::Outcome;
 DATA.csv has one row a reading (channel,x,reading; also repeat,direction,time) or one column a
 channel (x,1A,1B,2A,2B). Channels: 1A near indicator at 0 degrees, 1B far at 0, 2A far at 180,
 2B near at 180. x in mm, readings in um, positive towards the indicator. Any of the channels may be
-left out: the answer says what the rest determines.
+left out: the answer says what the rest determines. Other designs (both planes, every 90 degrees, any
+number of indicators): columns indicator and spindle (degrees) in place of channel, or the angles of each
+channel in [channels] of the set-up, such as 4D = { indicator = 270, spindle = 90 }; the answer is always
+the simultaneous solution then.
 
 Examples:
     errsep reversal data.csv
     errsep reversal data.csv --setup setup.toml --simultaneous --out report
+    errsep reversal eight.csv --setup angles.toml --out report
     errsep reversal data.csv --simultaneous --diagnose
     errsep reversal data.csv --simultaneous --with thermal-drift,zero-jump --corrected clean.csv
     errsep reversal cad.csv --columns x=z_mm:mm,1A=I_0_0:mm,2B=I_0_180:mm")]
@@ -104,7 +109,14 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         .map(OutFile::reserve)
         .transpose()?;
     let progress = super::progress("reading", None);
-    let data = read(&args.data, &setup.columns)?;
+    let data = match read_any(&args.data, &setup)? {
+        Readings::Four(data) => data,
+        Readings::Other(data) => {
+            let answer = designs::answer(args, &setup, &data);
+            progress.finish_and_clear();
+            return answer;
+        }
+    };
     progress.set_message("solving");
     let (mut outcome, fit) = solve(args, &data, &setup)?;
     outcome.warnings.extend(still(&data));

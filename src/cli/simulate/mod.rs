@@ -3,6 +3,7 @@
 pub mod anova;
 pub mod calibration_line;
 pub mod circle;
+mod designs;
 pub mod four_sensor;
 pub mod fourier;
 pub mod machine;

@@ -28,9 +28,9 @@ const URAD: f64 = 1e-6;
 
 /// Readings of a reversal in exact geometry, with known tilts and forms.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Example: errsep simulate reversal --alpha 40 --thickness 42 --noise 0.02 --seed 7 --out data"
-)]
+#[command(after_help = "Examples:
+    errsep simulate reversal --alpha 40 --thickness 42 --noise 0.02 --seed 7 --out data
+    errsep simulate reversal --design 0/0,180/0,90/0,270/0,0/180,180/180,90/180,270/180 --alpha-v 25 --out eight")]
 pub struct Args {
     /// Tilt between slide and spindle axis, urad.
     #[arg(
@@ -39,7 +39,7 @@ pub struct Args {
         default_value_t = 40.0,
         allow_hyphen_values = true
     )]
-    alpha: f64,
+    pub(super) alpha: f64,
     /// Second tilt (sign of the spindle position), urad.
     #[arg(
         long,
@@ -47,25 +47,25 @@ pub struct Args {
         default_value_t = 0.0,
         allow_hyphen_values = true
     )]
-    beta: f64,
+    pub(super) beta: f64,
     /// Third tilt (sign of the artefact's side), urad.
     #[arg(long, value_name = "URAD", default_value_t = -150.0, allow_hyphen_values = true)]
-    gamma: f64,
+    pub(super) gamma: f64,
     /// Thickness of the artefact, mm.
     #[arg(long, value_name = "MM", default_value_t = 0.0)]
-    thickness: f64,
+    pub(super) thickness: f64,
     /// Travel, mm.
     #[arg(long, value_name = "MM", default_value_t = 300.0)]
-    length: f64,
+    pub(super) length: f64,
     /// Positions of each trace.
     #[arg(long, value_name = "N", default_value_t = 301)]
-    positions: usize,
+    pub(super) positions: usize,
     /// How often each trace is taken.
     #[arg(long, value_name = "N", default_value_t = 1)]
-    repeats: u32,
+    pub(super) repeats: u32,
     /// Take each repeat forward and backward.
     #[arg(long)]
-    both_directions: bool,
+    pub(super) both_directions: bool,
     /// Seconds from one reading to the next.
     #[arg(long, value_name = "S", default_value_t = 0.5)]
     interval: f64,
@@ -76,7 +76,7 @@ pub struct Args {
         value_delimiter = ',',
         default_value = "0.02"
     )]
-    noise: Vec<f64>,
+    pub(super) noise: Vec<f64>,
     /// Root mean square of the slide's form and of the artefact's, um.
     #[arg(
         long,
@@ -84,22 +84,74 @@ pub struct Args {
         value_delimiter = ',',
         default_value = "1,1"
     )]
-    forms: Vec<f64>,
+    pub(super) forms: Vec<f64>,
     /// Make the forms cubic splines of so many cells in place of waves.
     #[arg(long, value_name = "CELLS")]
-    spline: Option<usize>,
+    pub(super) spline: Option<usize>,
     /// Share of readings that are outliers, of twenty times the noise.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
-    outliers: f64,
+    pub(super) outliers: f64,
     /// Switch on an effect of the diagnosis's catalogue at a size, in its exact form; may be given
     /// several times. Sizes are in um, mm or rad as the catalogue gives them.
     #[arg(long = "effect", value_name = "NAME=VALUE")]
-    effects: Vec<String>,
+    pub(super) effects: Vec<String>,
+    /// Another design than the four channels: indicator/spindle of each channel, degrees. --alpha and
+    /// --gamma are alpha_h and gamma_1 then.
+    #[arg(long, value_name = "I/S,...")]
+    design: Option<String>,
+    /// Tilt between slide and spindle axis in the vertical plane, urad.
+    #[arg(
+        long,
+        value_name = "URAD",
+        default_value_t = 0.0,
+        allow_hyphen_values = true,
+        requires = "design"
+    )]
+    pub(super) alpha_v: f64,
+    /// Tilt of the artefact along its side 90, urad.
+    #[arg(
+        long,
+        value_name = "URAD",
+        default_value_t = 0.0,
+        allow_hyphen_values = true,
+        requires = "design"
+    )]
+    pub(super) gamma_2: f64,
+    /// Half the cone angle of the artefact, urad.
+    #[arg(
+        long,
+        value_name = "URAD",
+        default_value_t = 0.0,
+        allow_hyphen_values = true,
+        requires = "design"
+    )]
+    pub(super) cone: f64,
+    /// Oval cone of the artefact, urad.
+    #[arg(
+        long,
+        value_name = "URAD",
+        default_value_t = 0.0,
+        allow_hyphen_values = true,
+        requires = "design"
+    )]
+    pub(super) kappa_c: f64,
+    /// Indicators that keep their zeros: eccentricity e_1, e_2 and oval part o of the artefact, um.
+    #[arg(
+        long,
+        value_name = "UM,UM,UM",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        requires = "design"
+    )]
+    pub(super) kept: Vec<f64>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
 
 pub(super) fn run(args: &Args) -> Result<Answer, Message> {
+    if let Some(design) = &args.design {
+        return super::designs::run(args, design);
+    }
     let plan = plan(args)?;
     let refused = |error: PlanError| {
         Message::bad_input(error.to_string()).remedy("correct the options of the simulation")

@@ -32,7 +32,7 @@ pub struct ReversalData {
     pub ignored: Vec<String>,
     /// Empty fields of a wide table: positions at which a channel was not read.
     pub gaps: usize,
-    first: [Option<Place>; 4],
+    pub(super) first: [Option<Place>; 4],
 }
 
 impl ReversalData {
@@ -92,7 +92,11 @@ pub(super) enum Readings {
 /// The file is no table, a column is unknown or missing, a field is not what its column holds, a
 /// reading is there twice, a channel's column is empty.
 pub fn read(path: &Path, map: &ColumnMap) -> Result<ReversalData, Message> {
-    let mut table = TableReader::open(path)?;
+    read_table(TableReader::open(path)?, map)
+}
+
+/// The same from a table that is open.
+pub(super) fn read_table(mut table: TableReader, map: &ColumnMap) -> Result<ReversalData, Message> {
     let columns = find_columns(&table, map)?;
     let mut data = ReversalData {
         observations: Observations::default(),
@@ -282,7 +286,7 @@ pub(super) fn channel_of(row: Row<'_>, column: &Column) -> Result<Channel, Messa
     })
 }
 
-fn direction(row: Row<'_>, column: &Column) -> Result<Direction, Message> {
+pub(super) fn direction(row: Row<'_>, column: &Column) -> Result<Direction, Message> {
     match row.text(column) {
         "forward" => Ok(Direction::Forward),
         "backward" => Ok(Direction::Backward),

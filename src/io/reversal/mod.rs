@@ -3,9 +3,11 @@
 mod columns;
 mod corrected;
 mod data;
+mod designs;
 mod setup;
 
 pub use columns::ColumnMap;
 pub use corrected::corrected;
 pub use data::{Layout, ReversalData, read};
+pub use designs::{DesignData, Readings, read_any};
 pub use setup::ReversalSetup;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use errsep_models::reversal::Convention;
+use errsep_models::reversal::designs::{Design, DesignChannel, DesignError, Zero};
 use errsep_models::reversal::staged::Interpolation;
 use serde::Deserialize;
 use toml::Spanned;
@@ -28,12 +29,17 @@ pub struct ReversalSetup {
     pub knots: Option<usize>,
     /// Names and units of the columns.
     pub columns: ColumnMap,
+    /// Channels by the angles of indicator and spindle.
+    pub channels: Vec<DesignChannel>,
+    /// What becomes of the indicators' zeros between the traces.
+    pub zero: Zero,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
 struct File {
     artefact: Artefact,
+    channels: BTreeMap<Spanned<String>, Spanned<Angles>>,
     indicator: Indicator,
     model: Model,
     columns: BTreeMap<Spanned<String>, Spanned<String>>,
@@ -50,6 +56,23 @@ struct Artefact {
 #[serde(deny_unknown_fields, default)]
 struct Indicator {
     noise: Option<Spanned<f64>>,
+    zero: Zeros,
+}
+
+/// The angles of a channel, degrees.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Angles {
+    indicator: f64,
+    spindle: f64,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+enum Zeros {
+    #[default]
+    Reset,
+    Kept,
 }
 
 #[derive(Deserialize, Default)]
@@ -104,7 +127,13 @@ impl ReversalSetup {
                 .add(role.as_ref(), column.as_ref())
                 .map_err(|(what, remedy)| setup.bad(role.span(), what, remedy))?;
         }
+        let channels = channels(&setup, &file.channels)?;
         Ok(Self {
+            channels,
+            zero: match file.indicator.zero {
+                Zeros::Reset => Zero::Reset,
+                Zeros::Kept => Zero::Kept,
+            },
             thickness: file.artefact.thickness.map(Spanned::into_inner),
             fit_thickness: file.artefact.fit_thickness,
             noise: file.indicator.noise.map(Spanned::into_inner),
@@ -146,6 +175,50 @@ impl ReversalSetup {
         if let Some(n) = self.knots {
             text += &format!("knots = {n}\n");
         }
+        if self.zero == Zero::Kept {
+            text = text.replacen("[indicator]\n", "[indicator]\nzero = \"kept\"\n", 1);
+        }
+        if !self.channels.is_empty() {
+            text += "\n[channels]      # degrees\n";
+        }
+        for c in &self.channels {
+            let (name, indicator, spindle) = (&c.name, c.indicator, c.spindle);
+            text += &format!("{name:?} = {{ indicator = {indicator}, spindle = {spindle} }}\n");
+        }
         text
     }
+}
+
+/// The channels of a set-up, each with angles of its own.
+fn channels(
+    setup: &SetupFile,
+    table: &BTreeMap<Spanned<String>, Spanned<Angles>>,
+) -> Result<Vec<DesignChannel>, Message> {
+    let mut channels: Vec<DesignChannel> = Vec::with_capacity(table.len());
+    for (name, angles) in table {
+        let Angles { indicator, spindle } = angles.as_ref();
+        let channel = DesignChannel::new(name.as_ref(), *indicator, *spindle).map_err(|why| {
+            setup.bad(
+                angles.span(),
+                why.to_string(),
+                "give both angles in degrees, 0 to 360",
+            )
+        })?;
+        channels.push(channel);
+        match Design::new(channels.clone()) {
+            Ok(_) => {}
+            Err(why @ DesignError::SameAngles { .. }) => {
+                return Err(setup.bad(
+                    angles.span(),
+                    why.to_string(),
+                    "give one of them its own angles; two traces of one channel are repeats of it: number \
+                     them in a column `repeat`",
+                ));
+            }
+            Err(why) => {
+                return Err(setup.bad(name.span(), why.to_string(), "list each channel once"));
+            }
+        }
+    }
+    Ok(channels)
 }

@@ -8,6 +8,7 @@
 mod bars;
 mod canvas;
 mod chart;
+mod dial;
 mod draw_chart;
 mod heat;
 mod pointer;
@@ -18,6 +19,7 @@ mod thin;
 
 pub use bars::{Bar, Bars};
 pub use chart::{Axis, Chart, Mark, Panels, Series};
+pub use dial::{Dial, Dials};
 pub use heat::{HeatMap, HeatMaps};
 pub use polar::{Polar, PolarTrace};
 
@@ -40,6 +42,14 @@ pub enum Plot {
     Polar(Polar),
     /// Horizontal bars.
     Bars(Bars),
+    /// Directions about an axis, views beside each other.
+    Dials(Dials),
+}
+
+impl From<Dials> for Plot {
+    fn from(dials: Dials) -> Self {
+        Self::Dials(dials)
+    }
 }
 
 impl From<HeatMaps> for Plot {
@@ -81,6 +91,7 @@ impl Plot {
             Self::HeatMaps(maps) => maps.drawings(),
             Self::Polar(polar) => vec![polar.drawing()],
             Self::Bars(bars) => vec![bars.drawing()],
+            Self::Dials(dials) => dials.drawings(),
         }
     }
 

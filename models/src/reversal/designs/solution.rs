@@ -7,7 +7,7 @@ use errsep_solvers::structured::{Parameters, StructuredFit};
 use super::analysis::Analysis;
 use super::channel::Design;
 use super::closure::{self, DesignClosure, PositionSlope};
-use super::determined::Determined;
+use super::determined::{Determined, SLOPES};
 use super::error::DesignFitError;
 use super::fit::DesignOptions;
 use super::layout::{FormOf, Layout};
@@ -201,9 +201,14 @@ impl DesignFit {
             .collect()
     }
 
-    /// The slopes, rad, or what is determined of them.
+    /// The slopes, rad, or what is determined of them, those of the slide first.
     pub fn slopes(&self) -> Vec<Found> {
-        self.found(&self.determined.slopes, 0)
+        let mut slopes = self.found(&self.determined.slopes, 0);
+        slopes.sort_by_key(|found| {
+            let first = found.name.split(' ').next();
+            SLOPES.iter().position(|name| Some(*name) == first)
+        });
+        slopes
     }
 
     /// The constants, µm, or what is determined of them.

@@ -1,0 +1,331 @@
+//! Designs other than the four channels: `errsep.reversal/2`.
+
+mod json;
+mod page;
+mod text;
+
+use errsep_models::reversal::Direction;
+use errsep_models::reversal::designs::{
+    DesignFit, DesignFitError, DesignOptions, Determined, FoundForm, angle_name, fit,
+};
+use errsep_models::reversal::simultaneous::{KnotVerdict, Knots};
+use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
+
+use super::Args;
+use super::refusal::OTHER_UNITS;
+use crate::cli::Answer;
+use crate::cli::quantity::COVERAGE;
+use crate::io::reversal::{DesignData, ReversalSetup};
+use crate::io::{CsvTable, Message, Status};
+use crate::report::number;
+
+/// More positions than this of a form are not seen apart.
+const MOST_POSITIONS: usize = 1001;
+
+/// Squares beyond their mean by so many standard deviations are told.
+const CLEAR: f64 = 4.0;
+
+/// A solved design with all that its answer tells.
+struct Outcome<'a> {
+    data: &'a DesignData,
+    fit: DesignFit,
+    x: Vec<f64>,
+    forms: Vec<FoundForm>,
+    warnings: Vec<String>,
+}
+
+/// Solves a design.
+///
+/// # Errors
+/// What these options cannot do here, or readings that determine no answer.
+pub fn answer(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<Answer, Message> {
+    let asked = [
+        (!args.with.is_empty(), "--with"),
+        (args.diagnose, "--diagnose"),
+        (args.corrected.is_some(), "--corrected"),
+        (setup.fit_thickness, "fit_thickness"),
+    ];
+    if let Some((_, option)) = asked.iter().find(|a| a.0) {
+        return Err(Message::bad_input(format!(
+            "{option} is for the channels 1A, 1B, 2A, 2B alone"
+        ))
+        .in_file(&args.data)
+        .remedy("leave it out, or give those four channels without other angles"));
+    }
+    let options = DesignOptions {
+        zero: setup.zero,
+        thickness_mm: setup.thickness.unwrap_or(0.0),
+        noise_um: setup.noise,
+        knots: setup.knots.map_or(Knots::Chosen, Knots::Cells),
+        ..DesignOptions::default()
+    };
+    let fit = fit(&data.observations, &options).map_err(|why| refusal(&why, args, data))?;
+    let x = positions(data);
+    let outcome = Outcome {
+        forms: fit.forms(&x),
+        warnings: warnings(&fit, data),
+        x,
+        fit,
+        data,
+    };
+    let mut inputs = vec![args.data.clone()];
+    inputs.extend(args.setup.clone());
+    Ok(Answer {
+        text: text::text(&args.data, &outcome)?,
+        json: json::json(&outcome)?,
+        page: page::page(&args.data, setup, &outcome)?,
+        tables: tables(&outcome),
+        inputs,
+        setup: None,
+        seed: None,
+        status: Status::Done,
+    })
+}
+
+impl Outcome<'_> {
+    fn freedom(&self) -> DegreesOfFreedom {
+        let freedom = self.fit.freedom();
+        if freedom.is_finite() {
+            DegreesOfFreedom::Finite(freedom.max(1.0))
+        } else {
+            DegreesOfFreedom::Infinite
+        }
+    }
+
+    /// Coverage factor of every standard uncertainty.
+    fn factor(&self) -> f64 {
+        // Degrees of freedom are positive, so that they have a coverage factor.
+        coverage_factor(COVERAGE, self.freedom()).unwrap_or(f64::NAN)
+    }
+
+    fn residual_rms(&self) -> f64 {
+        let squares: f64 = self.fit.residuals.iter().map(|r| r * r).sum();
+        (squares / self.fit.residuals.len() as f64).sqrt()
+    }
+
+    /// What the design leaves open, with what to do: combination and remedy.
+    fn open(&self) -> Vec<(String, String)> {
+        let determined: &Determined = &self.fit.determined;
+        let mut open: Vec<(String, String)> = determined
+            .not_determined
+            .iter()
+            .map(|n| {
+                let remedy = match &n.remedy {
+                    Some(remedy) => remedy.words.clone(),
+                    None => "more than one trace more is needed".to_owned(),
+                };
+                (n.combination.clone(), remedy)
+            })
+            .collect();
+        let blind: Vec<&str> = determined.not_seen.iter().map(|n| &n[..]).collect();
+        if !blind.is_empty() {
+            open.push((
+                format!("{}: seen by no channel", blind.join(", ")),
+                blind_remedy(&blind),
+            ));
+        }
+        open
+    }
+}
+
+/// What would see unknowns that no channel sees.
+fn blind_remedy(names: &[&str]) -> String {
+    let any = |list: &[&str]| names.iter().any(|n| list.contains(n));
+    let mut ways = Vec::new();
+    if any(&["M_h", "alpha_h"]) {
+        ways.push("an indicator at 0° or 180°");
+    }
+    if any(&["M_v", "alpha_v"]) {
+        ways.push("an indicator at 90° or 270°");
+    }
+    if any(&["gamma_1", "gamma_2", "kappa_c"]) {
+        ways.push("sides 90° apart");
+    }
+    if any(&["kappa_s"]) {
+        ways.push("sides between the right angles for kappa_s");
+    }
+    format!("if wanted: {}", ways.join(", "))
+}
+
+fn refusal(why: &DesignFitError, args: &Args, data: &DesignData) -> Message {
+    let (message, remedy) = match why {
+        DesignFitError::NotConverged { .. } | DesignFitError::NoStart(_) => (
+            Message::not_converged(why.to_string()),
+            "give fewer [model] knots, and check the angles of the channels",
+        ),
+        DesignFitError::OnePosition { .. } | DesignFitError::TooFewPositions { .. } => (
+            Message::bad_input(why.to_string()),
+            "read every channel at four or more different positions x",
+        ),
+        DesignFitError::TooSteep { .. } => (Message::bad_input(why.to_string()), OTHER_UNITS),
+        DesignFitError::TooFewReadings { .. } | DesignFitError::TooManyKnots { .. } => (
+            Message::not_determined(why.to_string()),
+            "take more readings, or give fewer [model] knots, or leave them out: they are chosen from the data",
+        ),
+        _ => (
+            Message::bad_input(why.to_string()),
+            "correct it in the data or the set-up",
+        ),
+    };
+    let named = match why {
+        DesignFitError::OnePosition { channel, .. } | DesignFitError::TooSteep { channel, .. } => {
+            let channels = data.observations.design.channels();
+            channels.iter().position(|c| c.name == *channel)
+        }
+        _ => None,
+    };
+    match named.and_then(|c| data.first.get(c)) {
+        Some(place) => message.at(place.clone()).remedy(remedy),
+        None => message.in_file(&args.data).remedy(remedy),
+    }
+}
+
+/// The positions of the channel with the most of them, or as many even ones as are seen apart.
+fn positions(data: &DesignData) -> Vec<f64> {
+    let mut by_channel = vec![Vec::new(); data.observations.design.channels().len()];
+    for reading in &data.observations.readings {
+        by_channel[reading.channel].push(reading.x);
+    }
+    for x in &mut by_channel {
+        x.sort_by(f64::total_cmp);
+        x.dedup();
+    }
+    let longest = by_channel
+        .into_iter()
+        .max_by_key(Vec::len)
+        .unwrap_or_default();
+    if longest.len() <= MOST_POSITIONS {
+        return longest;
+    }
+    let (first, last) = (longest[0], longest[longest.len() - 1]);
+    let step = (last - first) / (MOST_POSITIONS - 1) as f64;
+    (0..MOST_POSITIONS)
+        .map(|k| first + k as f64 * step)
+        .collect()
+}
+
+fn warnings(fit: &DesignFit, data: &DesignData) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if !data.not_read.is_empty() {
+        let names = data.not_read.join(", ");
+        warnings.push(format!("channels of the set-up without a reading: {names}"));
+    }
+    let design = &fit.design;
+    let once: Vec<String> = (0..design.sides().len())
+        .filter_map(|side| {
+            let mut seen = (0..design.channels().len()).filter(|c| design.side_of(*c) == side);
+            let (first, second) = (seen.next()?, seen.next());
+            let name = &design.channels()[first].name;
+            let angle = angle_name(design.sides()[side]);
+            second.is_none().then(|| format!("{angle}° (by {name})"))
+        })
+        .collect();
+    if !once.is_empty() {
+        warnings.push(format!(
+            "sides seen once only: {}; nothing checks their forms, and a wrong angle would show just so: \
+             check the angles of these channels",
+            once.join(", ")
+        ));
+    }
+    for (channel, own) in design.channels().iter().zip(&fit.by_channel) {
+        let stands = |value: Option<f64>| {
+            let readings = data.observations.readings.iter();
+            let at = design.channels().iter().position(|c| c == channel);
+            readings
+                .filter(|r| Some(r.channel) == at)
+                .all(|r| Some(r.value) == value)
+        };
+        let first = data
+            .observations
+            .readings
+            .iter()
+            .find(|r| design.channels()[r.channel] == *channel);
+        if own.readings > 1 && stands(first.map(|r| r.value)) {
+            warnings.push(format!(
+                "all readings of {} are equal: an indicator that does not move tells nothing; check it",
+                channel.name
+            ));
+        }
+    }
+    let exceeds = |squares: f64, freedom: f64| squares > freedom + CLEAR * (2.0 * freedom).sqrt();
+    if fit.noise_declared {
+        let squares: f64 = fit
+            .residuals
+            .iter()
+            .map(|r| (r / fit.noise_um).powi(2))
+            .sum();
+        let freedom = fit.degrees_of_freedom;
+        if freedom > 0.0 && exceeds(squares, freedom) {
+            warnings.push(format!(
+                "the readings scatter {} times as much as the declared noise: model and readings disagree, \
+                 and the uncertainties are too small",
+                number::plain((squares / freedom).sqrt(), 3)
+            ));
+        }
+    }
+    for closure in &fit.closures {
+        let count = closure.profile.len() as f64;
+        if closure.expected_rms > 0.0
+            && exceeds(count * (closure.rms / closure.expected_rms).powi(2), count)
+        {
+            warnings.push(format!(
+                "{} does not close: {} µm, noise alone would give {}",
+                closure.name,
+                number::plain(closure.rms, 3),
+                number::plain(closure.expected_rms, 3)
+            ));
+        }
+    }
+    for slope in &fit.position_slopes {
+        if slope.value.value.abs() > CLEAR * slope.value.std {
+            warnings.push(format!(
+                "{} is no zero: something changed between the positions of the spindle",
+                slope.name
+            ));
+        }
+    }
+    if fit.knots.verdict == KnotVerdict::TooFew {
+        warnings.push(
+            "neighbouring residuals go together: the noise is correlated, or the forms have finer detail \
+             than the knots follow; the uncertainties are too small then"
+                .to_owned(),
+        );
+    }
+    warnings
+}
+
+fn tables(o: &Outcome) -> Vec<CsvTable> {
+    let profiles = o.forms.iter().fold(
+        CsvTable::new("profiles.csv").numbers("x_mm", o.x.clone()),
+        |table, form| {
+            table
+                .numbers(format!("{}_um", form.name), form.values.clone())
+                .numbers(format!("{}_std_um", form.name), form.std.clone())
+        },
+    );
+    let readings = &o.data.observations.readings;
+    let name = |c: usize| o.fit.design.channels()[c].name.clone();
+    let ways = readings
+        .iter()
+        .map(|r| u8::from(r.direction == Direction::Backward));
+    let residuals = CsvTable::new("residuals.csv")
+        .texts(
+            "channel",
+            readings.iter().map(|r| name(r.channel)).collect::<Vec<_>>(),
+        )
+        .numbers(
+            "repeat",
+            readings
+                .iter()
+                .map(|r| f64::from(r.repeat))
+                .collect::<Vec<_>>(),
+        )
+        .words(
+            "direction",
+            ["forward", "backward"],
+            ways.collect::<Vec<_>>(),
+        )
+        .numbers("x_mm", readings.iter().map(|r| r.x).collect::<Vec<_>>())
+        .numbers("residual_um", o.fit.residuals.clone());
+    vec![profiles, residuals]
+}

@@ -2,6 +2,7 @@
 //! no more of Python than arrays, texts and exceptions. What people see is in `errsep/*.py`.
 
 mod answered;
+mod batch;
 mod errors;
 mod least_squares;
 mod long;
@@ -17,6 +18,8 @@ fn _errsep(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<answered::Answered>()?;
     module.add_function(wrap_pyfunction!(answered::call, module)?)?;
     module.add_function(wrap_pyfunction!(answered::main, module)?)?;
+    module.add_class::<batch::Shared>()?;
+    module.add_function(wrap_pyfunction!(batch::work, module)?)?;
     module.add_function(wrap_pyfunction!(table::table_as_csv, module)?)?;
     module.add_function(wrap_pyfunction!(least_squares::least_squares, module)?)
 }

@@ -36,4 +36,4 @@ def test_every_public_name_has_words() -> None:
                 if not key.startswith("_") and (callable(member) or isinstance(member, property)):
                     assert inspect.getdoc(member), f"{name}.{key}"
     public = {name for name in vars(_errsep) if not name.startswith("_")}
-    assert public == {"Answered", "call", "least_squares", "main", "table_as_csv"}
+    assert public == {"Answered", "Shared", "call", "least_squares", "main", "table_as_csv", "work"}

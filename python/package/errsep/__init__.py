@@ -12,6 +12,7 @@ own. Angles are in rad, positions in mm, readings and forms in µm.
 """
 
 from ._errsep import __version__
+from .batches import Batch, batch
 from .commands import (
     anova,
     circle,
@@ -32,6 +33,7 @@ from .quantity import Covariance, Quantities, Quantity
 from .result import Result
 
 __all__ = [
+    "Batch",
     "Covariance",
     "Error",
     "Fit",
@@ -45,6 +47,7 @@ __all__ = [
     "State",
     "__version__",
     "anova",
+    "batch",
     "circle",
     "diagnose",
     "four_sensor",

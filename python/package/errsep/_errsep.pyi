@@ -7,7 +7,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Answered", "__version__", "call", "least_squares", "main", "table_as_csv"]
+__all__ = ["Answered", "Shared", "__version__", "call", "least_squares", "main", "table_as_csv", "work"]
 __version__: str
 
 _Column = NDArray[np.float64] | list[str]
@@ -32,6 +32,26 @@ class Answered:
     @staticmethod
     def of_state(state: dict[str, Any]) -> Answered: ...
 
+@final
+class Shared:
+    """A batch whose tasks are worked out by `work`, in this process or in others."""
+
+    def __new__(
+        cls,
+        list: str | PathLike[str],
+        inputs: Sequence[tuple[str, bytes]],
+        out: str | PathLike[str],
+        *,
+        jobs: int,
+        retry_failed: bool,
+        verify: bool,
+        parquet: bool,
+    ) -> Shared: ...
+    def tasks(self) -> list[tuple[str, int]]: ...
+    def take(self, report: str) -> None: ...
+    def finish(self) -> tuple[int, int, int]: ...
+    def close(self) -> None: ...
+
 def call(
     arguments: Sequence[str],
     inputs: Sequence[tuple[str, bytes]],
@@ -45,3 +65,4 @@ def least_squares(
     callback: Callable[[int, float, NDArray[np.float64]], object] | None,
     asked: dict[str, Any],
 ) -> dict[str, Any]: ...
+def work(task: str) -> str: ...

@@ -209,6 +209,9 @@ fn shown(analysis: &Analysis, vector: &[f64]) -> Vec<(String, f64)> {
 /// Right angles, where indicators and spindles are set.
 const USUAL: [f64; 4] = [0.0, 90.0, 180.0, 270.0];
 
+/// Angles of the design's own beyond this many are not tried.
+const MOST_TRIED: usize = 12;
+
 struct Missing<'a> {
     design: &'a Design,
     zero: Zero,
@@ -244,8 +247,14 @@ impl Missing<'_> {
         let has =
             |list: &[f64], angle: f64| list.iter().any(|a| super::channel::is_same(*a, angle));
         let mut best: Option<((u8, usize), DesignChannel)> = None;
-        for phi in indicators.iter().chain(&USUAL) {
-            for theta in positions.iter().chain(&USUAL) {
+        let tried = |own: &[f64]| -> Vec<f64> {
+            let usual = USUAL.iter().filter(|a| !has(own, **a));
+            let own = own.iter().take(MOST_TRIED);
+            own.chain(usual).copied().collect()
+        };
+        let turned = tried(&positions);
+        for phi in &tried(&indicators) {
+            for theta in &turned {
                 let Ok(channel) = DesignChannel::at(*phi, *theta) else {
                     continue;
                 };
@@ -262,7 +271,11 @@ impl Missing<'_> {
                 }
                 let open = forms(&more).free().len()
                     + slopes(&more, 0).free().len()
-                    + constants(&more, self.zero).free().len();
+                    + match self.zero {
+                        // Each channel has its own.
+                        Zero::Reset => 0,
+                        Zero::Kept => constants(&more, Zero::Kept).free().len(),
+                    };
                 if best.as_ref().is_none_or(|(b, _)| (cost, open) < *b) {
                     best = Some(((cost, open), channel));
                 }

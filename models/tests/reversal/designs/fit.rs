@@ -316,6 +316,51 @@ fn the_staged_solution_of_a_linear_model() {
     }
 }
 
+/// Uncertainties are those of the lines through the channels, and errors over many seeds are as large.
+#[test]
+fn uncertainties_are_the_bound_and_hold_the_truth() {
+    let (mut squares, mut count) = (0.0, 0.0);
+    for seed in 0..24 {
+        let made = DesignPlan {
+            seed,
+            positions: 31,
+            ..plan(EIGHT)
+        };
+        let (observations, truth) = simulate(&made).unwrap();
+        let declared = DesignOptions {
+            noise_um: Some(0.05),
+            ..options(6)
+        };
+        let found = fit(&observations, &declared).unwrap();
+        let x = made.x();
+        let spread: f64 = x.iter().map(|x| (x - 150.0).powi(2)).sum();
+        let line = 0.05e-3 / spread.sqrt();
+        // α_h and α_v from four channels with a weight of a quarter; the cone from eight.
+        for (name, k, share) in [
+            ("alpha_h", 0, 0.5),
+            ("alpha_v", 1, 0.5),
+            ("gamma_1", 2, 0.5),
+            ("gamma_2", 3, 0.5),
+            ("cone", 4, 0.125_f64.sqrt()),
+        ] {
+            let own = found.slope(name).unwrap();
+            // Truncation: tilts of 3e-4 and slopes of the forms of 1e-4 change a derivative by 1e-7.
+            assert!(
+                (own.std / (share * line) - 1.0).abs() < 1e-5,
+                "{name}: {own:?}"
+            );
+            squares += ((own.value - truth.slopes_rad[k]) / own.std).powi(2);
+            count += 1.0;
+        }
+    }
+    let rms = f64::sqrt(squares / count);
+    // k·u: 120 values, whose root mean square has a standard deviation of 6.5 %; three of these.
+    assert!(
+        (rms - 1.0).abs() < 0.2,
+        "errors are {rms} times their uncertainty"
+    );
+}
+
 /// What cannot be solved is told.
 #[test]
 fn endings_are_told() {

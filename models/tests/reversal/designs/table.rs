@@ -4,6 +4,8 @@ use errsep_models::reversal::designs::{
     Analysis, Design, DesignChannel, Determined, Zero, form_analysis, slope_analysis,
 };
 use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// One row of the table: indicators, positions, and what is found.
 struct Row {
@@ -389,4 +391,55 @@ fn kept_zeros_add_eccentricity_and_closures() {
     let open = seed.not_determined.iter().find(|n| n.held == "o").unwrap();
     assert_eq!(open.combination, "zero of 0 + zero of 180 against o");
     assert_eq!(of(&QUARTER, &QUARTER).constants.to_spare(), 16 - 7);
+}
+
+/// Lists of channels at any angles: what is told of them is true of their matrices.
+#[test]
+fn designs_of_any_angles() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let mut remedies = 0;
+    for round in 0..60 {
+        let step = [90.0, 45.0, 30.0, 7.0][round % 4];
+        let count = rng.random_range(1..=10);
+        let mut made: Option<Design> = None;
+        for _ in 0..count {
+            let mut angle = || step * f64::from(rng.random_range(0..(360.0 / step) as u32));
+            let channel = DesignChannel::at(angle(), angle()).unwrap();
+            made = match made {
+                None => Some(Design::new(vec![channel]).unwrap()),
+                // Angles that are there already are left out.
+                Some(design) => Some(design.with(channel).unwrap_or(design)),
+            };
+        }
+        let design = made.unwrap();
+        let found = Determined::of(&design, Zero::Kept);
+        for analysis in [&found.forms, &found.slopes, &found.constants] {
+            let matrix = analysis.matrix();
+            for vector in analysis.null_space() {
+                let left = (matrix * DVector::from_vec(vector)).amax();
+                // Epsilons: ten unknowns, coefficients below a hundred (one per cent of a column is left).
+                assert!(left < 1e-11, "{design:?}: {left}");
+            }
+            let closures = analysis.closures();
+            assert_eq!(closures.len(), analysis.to_spare(), "{design:?}");
+            for weights in closures {
+                let left = (matrix.transpose() * DVector::from_vec(weights)).amax();
+                assert!(left < 1e-11, "{design:?}: closure leaves {left}");
+            }
+        }
+        for open in &found.not_determined {
+            let Some(remedy) = &open.remedy else { continue };
+            let after = design.with(remedy.channel.clone()).unwrap();
+            let alone = [
+                form_analysis(&after).alone(&open.held),
+                slope_analysis(&after, 2).alone(&open.held),
+                Determined::of(&after, Zero::Kept)
+                    .constants
+                    .alone(&open.held),
+            ];
+            assert!(alone.iter().any(Option::is_some), "{design:?}: {open:?}");
+            remedies += 1;
+        }
+    }
+    assert!(remedies > 30, "{remedies}");
 }

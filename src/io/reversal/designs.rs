@@ -98,13 +98,12 @@ fn read_design(mut table: TableReader, setup: &ReversalSetup) -> Result<DesignDa
         _ => Naming::Angles(needed("indicator")?, needed("spindle")?),
     };
     let (x, reading) = (needed("x")?, needed("reading")?);
-    let (repeat, way, time) = (optional("repeat"), optional("direction"), optional("time"));
-    let x_mm = setup.columns.unit("x").unwrap_or(LengthUnit::Mm).in_mm();
-    let value_um = setup
-        .columns
-        .unit("reading")
-        .unwrap_or(LengthUnit::Um)
-        .in_um();
+    let (repeat, way) = (optional("repeat"), optional("direction"));
+    let time = optional("time").map(Column::in_s);
+    let unit = |role: &str, column: &Column| setup.columns.unit(role).or(column.length_unit());
+    let x_mm = unit("x", &x).unwrap_or(LengthUnit::Mm).in_mm();
+    let value_um = unit("reading", &reading).unwrap_or(LengthUnit::Um).in_um();
+    let (x, reading) = (x.as_written(), reading.as_written());
     let mut found = Found {
         known: setup.channels.clone(),
         ..Found::default()

@@ -163,9 +163,6 @@ impl Design {
         }
         for (k, second) in channels.iter().enumerate() {
             for first in &channels[..k] {
-                if first.name == second.name {
-                    return Err(DesignError::SameName(first.name.clone()));
-                }
                 if first.is_at(second) {
                     return Err(DesignError::SameAngles {
                         first: first.name.clone(),
@@ -173,6 +170,9 @@ impl Design {
                         indicator: first.indicator,
                         spindle: first.spindle,
                     });
+                }
+                if first.name == second.name {
+                    return Err(DesignError::SameName(first.name.clone()));
                 }
             }
         }

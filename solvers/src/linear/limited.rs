@@ -13,8 +13,8 @@ fn most_iterations(columns: usize) -> usize {
     100 * (columns + 10)
 }
 
-/// The singular value decomposition, values in falling order; `None` where it does not converge, an
-/// entry is not finite, or there is no entry.
+/// The singular value decomposition, values in falling order; `None` where it does not converge, does not
+/// rebuild the matrix, an entry is not finite, or there is no entry.
 pub fn svd<R, C>(matrix: OMatrix<f64, R, C>, left: bool, right: bool) -> Option<SVD<f64, R, C>>
 where
     R: DimMin<C>,
@@ -32,7 +32,75 @@ where
         return None;
     }
     let most = most_iterations(matrix.nrows().max(matrix.ncols()));
-    SVD::try_new(matrix, left, right, f64::EPSILON, most)
+    let greatest = matrix.amax();
+    let decomposed = |matrix: OMatrix<f64, R, C>, tolerance: f64| {
+        let found = SVD::try_new(matrix.clone(), left, right, tolerance, most)?;
+        rebuilds(&found, &matrix).then_some(found)
+    };
+    // Entries such as cos 90° = 6 · 10⁻¹⁷ beside ones can lead the iteration to factors of another matrix.
+    // With a wider tolerance, or without them, which changes less than rounding does, it goes right.
+    decomposed(matrix.clone(), f64::EPSILON)
+        .or_else(|| decomposed(matrix.clone(), 5.0 * f64::EPSILON))
+        .or_else(|| {
+            let least = f64::EPSILON * greatest;
+            let plain = matrix.map(|v| if v.abs() < least { 0.0 } else { v });
+            decomposed(plain, f64::EPSILON)
+        })
+}
+
+/// Part of a matrix's norm by which its factors may miss it: rounding is a thousandth of that.
+const MISSED: f64 = 1e-10;
+
+/// Whether factors are those of a matrix, as far as those that were asked for tell: U Σ Vᵀ, or the
+/// lengths of A V or of Uᵀ A, which are the singular values.
+fn rebuilds<R, C>(found: &SVD<f64, R, C>, matrix: &OMatrix<f64, R, C>) -> bool
+where
+    R: DimMin<C>,
+    C: Dim,
+    DimMinimum<R, C>: DimSub<U1>,
+    DefaultAllocator: Allocator<R, C>
+        + Allocator<C>
+        + Allocator<R>
+        + Allocator<DimDiff<DimMinimum<R, C>, U1>>
+        + Allocator<DimMinimum<R, C>, C>
+        + Allocator<R, DimMinimum<R, C>>
+        + Allocator<DimMinimum<R, C>>,
+{
+    let values = &found.singular_values;
+    let reach = MISSED * matrix.norm();
+    let along = |lengths: &mut dyn Iterator<Item = f64>| {
+        lengths
+            .zip(values.iter())
+            .all(|(length, value)| (length - value).abs() <= reach)
+    };
+    match (&found.u, &found.v_t) {
+        (Some(u), Some(v_t)) => {
+            let rank = values.len();
+            let missed = (0..matrix.ncols()).map(|j| {
+                let column = (0..matrix.nrows()).map(|i| {
+                    let sum: f64 = (0..rank).map(|k| u[(i, k)] * values[k] * v_t[(k, j)]).sum();
+                    (sum - matrix[(i, j)]).powi(2)
+                });
+                column.sum::<f64>()
+            });
+            missed.sum::<f64>().sqrt() <= reach
+        }
+        (None, Some(v_t)) => along(&mut v_t.row_iter().map(|v| {
+            let along = (0..matrix.nrows()).map(|i| {
+                let sum: f64 = (0..matrix.ncols()).map(|j| matrix[(i, j)] * v[j]).sum();
+                sum * sum
+            });
+            along.sum::<f64>().sqrt()
+        })),
+        (Some(u), None) => along(&mut u.column_iter().map(|u| {
+            let along = (0..matrix.ncols()).map(|j| {
+                let sum: f64 = (0..matrix.nrows()).map(|i| matrix[(i, j)] * u[i]).sum();
+                sum * sum
+            });
+            along.sum::<f64>().sqrt()
+        })),
+        (None, None) => (values.norm() - matrix.norm()).abs() <= reach,
+    }
 }
 
 /// Eigenvalues and eigenvectors of a symmetric matrix; `None`
@@ -73,5 +141,35 @@ mod tests {
         assert!((rebuilt - matrix).norm() <= 20.0 * f64::EPSILON * matrix.norm());
         let eigen = symmetric_eigen(matrix).expect("small and finite");
         assert!((eigen.recompose() - matrix).norm() <= 20.0 * f64::EPSILON * matrix.norm());
+    }
+
+    /// Four indicators and two spindle positions: the cosines of right angles are no zeros.
+    #[test]
+    fn entries_that_are_nearly_nothing_lead_nowhere_else() {
+        let channels: Vec<[f64; 2]> = [0.0, 180.0, 90.0, 270.0]
+            .iter()
+            .flat_map(|phi: &f64| [0.0, 180.0].map(|theta| [*phi, (phi - theta).rem_euclid(360.0)]))
+            .map(|angles| angles.map(f64::to_radians))
+            .collect();
+        let design = DMatrix::from_fn(channels.len(), 6, |i, j| {
+            let [phi, psi] = channels[i];
+            let cosines = [phi.cos(), phi.sin(), psi.cos(), psi.sin(), 1.0];
+            cosines.get(j).copied().unwrap_or(0.5 * (2.0 * psi).cos())
+        });
+        // epsilons: 48 entries of order one, condition below five
+        let inverse = svd(design.clone(), true, true).expect("well conditioned");
+        let inverse = inverse.pseudo_inverse(1e-12).expect("both sides asked for");
+        let unit = &inverse * &design;
+        assert!((unit - DMatrix::identity(6, 6)).norm() < 100.0 * f64::EPSILON);
+        for (left, right) in [(true, false), (false, true), (false, false)] {
+            let one = svd(design.clone(), left, right).expect("well conditioned");
+            let square = one.singular_values.norm_squared();
+            assert!((square - design.norm_squared()).abs() < 100.0 * f64::EPSILON * square);
+            let left_lengths = one.u.map(|u| (u.transpose() * &design).norm());
+            let right_lengths = one.v_t.map(|v| (&design * v.transpose()).norm());
+            for length in left_lengths.into_iter().chain(right_lengths) {
+                assert!((length * length - square).abs() < 100.0 * f64::EPSILON * square);
+            }
+        }
     }
 }

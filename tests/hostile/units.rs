@@ -53,10 +53,19 @@ fn converted(text: &str, headings: &str, factors: &[f64]) -> String {
     format!("{headings}\n{}", rows.collect::<String>())
 }
 
+/// Model, options, file that is simulated, other headings and what its columns are multiplied by.
+type Case = (
+    &'static str,
+    &'static [&'static str],
+    &'static str,
+    &'static str,
+    &'static [f64],
+);
+
 #[test]
 fn every_table_takes_the_units_that_stand_beside_its_names() {
     const INCH: f64 = 1.0 / 25.4;
-    let cases: [(&str, &[&str], &str, &str, &[f64]); 4] = [
+    let cases: [Case; 4] = [
         ("circle", &[], "points.csv", "x (inch),y_in", &[INCH, INCH]),
         (
             "four-sensor",

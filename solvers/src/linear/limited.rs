@@ -183,7 +183,6 @@ mod tests {
         for matrix in [singular, 1e-200 * singular, 1e100 * singular] {
             for (left, right) in [(true, true), (false, true), (true, false)] {
                 let found = svd(matrix, left, right).expect("finite");
-                assert!(found.singular_values[0] > 0.0);
                 assert_eq!((found.u.is_some(), found.v_t.is_some()), (left, right));
             }
         }

@@ -18,8 +18,8 @@ use crate::diagnosis::attribution::reported::{Bias, Elsewhere, ParameterOut};
 use crate::diagnosis::attribution::shrink::{GapMeter, HeldOut, Size, shrink};
 use crate::diagnosis::attribution::sizes::{Sizes, first_amplitude};
 use crate::diagnosis::detection::estimate::estimate;
-use crate::diagnosis::levels::{INVISIBLE, POLISHED, SEPARABLE};
-use crate::diagnosis::noise::spikes::Spikes;
+use crate::diagnosis::levels::{INVISIBLE, POLISHED, SEPARABLE, WEAK};
+use crate::diagnosis::noise::spikes::calmed;
 use crate::diagnosis::options::Options;
 use crate::diagnosis::verdict::types::NoiseOut;
 
@@ -134,9 +134,6 @@ pub struct Joined {
     /// With them.
     #[serde(skip)]
     pub after: Vec<f64>,
-    /// What the effects change in every reading.
-    #[serde(skip)]
-    pub change: Vec<f64>,
 }
 
 /// Fits effects of a catalogue along with a model.
@@ -150,10 +147,7 @@ pub fn joined<M: FittedModel>(
     options: &Options,
 ) -> Result<Joined, NotJoined> {
     let chosen = chosen(catalogue, names)?;
-    let readings = model.linearised();
-    let calm = Spikes::new(model).calmed(model, &readings);
-    let calmed =
-        (calm.count > 0).then(|| model.refit(model.observed() + (&calm.readings - &readings)));
+    let (calmed, calm) = calmed(model);
     let model = calmed.as_ref().unwrap_or(model);
     let readings = model.linearised();
     let law = estimate(model, &readings).with_tails(calm.tails);
@@ -274,7 +268,7 @@ fn told<M: FittedModel>(
     let mut effects = Vec::with_capacity(causes.len());
     for (k, cause) in causes.iter().enumerate() {
         effects.push(effect(context, readings, causes, &sizes, k)?);
-        let weak = effects.last().is_some_and(|e| e.p_value > 0.05);
+        let weak = effects.last().is_some_and(|e| e.p_value > WEAK);
         if weak && cause.shape.free() > 0 {
             notes.push(format!(
                 "`{}` does not stand out of the noise: of a size that may be zero its other parameters say nothing.",
@@ -336,7 +330,6 @@ fn told<M: FittedModel>(
         notes,
         before: meter.residuals(readings),
         after: meter.residuals(&clean),
-        change: change.as_slice().to_vec(),
     })
 }
 

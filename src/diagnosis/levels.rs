@@ -136,3 +136,6 @@ pub(in crate::diagnosis) const TELL: f64 = 0.99;
 /// *Reckoned.* A plan promises nothing of an effect, and none is put in for a proof, of which less than
 /// this part is visible: the model of the plan is not that exact.
 pub(in crate::diagnosis) const PLANNED: f64 = 0.01;
+
+/// *Quantile.* An effect that is given and stands out less than this is told not to: its size may be zero.
+pub(in crate::diagnosis) const WEAK: f64 = 0.05;

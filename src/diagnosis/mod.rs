@@ -26,7 +26,7 @@ pub use catalogue::tabulated::{Tabulated, TabulatedEffects};
 use detection::estimate::estimate;
 pub use joined::{Joined, JoinedEffect, JoinedGap, JoinedProfile, NotJoined, joined};
 pub use noise::law::{NoiseLaw, NoiseSource};
-use noise::spikes::Spikes;
+use noise::spikes::calmed;
 pub use options::Options;
 pub use planning::certificate::{Diagnosability, certificate};
 pub use planning::prove::{Trials, prove};
@@ -50,16 +50,9 @@ pub fn diagnose_with<M: FittedModel>(
         .into_iter()
         .filter(|effect| !options.without.iter().any(|name| name == effect.name()))
         .collect();
+    let (calmed, calm) = calmed(model);
+    let model = calmed.as_ref().unwrap_or(model);
     let readings = model.linearised();
-    let calm = Spikes::new(model).calmed(model, &readings);
-    let calmed;
-    let (model, readings) = if calm.count > 0 {
-        calmed = model.refit(model.observed() + (&calm.readings - &readings));
-        let readings = calmed.linearised();
-        (&calmed, readings)
-    } else {
-        (model, readings)
-    };
     let law = estimate(model, &readings).with_tails(calm.tails);
     let context = Context::new(model, &catalogue, law, options.draws, options.seed);
     examined(&context, &readings, options.false_alarm, |examined| {

@@ -215,3 +215,13 @@ fn simulation_into_a_folder_is_told_in_short() {
         "{printed}"
     );
 }
+
+/// Without noise the deviations are those of rounding: 50 mm in 15 digits.
+#[test]
+fn points_exactly_on_a_circle_are_a_circle() {
+    let folder = Folder::with(&[]);
+    let arguments = ["simulate", "circle", "--noise", "0", "--positions", "72"];
+    folder.write("exact.csv", &run(&folder, &arguments).stdout);
+    let answer = json(&folder, &["circle", "exact.csv", "--format", "json"]);
+    assert!((number(&answer, "/fit/radius/value") - 50.0).abs() < 1e-12);
+}

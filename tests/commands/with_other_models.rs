@@ -215,3 +215,13 @@ fn a_yaw_joins_the_fourier_scans_of_one_file() {
     ];
     bad_input(&folder, &two, &["--with takes the scans of one file"]);
 }
+
+/// In first order an effect would stand beside the geometry, not in it.
+#[test]
+fn effects_join_a_reversal_by_its_own_command() {
+    let folder = Folder::with(&[]);
+    let made = run(&folder, &["simulate", "reversal", "--positions", "9"]);
+    folder.write("r.csv", &made.stdout);
+    let arguments = ["diagnose", "r.csv", "--with", "taper"];
+    bad_input(&folder, &arguments, &["errsep reversal r.csv"]);
+}

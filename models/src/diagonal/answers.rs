@@ -4,12 +4,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::components::{Component, Location};
-use super::design::{Design, decompose};
+use super::design::{Design, decompose, is_definition};
 use super::prediction::Parameter;
+use super::regression::OPEN;
 use super::{DiagonalError, WorkZone};
-
-/// Part of an unknown that may lie in what the readings cannot see while it still counts as determined.
-const UNSEEN: f64 = 1e-6;
 
 /// An error function that the readings determine at every position.
 #[derive(Debug, Clone)]
@@ -48,7 +46,7 @@ impl Answers {
         };
         let known = |parameter: Parameter| {
             let j = design.unknowns.index_of(parameter)?;
-            (unseen(j) < UNSEEN).then_some(j)
+            (unseen(j) < OPEN).then_some(j)
         };
         let locations = Location::ALL.into_iter().filter_map(|location| {
             let j = known(Parameter::Squareness(location))?;
@@ -66,7 +64,7 @@ impl Answers {
                     .positions
                     .push(zone.step()[component.axis.index()] * index as f64);
                 let node = Parameter::Node(component, index);
-                if super::design::is_definition(node, zone.steps) {
+                if is_definition(node, zone.steps) {
                     continue;
                 }
                 let j = known(node)?;

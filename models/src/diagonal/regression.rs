@@ -20,7 +20,7 @@ const ROUNDINGS: f64 = 100.0;
 
 /// What a measured slope must share with the directions that the readings leave open to determine one
 /// of them: those are known to about 1e-11, and what a set-up leaves open shows with more than 1e-4.
-const OPEN: f64 = 1e-6;
+pub(super) const OPEN: f64 = 1e-6;
 
 /// What a measured slope may count for beside a reading: outside, rounding shows in the uncertainties of
 /// what it settles (1e-7 of them at either end).

@@ -17,6 +17,16 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         Some(path) => ReversalSetup::read(path)?,
         None => ReversalSetup::default(),
     };
+    if !args.with.is_empty() {
+        return Err(Message::bad_input(
+            "effects join a reversal in exact geometry, by a command of its own",
+        )
+        .remedy(format!(
+            "errsep reversal {} --simultaneous --with {}",
+            args.data.display(),
+            args.with.join(",")
+        )));
+    }
     if let Some(columns) = &args.columns {
         setup.columns = columns.clone();
     }

@@ -78,6 +78,15 @@ struct Weight {
     ratio: f64,
 }
 
+/// A model fitted to readings whose spikes are pulled in, where there are any, and what was done.
+pub(in crate::diagnosis) fn calmed<M: FittedModel>(model: &M) -> (Option<M>, Calmed) {
+    let readings = model.linearised();
+    let calm = Spikes::new(model).calmed(model, &readings);
+    let changed =
+        (calm.count > 0).then(|| model.refit(model.observed() + (&calm.readings - &readings)));
+    (changed, calm)
+}
+
 impl Spikes {
     pub fn new<M: FittedModel>(model: &M) -> Self {
         if model.names_single_readings() {

@@ -54,24 +54,28 @@ fn width(points: &[Point], c: Point) -> f64 {
     }
 }
 
-/// The crossing of the bisectors of two pairs, the origin of the calculation at the first point.
+/// The crossing of the bisectors of two pairs: from an origin at the first point, then corrected
+/// once by what is left of both equations there, which takes out the rounding of products (two
+/// short pairs, far from each other, otherwise leave the centre uncertain by 1e-12).
 fn crossing(a: (Point, Point), b: (Point, Point)) -> Option<Point> {
-    let o = a.0;
-    let row = |(p, q): (Point, Point)| {
-        let n = minus(q, p);
-        let middle = Point::new(
-            0.5 * (p.x - o.x) + 0.5 * (q.x - o.x),
-            0.5 * (p.y - o.y) + 0.5 * (q.y - o.y),
+    let step = |from: Point| {
+        let row = |(p, q): (Point, Point)| {
+            let n = minus(q, p);
+            let middle = Point::new(
+                0.5 * (p.x - from.x) + 0.5 * (q.x - from.x),
+                0.5 * (p.y - from.y) + 0.5 * (q.y - from.y),
+            );
+            (n, dot(n, middle))
+        };
+        let ((n, r), (m, s)) = (row(a), row(b));
+        let det = cross(n, m);
+        let c = Point::new(
+            from.x + (r * m.y - s * n.y) / det,
+            from.y + (s * n.x - r * m.x) / det,
         );
-        (n, dot(n, middle))
+        (c.x.is_finite() && c.y.is_finite()).then_some(c)
     };
-    let ((n, r), (m, s)) = (row(a), row(b));
-    let det = cross(n, m);
-    let c = Point::new(
-        o.x + (r * m.y - s * n.y) / det,
-        o.y + (s * n.x - r * m.x) / det,
-    );
-    (c.x.is_finite() && c.y.is_finite()).then_some(c)
+    step(step(a.0)?)
 }
 
 fn pairs(points: &[Point]) -> Vec<(Point, Point)> {

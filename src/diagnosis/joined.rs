@@ -10,6 +10,7 @@ use nalgebra::DVector;
 use serde::Serialize;
 use thiserror::Error;
 
+use crate::diagnosis::attribution::allowed::{Allowed, allowed_fits, answers_widened, widened};
 use crate::diagnosis::attribution::bias::biases;
 use crate::diagnosis::attribution::candidates::elsewhere;
 use crate::diagnosis::attribution::context::{Cause, Context, finer, raw_signatures, span};
@@ -264,10 +265,11 @@ fn told<M: FittedModel>(
     }
     let sizes = Sizes::fitted_with_state(context, readings, causes)
         .ok_or_else(|| NotJoined::Undetermined(name(0)))?;
+    let allowed = allowed_fits(context, readings, causes, &sizes);
     let change = context.change(causes, &sizes.amplitudes);
     let mut effects = Vec::with_capacity(causes.len());
     for (k, cause) in causes.iter().enumerate() {
-        effects.push(effect(context, readings, causes, &sizes, k)?);
+        effects.push(effect(context, readings, causes, (&sizes, &allowed), k)?);
         let weak = effects.last().is_some_and(|e| e.p_value > WEAK);
         if weak && cause.shape.free() > 0 {
             notes.push(format!(
@@ -302,6 +304,7 @@ fn told<M: FittedModel>(
     let clean = readings - &change;
     let (before, after) = (meter.size(readings, 0), meter.size(&clean, unknowns));
     let (quantities, moved) = biases(context, readings, causes);
+    let quantities = answers_widened(context, readings, quantities, &moved, &allowed);
     let profiles = context.model.profiles().into_iter().zip(moved);
     Ok(Joined {
         schema: "errsep.fit-with/1",
@@ -338,7 +341,7 @@ fn effect<M: FittedModel>(
     context: &Context<'_, M>,
     readings: &DVector<f64>,
     causes: &[Cause],
-    sizes: &Sizes,
+    (sizes, allowed): (&Sizes, &[Allowed]),
     which: usize,
 ) -> Result<JoinedEffect, NotJoined> {
     let cause = &causes[which];
@@ -361,7 +364,10 @@ fn effect<M: FittedModel>(
         p_value: context.p_value(&beside, cause.effect),
         visible: family.map_or(0.0, |f| context.dictionary.families[f].visible),
         plausible: context.plausible(cause.effect, &cause.shape, amplitudes, &stds),
-        parameters: estimates.into_iter().map(Into::into).collect(),
+        parameters: widened(context, readings, causes, which, estimates, allowed)
+            .into_iter()
+            .map(Into::into)
+            .collect(),
         elsewhere: elsewhere(context, readings, causes, which),
     })
 }

@@ -166,14 +166,50 @@ fn a_drift_joins_the_step_diagonal_test() {
         &[&arguments[..], &["--effect", "drift=4", "--out", "s"]].concat(),
     );
     assert_eq!(made.status, 0, "{}", made.stderr);
-    let answer = json(
-        &folder,
-        &["step-diagonal", "s/readings.csv", "--with", "drift"],
-    );
+    let arguments = ["step-diagonal", "s/readings.csv", "--with", "drift"];
+    let answer = json(&folder, &[&arguments[..], &["--out", "out"]].concat());
     holds(&answer, "drift", 4.0);
+    // Residuals of both fits, each in a file of its own.
+    assert!(folder.read("out/residuals.csv").lines().count() > 100);
+    let columns = folder.read("out/with_residuals.csv");
+    assert!(columns.contains("before_um,after_um"), "{columns:.200}");
     let quantities = answer["with"]["quantities"].as_array().unwrap();
     let about = |name: &str| quantities.iter().any(|q| q["quantity"] == name);
     assert!(about("EXY"), "{quantities:?}");
+}
+
+/// A drift of which nothing is seen: its time constant is open, and with it the size.
+#[test]
+fn a_size_that_goes_with_an_open_shape_has_the_interval_of_all_shapes() {
+    let folder = Folder::with(&[]);
+    // 2 µm within a tenth of the test: most of it goes by before the second run.
+    for seed in ["1", "12", "19", "22"] {
+        let effect = ["--effect", "drift=2", "--seed", seed, "--out", seed];
+        let runs = [
+            "--sequence",
+            "XYZ",
+            "--sequence",
+            "YZX",
+            "--sequence",
+            "ZXY",
+        ];
+        let usual = [
+            "simulate",
+            "step-diagonal",
+            "--repeats",
+            "4",
+            "--rotation",
+            "0",
+        ];
+        let made = run(&folder, &[&usual[..], &runs, &effect].concat());
+        assert_eq!(made.status, 0, "{}", made.stderr);
+        let data = format!("{seed}/readings.csv");
+        let answer = json(&folder, &["step-diagonal", &data, "--with", "drift"]);
+        holds(&answer, "drift", 2.0);
+        // By the covariance at the best shape alone three of these are off by more than 5 u.
+        let own = &answer["effects"][0]["parameters"];
+        assert!(own[0]["std"].as_f64().unwrap() > 0.7, "{own}");
+    }
 }
 
 /// The slide's yaw turns both probes: a wave of 20 µrad, told by its root mean square.

@@ -12,7 +12,7 @@ use super::{Args, page, recognise};
 use crate::cli::{Answer, CommonArgs, progress};
 use crate::diagnosis::{Joined, JoinedEffect, NotJoined, Options, for_people, joined};
 use crate::io::message::{list, nearest};
-use crate::io::{Message, Status};
+use crate::io::{CsvTable, Message, Status};
 use crate::report::diagnosis as sheet;
 use crate::report::number::probability;
 
@@ -141,7 +141,13 @@ pub(in crate::cli) fn beside(mut answer: Answer, given: &Given<'_>) -> Result<An
         object.insert("with".to_owned(), Value::Object(own));
     }
     answer.page = answer.page.followed_by(HEADING, joined.page);
-    answer.tables.extend(joined.tables);
+    // The command has residuals of its own: those of the fit without the effects.
+    answer
+        .tables
+        .extend(joined.tables.into_iter().map(|table| CsvTable {
+            file_name: format!("with_{}", table.file_name),
+            ..table
+        }));
     answer.seed = joined.seed;
     Ok(answer)
 }

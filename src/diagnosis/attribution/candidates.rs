@@ -105,6 +105,26 @@ pub(in crate::diagnosis) fn elsewhere<M: FittedModel>(
     causes: &[Cause],
     which: usize,
 ) -> Vec<Elsewhere> {
+    let alike = variants_alike(context, readings, causes, which).into_iter();
+    alike
+        .filter_map(|(variant, trial)| {
+            let sizes = Sizes::fitted_with_state(context, readings, &trial)?;
+            let own = sizes.of(context, &trial, which);
+            Some(Elsewhere {
+                variant,
+                parameters: own.into_iter().map(Into::into).collect(),
+            })
+        })
+        .collect()
+}
+
+/// Those variants in words, with the causes of the fit in which the cause has them.
+pub(in crate::diagnosis) fn variants_alike<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    which: usize,
+) -> Vec<(String, Vec<Cause>)> {
     let cause = &causes[which];
     let effect = &context.catalogue[cause.effect];
     let others = without(causes, which);
@@ -130,17 +150,10 @@ pub(in crate::diagnosis) fn elsewhere<M: FittedModel>(
         if !possible(context, readings, &others, &other) {
             return None;
         }
-        let mut trial = others.clone();
-        trial.push(other);
-        if context.misfit(readings, &trial) > least + chi_squared_of_two(0.95) {
-            return None;
-        }
-        let sizes = Sizes::fitted_with_state(context, readings, &trial)?;
-        let own = sizes.of(context, &trial, others.len());
-        Some(Elsewhere {
-            variant,
-            parameters: own.into_iter().map(Into::into).collect(),
-        })
+        let mut trial = causes.to_vec();
+        trial[which] = other;
+        let close = context.misfit(readings, &trial) <= least + chi_squared_of_two(0.95);
+        close.then_some((variant, trial))
     };
     starts.into_values().filter_map(alike).collect()
 }

@@ -1,6 +1,7 @@
 //! Which effects cause the gap: search, confidence set, sizes, and how far the answers move without
 //! them.
 
+pub(super) mod allowed;
 pub(super) mod attribute;
 pub(super) mod bias;
 pub(super) mod candidates;

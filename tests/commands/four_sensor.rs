@@ -228,6 +228,11 @@ fn bad_input_is_named_with_its_place() {
         ),
         (
             &good,
+            "[sensors]\nspacing = [5.0, 5.0, 25.0]\n[parabola]\ntilt_slope = -1e200\n",
+            "no slide has such a [parabola]",
+        ),
+        (
+            &good,
             "[sensors]\nspacing = [5.0, 5.0, 25.0]\n[separation]\nchoice = \"discrepancy\"\n",
             "noise",
         ),

@@ -242,3 +242,22 @@ fn a_prediction_out_of_reach_is_not_diagnosed() {
         );
     }
 }
+
+/// Deviations that are rounding of far greater coordinates are no noise of 1e-154.
+#[test]
+fn a_circle_of_great_coordinates_has_no_less_noise_than_their_rounding() {
+    let far = 9_223_372_036_854_775_807_i64;
+    let mut points = format!("x,y\n31,{far}\n{far},48\n");
+    for k in 0..12 {
+        let angle = f64::from(k) * 0.5;
+        points += &format!("{},{}\n", 50.0 * angle.cos(), 50.0 * angle.sin());
+    }
+    let folder = Folder::with(&[("p.csv", &points)]);
+    let told = run(&folder, &["diagnose", "p.csv", "--model", "circle"]);
+    assert!([0, 1].contains(&told.status), "{}", told.stderr);
+    assert!(
+        !told.stdout.contains("NaN") && !told.stdout.contains("10⁻¹⁵⁴"),
+        "{}",
+        told.stdout
+    );
+}

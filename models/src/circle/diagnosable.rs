@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use super::effects;
 use super::orthogonal::{CircleFit, orthogonal_fit};
 use super::points::{Circle, CircleError, Point};
-use crate::model::{Effect, FittedModel, Freedom, Place, Quantity, Record};
+use crate::model::{Effect, FittedModel, Freedom, Place, Quantity, ROUNDING, Record};
 use crate::units::UM_PER_MM;
 
 /// Points of one or several passes round a circle with the fitted circle.
@@ -169,6 +169,11 @@ impl FittedModel for CirclePoints {
 
     fn record(&self) -> &Record {
         &self.record
+    }
+
+    fn rounding(&self) -> f64 {
+        let Point { x, y } = self.fixed.centre;
+        ROUNDING * UM_PER_MM * (x.hypot(y) + self.fixed.radius)
     }
 
     fn freedom(&self) -> Freedom {

@@ -11,6 +11,9 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+/// Relative rounding of numbers that a calculation has gone through.
+pub(crate) const ROUNDING: f64 = 1e-12;
+
 pub(crate) use effect::each;
 pub use effect::{About, Effect, Estimate, Link, Parameter, Shape};
 
@@ -250,6 +253,12 @@ pub trait FittedModel: Clone + Send + Sync {
     /// is no gap.
     fn expected_scatter(&self) -> &[Column] {
         &[]
+    }
+
+    /// The smallest difference of readings that is more than rounding of what they were reckoned from:
+    /// 1e-12 of the greatest reading, unless they are small differences of greater numbers.
+    fn rounding(&self) -> f64 {
+        ROUNDING * self.observed().amax()
     }
 
     /// Standard deviation of one reading where the user states it.

@@ -141,18 +141,19 @@ fn stated(file: &SetupFile, table: &Spanned<ParabolaTable>) -> Result<Parabola, 
     .into_iter()
     .flatten()
     .collect();
-    let finite = ways
-        .surface_curvature
-        .iter()
-        .chain(ways.zero_adjustment.iter().flatten())
-        .chain(&ways.tilt_slope)
-        .all(|value| value.is_finite());
+    // Beyond these the tilts are no small angles and the adjustment no matter of a sensor's travel.
+    let beyond = |value: f64, limit: f64| value.is_nan() || value.abs() > limit;
+    let too_great = ways.surface_curvature.is_some_and(|c| beyond(c, 1e3))
+        || ways.tilt_slope.is_some_and(|s| beyond(s, 1.0))
+        || ways
+            .zero_adjustment
+            .is_some_and(|z| z.iter().any(|z| beyond(*z, 1e6)));
     match found.as_slice() {
-        [one] if finite => Ok(*one),
+        [one] if !too_great => Ok(*one),
         [_] => Err(file.bad(
             table.span(),
-            "a value of [parabola] is not finite",
-            "give a number, or leave the table out",
+            "no slide has such a [parabola]",
+            "surface_curvature is in um/mm2 (up to 1000), zero_adjustment in um (up to 1e6), tilt_slope in rad/mm (up to 1)",
         )),
         [] => Err(file.bad(
             table.span(),

@@ -17,8 +17,6 @@ use crate::diagnosis::noise::steps::levelled;
 
 /// Draws behind what neighbours tell of the noise.
 const NEIGHBOUR_DRAWS: usize = 64;
-/// Noise below this part of the greatest reading is rounding.
-const ROUNDING: f64 = 1e-12;
 
 /// The law that is stated, or that the repeats of a model's readings follow, or what stands in
 /// for it.
@@ -29,7 +27,7 @@ pub(in crate::diagnosis) fn estimate<M: FittedModel>(
     if let Some(sigma) = model.stated_noise() {
         return NoiseLaw::white(sigma, f64::INFINITY, NoiseSource::Stated);
     }
-    let floor = (ROUNDING * model.observed().amax()).max(f64::MIN_POSITIVE.sqrt());
+    let floor = model.rounding().max(f64::MIN_POSITIVE.sqrt());
     let level = levelled(model, readings);
     let contrasts = Contrasts::new(model.places(), model.traces(), &level);
     if contrasts.count() < FEWEST_CONTRASTS {

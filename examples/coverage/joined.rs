@@ -125,6 +125,10 @@ fn one<M: FittedModel>(
     let readings = clean.linearised();
     for (quantity, bias) in clean.quantities().iter().zip(&fit.quantities) {
         let truth = quantity.weights.dot(&readings);
+        // The mean along an axis less the offset along it is zero by definition.
+        if bias.after_std <= 1e-9 * bias.std {
+            continue;
+        }
         tallies[1].add(bias.after - truth, bias.after_std, freedom);
     }
     Some(tallies)

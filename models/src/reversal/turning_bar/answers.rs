@@ -144,6 +144,11 @@ impl TurningFit<'_> {
         self.offset(x).arg()
     }
 
+    /// Amplitude of the once-per-turn wave at a position, µm.
+    pub(super) fn amplitude(&self, x: f64) -> f64 {
+        self.offset(x).norm()
+    }
+
     /// The middle of the travel, mm.
     pub fn middle_mm(&self) -> f64 {
         let (low, high) = self.problem.run.range();

@@ -43,7 +43,10 @@ pub struct OnceATurn {
 /// # Errors
 /// [`TurningError`]: nothing turns, or too few turns.
 pub fn once_a_turn(run: &Run, about_hz: Option<f64>) -> Result<OnceATurn, TurningError> {
-    let survey = Survey::new(run, 0.0, 1.0, about_hz)?;
+    let mut survey = Survey::new(run, 0.0, 1.0, about_hz)?;
+    // In the middle a wave that goes out of step along the run is not lost.
+    survey.frame.reference_mm = middle_of(run);
+    let survey = survey;
     let even = Setting {
         harmonics: vec![2],
         along: Along::Constant,
@@ -58,9 +61,6 @@ pub fn once_a_turn(run: &Run, about_hz: Option<f64>) -> Result<OnceATurn, Turnin
         at.border[SPEED] = speed;
         at.border[ECCENTRICITY] = mean.norm();
     })?;
-    let white = |squares: f64, freedom: f64| Law::of_white(squares / freedom);
-    let spread = Spread::new(&wave, &white(wave.squares, wave.freedom()), 1.0);
-    let frequency = wave.speed(survey.base_hz, &spread);
     let growing = Setting {
         growing: true,
         along: Along::Linear,
@@ -75,6 +75,9 @@ pub fn once_a_turn(run: &Run, about_hz: Option<f64>) -> Result<OnceATurn, Turnin
             at.border[j] = wave.at.border[j];
         }
     })?;
+    // What the wave's growth leaves in the first fit is no noise: that of the second is.
+    let noise = Law::of_white(bar.squares / bar.freedom());
+    let frequency = wave.speed(survey.base_hz, &Spread::new(&wave, &noise, 1.0));
     let middle = survey.frame.middle;
     let direction = bar.axis_direction(middle_of(run));
     // Highest where ψ = −θ is the direction of the run-out.

@@ -14,6 +14,9 @@ use super::start::Survey;
 /// its square alone a run without recorded angle tells, and at zero nothing.
 const ACROSS_SEEN: f64 = 5.0;
 
+/// Steps at most: a steady turn fitted to one that is not leaves much, and then they come slowly.
+const MOST_STEPS: u64 = 2000;
+
 /// A model at its least squares.
 #[derive(Debug, Clone)]
 pub struct TurningFit<'a> {
@@ -194,7 +197,11 @@ pub(super) fn fit<'a>(
     let problem = TurningProblem::new(run, setting, &survey.frame, hold)?;
     let mut at = Parameters::zeros(problem.band_count(), problem.border_count());
     start(&problem, &mut at);
-    let result = fit_structured(&problem, at, &Minimisation::structured())?;
+    let options = Minimisation {
+        max_iterations: MOST_STEPS,
+        ..Minimisation::structured()
+    };
+    let result = fit_structured(&problem, at, &options)?;
     let covariance = result
         .covariance()
         .ok_or_else(|| TurningError::NotConverged {

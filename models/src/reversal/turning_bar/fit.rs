@@ -17,6 +17,9 @@ const ACROSS_SEEN: f64 = 5.0;
 /// Steps at most: a steady turn fitted to one that is not leaves much, and then they come slowly.
 const MOST_STEPS: u64 = 2000;
 
+/// Puts the unknowns where a fit begins.
+type Begin<'b> = dyn Fn(&TurningProblem, &mut Parameters) + 'b;
+
 /// A model at its least squares.
 #[derive(Debug, Clone)]
 pub struct TurningFit<'a> {
@@ -110,8 +113,7 @@ pub fn unsteady<'a>(
             put_bar(problem, at, bar);
         }
     };
-    let starts: [&dyn Fn(&TurningProblem, &mut Parameters); 3] =
-        [&of_side(across), &of_side(-across), &from_steady];
+    let starts: [&Begin; 3] = [&of_side(across), &of_side(-across), &from_steady];
     let mut found: Vec<TurningFit<'a>> = Vec::new();
     let mut failed = TurningError::NoWave;
     for start in starts {
@@ -161,7 +163,7 @@ fn fit_seen<'a>(
     run: &'a Run,
     survey: &'a Survey,
     setting: &Setting,
-    start: &dyn Fn(&TurningProblem, &mut Parameters),
+    start: &Begin,
 ) -> Result<TurningFit<'a>, TurningError> {
     let free = fit(run, survey, setting, Held::default(), start);
     if run.angle.is_some() || !setting.growing {
@@ -191,7 +193,7 @@ pub(super) fn fit<'a>(
     survey: &'a Survey,
     setting: &Setting,
     hold: Held,
-    start: &dyn Fn(&TurningProblem, &mut Parameters),
+    start: &Begin,
 ) -> Result<TurningFit<'a>, TurningError> {
     setting.check()?;
     let problem = TurningProblem::new(run, setting, &survey.frame, hold)?;

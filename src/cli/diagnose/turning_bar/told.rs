@@ -368,13 +368,17 @@ impl<'a, 'b> Told<'a, 'b> {
 
 /// What the slope of the form is, by the direction of the indicator (rad).
 fn combination(indicator: f64) -> String {
-    let degrees = indicator.to_degrees().rem_euclid(360.0);
-    match degrees {
-        d if d == 0.0 => "alpha_h + cone".to_owned(),
-        d if d == 90.0 => "alpha_v + cone".to_owned(),
-        d if d == 180.0 => "cone - alpha_h".to_owned(),
-        d if d == 270.0 => "cone - alpha_v".to_owned(),
-        d => format!("alpha towards {d}° + cone"),
+    // To a millionth of a degree.
+    let degrees = (indicator.to_degrees().rem_euclid(360.0) * 1e6).round() / 1e6;
+    let name = [
+        (0.0, "alpha_h + cone"),
+        (90.0, "alpha_v + cone"),
+        (180.0, "cone - alpha_h"),
+        (270.0, "cone - alpha_v"),
+    ];
+    match name.iter().find(|(of, _)| *of == degrees) {
+        Some((_, name)) => (*name).to_owned(),
+        None => format!("alpha towards {degrees}° + cone"),
     }
 }
 
@@ -391,9 +395,8 @@ fn resolution(values: &[f64]) -> Option<f64> {
         let multiple = (v - sorted[0]) / least;
         (multiple - multiple.round()).abs() < 0.01
     };
-    (least.is_finite()
-        && 20.0 * least < largest.max(1.0) * 20.0
-        && sorted.iter().all(whole)
-        && (sorted.len() as f64) > 4.0 * (sorted[sorted.len() - 1] - sorted[0]) / least)
-        .then_some(least)
+    // Coarse only where a step is taken by several readings on average.
+    let span = sorted[sorted.len() - 1] - sorted[0];
+    let coarse = least.is_finite() && sorted.len() as f64 > 4.0 * span / least;
+    (coarse && sorted.iter().all(whole)).then_some(least)
 }

@@ -8,7 +8,7 @@ use errsep_models::reversal::turning_bar::{
 
 use crate::diagnosis::Kind;
 use crate::diagnosis::turning::{BAR_BEND, RECORDED_ANGLE, Weighed};
-use crate::number::{measured, percent, plain, probability};
+use crate::number::{fixed, measured, percent, plain, probability};
 
 /// Places along the bar and times of the curves.
 const POINTS: usize = 201;
@@ -187,7 +187,7 @@ impl<'a, 'b> Told<'a, 'b> {
             "ahead of"
         };
         let when = if self.run.timed {
-            format!("{} s", plain(curve.time[k], 4))
+            format!("{} s", fixed(curve.time[k], 0))
         } else {
             format!("reading {}", curve.time[k].round())
         };
@@ -198,7 +198,7 @@ impl<'a, 'b> Told<'a, 'b> {
         let speeds = self.per_minute(&[slow, fast]);
         format!(
             "it was {degrees}° {way} a steady turn at {when} (x = {} mm), and its speed ran from {} to {} {}",
-            plain(curve.x[k], 4),
+            fixed(curve.x[k], 1),
             plain(speeds[0], 4),
             plain(speeds[1], 4),
             self.speed_unit()

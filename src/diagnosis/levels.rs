@@ -139,3 +139,12 @@ pub(in crate::diagnosis) const PLANNED: f64 = 0.01;
 
 /// *Quantile.* An effect that is given and stands out less than this is told not to: its size may be zero.
 pub(in crate::diagnosis) const WEAK: f64 = 0.05;
+
+// A bar that turns.
+
+/// *Tuned.* What an effect leaves may exceed the noise law by no more than the noise itself and by no more
+/// than this part of the gap before, or it is not adequate.
+pub(in crate::diagnosis) const TURN_LEFT: f64 = 0.2;
+/// *Quantile.* Evidence (natural logarithm) by which two explanations, or the two signs of γ across, must
+/// differ to be told apart: odds of 150 to 1.
+pub(in crate::diagnosis) const TURN_APART: f64 = 5.0;

@@ -13,6 +13,7 @@ mod noise;
 mod options;
 mod planning;
 mod search;
+pub mod turning;
 mod verdict;
 
 use errsep_models::model::{Effect, FittedModel};

@@ -17,6 +17,7 @@ pub mod reversal;
 pub mod setup;
 pub mod source;
 pub mod table;
+pub mod turning;
 pub mod units;
 
 pub use folder::{OutFile, OutFolder};

@@ -49,6 +49,7 @@ pub mod simulation;
 pub mod step_diagonal;
 pub mod straightness;
 mod table;
+pub mod turning_bar;
 
 pub use page::{Block, Figure, KeyFigure, Page, Provenance, Section, Standing};
 pub use table::{Cell, Order, Table};

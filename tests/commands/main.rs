@@ -21,5 +21,6 @@ mod report;
 mod reversal;
 mod spindle_bar;
 mod step_diagonal;
+mod turning_bar;
 mod with_effects;
 mod with_other_models;

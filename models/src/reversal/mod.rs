@@ -18,6 +18,7 @@ pub mod simultaneous;
 mod smooth_profile;
 pub mod staged;
 pub mod turning;
+pub mod turning_bar;
 
 pub use combinations::Combination;
 pub use convention::{Contrast, Convention, NOT_SHOWN};

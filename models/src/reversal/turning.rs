@@ -3,17 +3,15 @@
 //!
 //! The reading is F(x) + a once-per-turn wave (the artefact runs out by its eccentricity and tilt)
 //! and its harmonics. The wave tells the spindle angle: its frequency is found where a least-squares
-//! fit of wave and smooth background leaves least. Every half turn the indicator sees the opposite
+//! fit of wave and smooth background leaves least, by the engine of [`turning_bar`](super::turning_bar). Every half turn the indicator sees the opposite
 //! side, as in the channels 1A and 2B of the reversal.
 
 use errsep_solvers::linear::limited::svd;
-use errsep_solvers::scalar::least_between;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
-use std::convert::Infallible;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use thiserror::Error;
 
+use super::turning_bar::{Run, TurningError, once_a_turn};
 use super::{Channel, Direction, Observations, Reading};
 
 /// One sample of the run.
@@ -78,10 +76,6 @@ pub enum NoTraces {
     NoWave,
 }
 
-/// Degree of the polynomial that stands for all that is slow.
-const BACKGROUND_DEGREE: usize = 8;
-/// Harmonics of the turn in the fit of its frequency.
-const HARMONICS: usize = 2;
 /// Samples a turn needs, and turns a run needs.
 const SAMPLES_PER_TURN: f64 = 20.0;
 const FEWEST_TURNS: f64 = 3.0;
@@ -102,7 +96,6 @@ pub fn find_turning(samples: &[Sample], about: Option<f64>) -> Result<Turning, N
         return Err(NoTraces::Time { index: i + 1 });
     }
     let span = samples[n - 1].time - samples[0].time;
-    let step = 1.0 / (2.0 * span);
     let (from, to) = match about {
         Some(f) if !(FEWEST_TURNS..=n as f64 / FEWEST_PER_TURN).contains(&(1.05 * f * span)) => {
             return Err(NoTraces::Speed {
@@ -117,50 +110,36 @@ pub fn find_turning(samples: &[Sample], about: Option<f64>) -> Result<Turning, N
     if !(from > 0.0 && from < to) {
         return Err(too_few);
     }
-    let rest = Fit::of(samples, None, 0).ok_or(NoTraces::NoWave)?.rests;
-    let power = |f: f64| {
-        let (c, s) = samples
-            .iter()
-            .zip(&rest)
-            .fold((0.0, 0.0), |(c, s), (p, r)| {
-                let (sin, cos) = (TAU * f * p.time).sin_cos();
-                (c + r * cos, s + r * sin)
-            });
-        c * c + s * s
+    let time: Vec<f64> = samples.iter().map(|p| p.time).collect();
+    // What is slow is a spline in time: where the slide stands does not matter to the wave.
+    let run = Run {
+        x: time.clone(),
+        time,
+        timed: true,
+        value: samples.iter().map(|p| p.value).collect(),
+        angle: None,
+        direction: 1.0,
     };
-    let coarse = (0..=((to - from) / step).ceil() as usize)
-        .into_par_iter()
-        .map(|k| from + k as f64 * step)
-        .map(|f| (power(f), f))
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .ok_or(NoTraces::NoWave)?
-        .1;
-    // Of steady amplitude: a run-out that turned evenly along the artefact could not be told from a
-    // little more or less speed, and would leave the frequency undetermined.
-    let squares = |f: f64| {
-        let fit = Fit::of(samples, Some(f), 2);
-        Ok::<f64, Infallible>(fit.map_or(f64::INFINITY, |fit| fit.squares))
-    };
-    let (low, high) = (coarse - 1.5 * step, coarse + 1.5 * step);
-    // A least value is flat to about the root of a rounding.
-    let frequency = least_between(low, high, 1e-8 * step, squares).unwrap_or(coarse);
-    let fit = Fit::of(samples, Some(frequency), 4).ok_or(NoTraces::NoWave)?;
-    let sigma = (fit.squares / (n - fit.unknowns) as f64).sqrt();
-    let amplitude = fit.cosine.hypot(fit.sine);
+    let wave = once_a_turn(&run, about).map_err(|why| match why {
+        TurningError::TooFew { .. }
+        | TurningError::TooFewTurns { .. }
+        | TurningError::TooFewPerTurn { .. }
+        | TurningError::TooManyUnknowns { .. } => too_few,
+        _ => NoTraces::NoWave,
+    })?;
     // Four standard deviations of the amplitude that noise alone would show.
-    if amplitude.is_nan() || amplitude <= 4.0 * sigma * (2.0 / n as f64).sqrt() {
+    let noise = wave.rest * (2.0 / n as f64).sqrt();
+    if wave.amplitude.is_nan() || wave.amplitude <= 4.0 * noise {
         return Err(NoTraces::NoWave);
     }
-    let middle = f64::midpoint(samples[0].time, samples[n - 1].time);
-    let phase = fit.sine.atan2(fit.cosine);
+    let (frequency, frequency_std) = wave.frequency;
     Ok(Turning {
         frequency,
-        // Cramér–Rao bound of a wave's frequency in white noise.
-        frequency_std: 6f64.sqrt() * sigma / (PI * span * amplitude * (n as f64).sqrt()),
-        highest_at: middle + phase / (TAU * frequency),
-        amplitude,
-        angle_std_rad: sigma * (2.0 / n as f64).sqrt() / amplitude,
-        rest_rms: sigma,
+        frequency_std,
+        highest_at: wave.highest_at,
+        amplitude: wave.amplitude,
+        angle_std_rad: noise / wave.amplitude,
+        rest_rms: wave.rest,
         turns: span * frequency,
     })
 }
@@ -238,66 +217,4 @@ fn passage(samples: &[Sample], time: f64) -> Option<(f64, f64)> {
         solution.get(0).copied()
     };
     Some((fit(2, |p| p.x)?, fit(3, |p| p.value)?))
-}
-
-/// Least squares of background, and of the wave of a frequency with its harmonics: two columns a
-/// harmonic for steady amplitudes, four for such that change evenly along the run.
-struct Fit {
-    squares: f64,
-    unknowns: usize,
-    rests: Vec<f64>,
-    /// Once-per-turn amplitudes in the middle of the run.
-    cosine: f64,
-    sine: f64,
-}
-
-impl Fit {
-    fn of(samples: &[Sample], frequency: Option<f64>, columns: usize) -> Option<Self> {
-        let (first, last) = (samples.first()?.time, samples.last()?.time);
-        let middle = f64::midpoint(first, last);
-        let background = BACKGROUND_DEGREE + 1;
-        let unknowns = background + columns * HARMONICS;
-        let fill = |p: &Sample, row: &mut DVector<f64>| {
-            let t = (p.time - middle) / (last - middle);
-            row[0] = 1.0;
-            row[1] = t;
-            for k in 2..background {
-                row[k] = 2.0 * t * row[k - 1] - row[k - 2];
-            }
-            if let Some(f) = frequency {
-                for h in 0..HARMONICS {
-                    let (sin, cos) = ((h + 1) as f64 * TAU * f * (p.time - middle)).sin_cos();
-                    let values = [cos, sin, t * cos, t * sin];
-                    for (k, value) in values.into_iter().take(columns).enumerate() {
-                        row[background + columns * h + k] = value;
-                    }
-                }
-            }
-        };
-        // Chebyshev polynomials and waves are near orthogonal: normal equations lose few digits.
-        let mut row = DVector::zeros(unknowns);
-        let mut normal = DMatrix::zeros(unknowns, unknowns);
-        let mut right = DVector::zeros(unknowns);
-        for p in samples {
-            fill(p, &mut row);
-            normal.ger(1.0, &row, &row, 1.0);
-            right.axpy(p.value, &row, 1.0);
-        }
-        let solution = normal.cholesky()?.solve(&right);
-        let rests = samples
-            .iter()
-            .map(|p| {
-                fill(p, &mut row);
-                p.value - row.dot(&solution)
-            })
-            .collect::<Vec<_>>();
-        let amplitude = |k: usize| solution.get(background + k).copied().unwrap_or(0.0);
-        Some(Self {
-            squares: rests.iter().map(|r| r * r).sum(),
-            unknowns,
-            cosine: amplitude(0),
-            sine: amplitude(1),
-            rests,
-        })
-    }
 }

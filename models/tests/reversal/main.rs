@@ -7,3 +7,4 @@ mod left_out;
 mod simultaneous;
 mod staged;
 mod turning;
+mod turning_bar;

@@ -14,6 +14,7 @@ pub(super) mod page;
 mod recognise;
 pub(super) mod reversal;
 mod step_diagonal;
+mod turning_bar;
 pub(super) mod words;
 
 use std::path::{Path, PathBuf};

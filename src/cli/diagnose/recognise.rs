@@ -4,8 +4,10 @@ use clap::builder::PossibleValuesParser;
 
 use super::{
     Args, calibration_line, circle, four_sensor, fourier, machine, reversal, step_diagonal,
+    turning_bar,
 };
 use crate::cli::Answer;
+use crate::io::turning::is_run;
 use crate::io::{Message, SetupFile, TableReader};
 
 /// A model that can be diagnosed.
@@ -70,7 +72,21 @@ pub(super) const MODELS: &[Model] = &[
         columns: &[&["diagonal", "sequence", "x", "y", "reading"]],
         run: step_diagonal::run,
     },
+    Model {
+        name: TURNING_BAR,
+        tables: &["bar", "spindle"],
+        // A run is told by what other files lack: see `is_run`.
+        columns: &[],
+        run: turning_bar::run,
+    },
 ];
+
+const TURNING_BAR: &str = "turning-bar";
+
+/// The model of a bar that turns.
+fn of_a_run() -> Option<&'static Model> {
+    MODELS.iter().find(|m| m.name == TURNING_BAR)
+}
 
 /// The names that `--model` takes.
 pub(super) fn names() -> PossibleValuesParser {
@@ -86,8 +102,11 @@ pub(super) fn model(args: &Args) -> Result<&'static Model, Message> {
         let asked = MODELS.iter().find(|m| m.name == name);
         return asked.ok_or_else(|| Message::bad_input(format!("there is no model `{name}`")));
     }
-    if args.columns.is_some() {
-        return Ok(&MODELS[0]);
+    if let Some(map) = &args.columns {
+        let of_a_reversal = ["channel", "1A", "1B", "2A", "2B"];
+        let turns = (map.names("time") || map.names("spindle")) && map.names("reading");
+        let run = of_a_run().filter(|_| turns && !of_a_reversal.iter().any(|r| map.names(r)));
+        return Ok(run.unwrap_or(&MODELS[0]));
     }
     let table = TableReader::open(&args.data)?;
     let found: Vec<&str> = table.bare_names().collect();
@@ -103,6 +122,9 @@ pub(super) fn model(args: &Args) -> Result<&'static Model, Message> {
         .collect();
     if let [only] = by_setup[..] {
         return Ok(only);
+    }
+    if let Some(model) = of_a_run().filter(|_| is_run(&found)) {
+        return Ok(model);
     }
     // The longest form that is wholly there: x and y alone are also part of others.
     let length = |model: &Model| {
@@ -158,7 +180,10 @@ fn nearest(found: &[&str]) -> Option<&'static Model> {
 fn unknown(table: &TableReader) -> Message {
     let forms: Vec<String> = MODELS
         .iter()
-        .map(|m| format!("{} ({})", m.name, m.columns[0].join(", ")))
+        .map(|m| match m.columns.first() {
+            Some(columns) => format!("{} ({})", m.name, columns.join(", ")),
+            None => format!("{} (time or spindle, x, reading)", m.name),
+        })
         .collect();
     table
         .in_header(0, "the columns are those of no model that can be diagnosed")

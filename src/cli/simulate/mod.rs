@@ -10,6 +10,7 @@ pub mod machine;
 pub mod positioning;
 pub mod reversal;
 pub mod step_diagonal;
+pub mod turning_bar;
 
 use std::fmt::Write;
 use std::path::Path;
@@ -42,6 +43,7 @@ enum Kind {
     Positioning(positioning::Args),
     Reversal(reversal::Args),
     StepDiagonal(step_diagonal::Args),
+    TurningBar(turning_bar::Args),
 }
 
 impl Args {
@@ -56,6 +58,7 @@ impl Args {
             Kind::Positioning(args) => &args.common,
             Kind::Reversal(args) => &args.common,
             Kind::StepDiagonal(args) => &args.common,
+            Kind::TurningBar(args) => &args.common,
         }
     }
 }
@@ -75,6 +78,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         Kind::Positioning(args) => positioning::run(args),
         Kind::Reversal(args) => reversal::run(args),
         Kind::StepDiagonal(args) => step_diagonal::run(args),
+        Kind::TurningBar(args) => turning_bar::run(args),
     }?;
     if let Some(folder) = &args.common().out {
         answer.text = summary(&answer, folder);

@@ -37,13 +37,16 @@ pub const ROLES: [&str; 10] = [
     "2B",
 ];
 
+/// What a column of a run in which the bar turns can hold beside these.
+const OF_A_RUN: &str = "spindle";
+
 impl ColumnMap {
     /// Adds one entry, `column` or `column:unit`.
     ///
     /// # Errors
     /// What is wrong, in words, and the remedy.
     pub fn add(&mut self, role: &str, column_and_unit: &str) -> Result<(), (String, String)> {
-        if !ROLES.contains(&role) {
+        if !ROLES.contains(&role) && role != OF_A_RUN {
             let remedy = match nearest(role, ROLES) {
                 Some(near) => format!("did you mean `{near}`? Known are {}", list(&ROLES)),
                 None => format!("known are {}", list(&ROLES)),
@@ -78,6 +81,11 @@ impl ColumnMap {
             unit,
         });
         Ok(())
+    }
+
+    /// Whether a column was given for this role.
+    pub fn names(&self, role: &str) -> bool {
+        self.entries.iter().any(|e| e.role == role)
     }
 
     /// Whether nothing was renamed.

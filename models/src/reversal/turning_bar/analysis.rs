@@ -1,0 +1,374 @@
+//! Every model of a run beside the others, under one law of the noise.
+
+use errsep_solvers::structured::StructuredProblem;
+use nalgebra::{Matrix4, Vector4};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::answers::Told;
+use super::contrasts::{TurnResiduals, turn_residuals};
+use super::error::TurningError;
+use super::fit::{TurningFit, bent, fit, steady, unsteady};
+use super::noise::{law, misfit, windows};
+use super::problem::{HARMONICS, Held};
+use super::run::Run;
+use super::setting::{Along, Setting, Wave};
+use super::spread::Spread;
+use super::start::Survey;
+use crate::noise::Law;
+
+/// A cell of a spline is so many turns long or longer: what happens within a turn is the section's.
+const TURNS_A_CELL: f64 = 2.0;
+/// Steps of the ladder of cells without a better one after which it ends.
+const PATIENCE: usize = 2;
+/// Cells from which the law of the noise is first taken, at most.
+const FIRST_CELLS: (usize, usize) = (20, 40);
+
+/// What is known of a run beforehand.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Plan {
+    /// Harmonics, indicator, handedness; cells and wave are the analysis's own.
+    pub setting: Setting,
+    /// Cells of the form; `None`: chosen.
+    pub form_cells: Option<usize>,
+    /// Cells of the turn; `None`: chosen.
+    pub turn_cells: Option<usize>,
+}
+
+/// One model of the run.
+#[derive(Debug, Clone)]
+pub struct Rival<'a> {
+    /// Its fit.
+    pub fit: TurningFit<'a>,
+    /// −2 ln of the likelihood of its residuals under the law, up to a constant.
+    pub misfit: f64,
+    /// What stands out of its residuals, turn by turn.
+    pub turns: TurnResiduals,
+    /// Root mean square of what it misses of turns that it was not fitted to, µm.
+    pub held_out: Option<f64>,
+}
+
+/// All models of a run.
+#[derive(Debug, Clone)]
+pub struct Analysis<'a> {
+    /// Law of the noise, µm² and the unit of time.
+    pub law: Law,
+    /// By what the variances of the law are raised, for slow parts that it does not hold.
+    pub factor: f64,
+    /// A straight bar that turns steadily, or as recorded.
+    pub steady: Rival<'a>,
+    /// The same with an angle that strays.
+    pub unsteady: Option<Rival<'a>>,
+    /// A bar of any axis that turns steadily.
+    pub bent: Option<Rival<'a>>,
+    /// Of the unsteady turn with γ across of the other sign: its misfit beyond the better one's.
+    pub mirror: Option<f64>,
+}
+
+/// Fits every model.
+///
+/// # Errors
+/// [`TurningError`] where the steady turn has no fit; of a rival that has none there is none.
+pub fn analyse<'a>(
+    run: &'a Run,
+    survey: &'a Survey,
+    plan: &Plan,
+) -> Result<Analysis<'a>, TurningError> {
+    let most = ((survey.turns / TURNS_A_CELL) as usize).max(1);
+    let first = Setting {
+        form_cells: plan.form_cells.unwrap_or(most.min(FIRST_CELLS.0)),
+        wave: Wave::Unsteady {
+            cells: plan.turn_cells.unwrap_or(most.min(FIRST_CELLS.1)),
+        },
+        ..plan.setting.clone()
+    };
+    let even = steady(run, survey, &first)?;
+    let (noise, setting) = match unsteady(run, survey, &first, &even) {
+        Ok(fits) => {
+            let noise = law(run, &fits[0].psi, &fits[0].residuals);
+            (
+                noise,
+                chosen(run, survey, &first, &fits[0], plan, &noise, most),
+            )
+        }
+        Err(_) => (law(run, &even.psi, &even.residuals), first),
+    };
+    let even = steady(run, survey, &setting)?;
+    let strays = unsteady(run, survey, &setting, &even).unwrap_or_default();
+    let Wave::Unsteady { cells } = setting.wave else {
+        return Err(TurningError::NoWave);
+    };
+    let bend = Setting {
+        wave: Wave::Bent { cells },
+        ..setting.clone()
+    };
+    let bend = bent(run, survey, &bend, &even).ok();
+    // The law is that of whatever leaves least.
+    let least = strays.first().into_iter().chain(&bend).chain([&even]);
+    let least = least.min_by(|a, b| {
+        misfit(run, &a.residuals, &noise).total_cmp(&misfit(run, &b.residuals, &noise))
+    });
+    let noise = least.map_or(noise, |fit| law(run, &fit.psi, &fit.residuals));
+    let rival = |fit: TurningFit<'a>| Rival {
+        misfit: misfit(run, &fit.residuals, &noise),
+        turns: turn_residuals(&fit, &noise),
+        held_out: None,
+        fit,
+    };
+    let mut strays = strays.into_iter().map(rival).collect::<Vec<_>>();
+    strays.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    let mirror = (strays.len() > 1).then(|| strays[1].misfit - strays[0].misfit);
+    let mut strays = strays.into_iter();
+    let (even, stray, bend) = (rival(even), strays.next(), bend.map(rival));
+    let slow = [Some(&even), stray.as_ref(), bend.as_ref()]
+        .into_iter()
+        .flatten()
+        .map(|r| {
+            let (turns, taken) = (
+                r.turns.turns.len() as f64,
+                r.fit.problem.form.coefficient_count() as f64,
+            );
+            r.turns.slow * turns / f64::max(turns - taken, 1.0)
+        })
+        .fold(f64::INFINITY, f64::min);
+    Ok(Analysis {
+        law: noise,
+        factor: slow.max(1.0),
+        steady: even,
+        unsteady: stray,
+        bent: bend,
+        mirror,
+    })
+}
+
+/// The cells that describe the run best: of the form, then of the turn, up a ladder each, by the
+/// likelihood under the law less ½ ln n for each unknown (Schwarz).
+fn chosen(
+    run: &Run,
+    survey: &Survey,
+    first: &Setting,
+    from: &TurningFit,
+    plan: &Plan,
+    noise: &Law,
+    most: usize,
+) -> Setting {
+    let across = from.at.border[super::problem::ACROSS_E];
+    let hold = Held {
+        across: from.across_held,
+        ..Held::default()
+    };
+    let bar = [survey.bar[0], survey.bar[1], across];
+    let score = |setting: &Setting| {
+        let fitted = fit(run, survey, setting, hold, &|problem, at| {
+            at.border.clone_from(&from.at.border);
+            if let (Some(basis), Some(unknowns)) = (&problem.wave, problem.wave_unknowns.first()) {
+                for (j, value) in unknowns.iter().zip(survey.turn(basis, bar)) {
+                    at.band[*j] = value;
+                }
+            }
+        });
+        let fitted = fitted.ok()?;
+        let price = (run.len() as f64).ln() * fitted.unknowns as f64;
+        Some(misfit(run, &fitted.residuals, noise) + price)
+    };
+    let mut setting = first.clone();
+    if plan.turn_cells.is_none() {
+        let with = |cells| Setting {
+            wave: Wave::Unsteady { cells },
+            ..setting.clone()
+        };
+        setting = best_of(most, with, &score).unwrap_or(setting);
+    }
+    if plan.form_cells.is_none() {
+        let with = |form_cells| Setting {
+            form_cells,
+            ..setting.clone()
+        };
+        setting = best_of(most, with, &score).unwrap_or(setting);
+    }
+    setting
+}
+
+/// Goes up a ladder of cells until it no longer gets better.
+fn best_of(
+    most: usize,
+    with: impl Fn(usize) -> Setting,
+    score: &impl Fn(&Setting) -> Option<f64>,
+) -> Option<Setting> {
+    let mut best: Option<(f64, Setting)> = None;
+    let mut since = 0;
+    let mut cells = 1;
+    while cells <= most && since <= PATIENCE {
+        let setting = with(cells);
+        if let Some(value) = score(&setting) {
+            if best.as_ref().is_none_or(|b| value < b.0) {
+                best = Some((value, setting));
+                since = 0;
+            } else {
+                since += 1;
+            }
+        }
+        cells = (cells + 1).max(cells * 7 / 5);
+    }
+    best.map(|b| b.1)
+}
+
+impl Rival<'_> {
+    /// Covariance of its unknowns.
+    pub fn spread(&self, analysis: &Analysis) -> Spread {
+        Spread::new(&self.fit, &analysis.law, analysis.factor)
+    }
+}
+
+impl Analysis<'_> {
+    /// Evidence for a rival against the steady turn: half of what the misfit falls by, less ½ ln n for
+    /// each further unknown (Schwarz).
+    pub fn evidence(&self, rival: &Rival) -> f64 {
+        let n = rival.fit.residuals.len() as f64;
+        let more = rival.fit.unknowns as f64 - self.steady.fit.unknowns as f64;
+        0.5 * (self.steady.misfit - rival.misfit - more * n.ln())
+    }
+
+    /// Probability that noise alone makes the misfit fall by as much.
+    pub fn p_value(&self, rival: &Rival) -> f64 {
+        let more = rival.fit.unknowns as f64 - self.steady.fit.unknowns as f64;
+        let fall = (self.steady.misfit - rival.misfit) / self.factor;
+        match ChiSquared::new(more.max(1.0)) {
+            Ok(law) if fall > 0.0 => law.sf(fall),
+            _ => 1.0,
+        }
+    }
+
+    /// Probability that a steady turn seems to stray as much, from the covariance of the stray itself.
+    pub fn p_steady(&self) -> f64 {
+        let Some(rival) = &self.unsteady else {
+            return 1.0;
+        };
+        match rival.fit.strays(&rival.spread(self)) {
+            Some((square, freedom)) if freedom > 0.0 => {
+                ChiSquared::new(freedom).map_or(1.0, |law| law.sf(square))
+            }
+            _ => 1.0,
+        }
+    }
+
+    /// Fits steady turn and rivals to every other turn and sees what they miss of the turns between.
+    pub fn hold_out(&mut self, run: &Run, survey: &Survey) {
+        let mut turn = vec![0; run.len()];
+        for (k, window) in windows(&self.steady.fit.psi, 1.0).into_iter().enumerate() {
+            turn[window].fill(k);
+        }
+        let rivals = [
+            Some(&mut self.steady),
+            self.unsteady.as_mut(),
+            self.bent.as_mut(),
+        ];
+        for rival in rivals.into_iter().flatten() {
+            let halves =
+                [0, 1].map(|half| missed(&rival.fit, survey, run, &|i| turn[i] % 2 == half));
+            rival.held_out = match halves {
+                [Some(a), Some(b)] => Some(((a.0 + b.0) / (a.1 + b.1)).sqrt()),
+                _ => None,
+            };
+        }
+    }
+}
+
+/// Sum of squares and number of the readings that were left out of a fit to those that `keep` keeps.
+fn missed(
+    whole: &TurningFit,
+    survey: &Survey,
+    run: &Run,
+    keep: &impl Fn(usize) -> bool,
+) -> Option<(f64, f64)> {
+    let part = run.part(keep);
+    let own = Survey {
+        frame: survey.frame.part(keep),
+        ..survey.clone()
+    };
+    let hold = Held {
+        across: whole.across_held,
+        ..Held::default()
+    };
+    let fitted = fit(&part, &own, whole.setting(), hold, &|problem, at| {
+        *at = problem.taken_over(&whole.problem, &whole.at);
+    })
+    .ok()?;
+    let at = whole.problem.taken_over(&fitted.problem, &fitted.at);
+    let left = whole.problem.residuals(&at);
+    let out = left.iter().enumerate().filter(|(i, _)| !keep(*i));
+    let (sum, count) = out.fold((0.0, 0.0), |(s, n), (_, r)| (s + r * r, n + 1.0));
+    Some((sum, count))
+}
+
+/// Slopes of traces at pairs of opposite angles of the once-per-turn wave, as they follow twice the
+/// angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pairs {
+    /// Amplitude over twice the angle, rad, in the readings.
+    pub amplitude_rad: Told,
+    /// The same of a section that is oval and the same all along the bar, rad.
+    pub of_oval_rad: f64,
+    /// Amplitude of that section, µm.
+    pub oval_um: f64,
+}
+
+impl TurningFit<'_> {
+    /// What pairs of opposite angles would scatter by; `None` without harmonic 2.
+    ///
+    /// The wave is highest where ψ is the direction of e + γx. A trace at the angle w behind that sees
+    /// cos 2ψ turn along the bar with twice that direction: a section that does not change brings a
+    /// slope there that follows 2w.
+    pub fn pairs(&self, spread: &Spread) -> Option<Pairs> {
+        let setting = &self.problem.setting;
+        if matches!(setting.wave, Wave::Bent { .. }) {
+            return None;
+        }
+        let h = setting.harmonics.iter().position(|k| *k == 2)?;
+        let per = setting.per_harmonic();
+        let from = HARMONICS + per * h;
+        let middle = self.problem.frame.xi(self.middle_mm());
+        let value = |l: usize| self.at.border[from + l];
+        let oval = match setting.along {
+            Along::Constant => (value(0), value(1)),
+            Along::Linear => (value(0) + middle * value(2), value(1) + middle * value(3)),
+        };
+        let (mut normal, mut seen, mut constant) =
+            (Matrix4::zeros(), Vector4::zeros(), Vector4::zeros());
+        for (i, psi) in self.psi.iter().enumerate() {
+            let x = self.problem.run.x[i];
+            let bar = self.axis_direction(x);
+            let xi = self.problem.frame.xi(x) - middle;
+            let (s, c) = (2.0 * (psi - bar)).sin_cos();
+            let row = Vector4::new(c, s, xi * c, xi * s);
+            let (s, c) = (2.0 * psi).sin_cos();
+            let own = oval.0 * c + oval.1 * s;
+            let change = match setting.along {
+                Along::Constant => 0.0,
+                Along::Linear => xi * (value(2) * c + value(3) * s),
+            };
+            normal += row * row.transpose();
+            seen += row * (self.residuals[i] + own + change);
+            constant += row * own;
+        }
+        let inverse = normal.try_inverse()?;
+        let amplitude = |right: &Vector4<f64>| {
+            let found = inverse * right;
+            1e-3 * found[2].hypot(found[3]) / self.problem.frame.half_mm
+        };
+        // As sure as the change of the oval section along the bar.
+        let mut row = nalgebra::DVector::zeros(self.inverse.nrows());
+        if per > 2 {
+            row[self.problem.band_count() + from + 2] = 1.0;
+        } else {
+            row[self.problem.band_count() + from] = 1.0;
+        }
+        Some(Pairs {
+            amplitude_rad: Told {
+                value: amplitude(&seen),
+                std: 1e-3 * spread.variance(&row).sqrt() / self.problem.frame.half_mm,
+            },
+            of_oval_rad: amplitude(&constant),
+            oval_um: oval.0.hypot(oval.1),
+        })
+    }
+}

@@ -1,0 +1,258 @@
+//! The fit of one model to a run, from starts that the run itself tells.
+
+use errsep_solvers::options::Options as Minimisation;
+use errsep_solvers::structured::{Parameters, StructuredProblem, fit_structured};
+use nalgebra::DMatrix;
+
+use super::error::TurningError;
+use super::problem::{ACROSS_E, ALONG_E, ECCENTRICITY, Held, SPEED, THETA, TurningProblem};
+use super::run::Run;
+use super::setting::{Setting, Wave};
+use super::start::Survey;
+
+/// γ across the eccentricity is held at zero where it is below so many of its standard deviations: of
+/// its square alone a run without recorded angle tells, and at zero nothing.
+const ACROSS_SEEN: f64 = 5.0;
+
+/// Steps at most: a steady turn fitted to one that is not leaves much, and then they come slowly.
+const MOST_STEPS: u64 = 2000;
+
+/// Puts the unknowns where a fit begins.
+type Begin<'b> = dyn Fn(&TurningProblem, &mut Parameters) + 'b;
+
+/// A model at its least squares.
+#[derive(Debug, Clone)]
+pub struct TurningFit<'a> {
+    pub(super) problem: TurningProblem<'a>,
+    /// Where it is.
+    pub(super) at: Parameters,
+    /// (JᵀJ)⁻¹ over the unknowns of band and border; zero where held.
+    pub(super) inverse: DMatrix<f64>,
+    /// Reading less model, µm.
+    pub residuals: Vec<f64>,
+    /// ψ of every reading, rad.
+    pub psi: Vec<f64>,
+    /// Σ of the squares of the residuals, µm².
+    pub squares: f64,
+    /// Unknowns that were fitted.
+    pub unknowns: usize,
+    /// Steps of the minimisation.
+    pub iterations: u64,
+    /// Whether γ across the eccentricity was held at zero, because the run shows none.
+    pub across_held: bool,
+}
+
+impl TurningFit<'_> {
+    /// Root mean square of the residuals, µm.
+    pub fn rms(&self) -> f64 {
+        (self.squares / self.residuals.len() as f64).sqrt()
+    }
+
+    /// Readings beyond the unknowns.
+    pub fn freedom(&self) -> f64 {
+        (self.residuals.len() - self.unknowns) as f64
+    }
+
+    /// What was fitted.
+    pub fn setting(&self) -> &Setting {
+        &self.problem.setting
+    }
+
+    /// γ across the eccentricity, µm over half the travel.
+    pub(super) fn across(&self) -> f64 {
+        self.at.border[ACROSS_E]
+    }
+}
+
+/// Fits a steady turn, or the recorded one: of the starts that the turns tell one by one.
+///
+/// # Errors
+/// [`TurningError`]: a fit that has no answer.
+pub fn steady<'a>(
+    run: &'a Run,
+    survey: &'a Survey,
+    setting: &Setting,
+) -> Result<TurningFit<'a>, TurningError> {
+    let setting = Setting {
+        wave: Wave::Steady,
+        ..setting.clone()
+    };
+    fit_seen(run, survey, &setting, &|problem, at| {
+        at.border[THETA] = survey.steady.theta;
+        at.border[SPEED] = survey.steady.speed;
+        put_bar(problem, at, survey.steady.bar);
+    })
+}
+
+/// Fits a turn that strays, from three starts: the bar inclined to either side across its eccentricity,
+/// each with the turn that the waves then tell, and the steady turn. Returns the fits with γ across
+/// positive and negative, the better first; one where both come to the same.
+///
+/// # Errors
+/// [`TurningError`] of the last start where none has an answer.
+pub fn unsteady<'a>(
+    run: &'a Run,
+    survey: &'a Survey,
+    setting: &Setting,
+    steady: &TurningFit,
+) -> Result<Vec<TurningFit<'a>>, TurningError> {
+    let [e, along, across] = survey.bar;
+    let from_steady = |problem: &TurningProblem, at: &mut Parameters| {
+        let theta = steady.at.border[THETA];
+        let speed = steady.at.border[SPEED] / problem.frame.half_time;
+        put_turn(problem, at, &|basis| {
+            basis.line(theta - speed * problem.frame.middle, speed)
+        });
+        let bar = [ECCENTRICITY, ALONG_E, ACROSS_E].map(|j| steady.at.border[j]);
+        put_bar(problem, at, bar);
+    };
+    let of_side = |across: f64| {
+        move |problem: &TurningProblem, at: &mut Parameters| {
+            let bar = [e, along, across];
+            put_turn(problem, at, &|basis| survey.turn(basis, bar));
+            put_bar(problem, at, bar);
+        }
+    };
+    let starts: [&Begin; 3] = [&of_side(across), &of_side(-across), &from_steady];
+    let mut found: Vec<TurningFit<'a>> = Vec::new();
+    let mut failed = TurningError::NoWave;
+    for start in starts {
+        match fit_seen(run, survey, setting, start) {
+            Ok(fit) => {
+                let twin = found
+                    .iter()
+                    .position(|f| (f.across() < 0.0) == (fit.across() < 0.0));
+                match twin {
+                    Some(k) if fit.squares < found[k].squares => found[k] = fit,
+                    Some(_) => {}
+                    None => found.push(fit),
+                }
+            }
+            Err(why) => failed = why,
+        }
+    }
+    if found.is_empty() {
+        return Err(failed);
+    }
+    found.sort_by(|a, b| a.squares.total_cmp(&b.squares));
+    // Of a bar that is not seen to incline across there is one answer.
+    if found.iter().any(|f| f.across_held) {
+        found.truncate(1);
+    }
+    Ok(found)
+}
+
+/// Fits a bar of any axis that turns as the steady fit found.
+///
+/// # Errors
+/// [`TurningError`]: a fit that has no answer.
+pub fn bent<'a>(
+    run: &'a Run,
+    survey: &'a Survey,
+    setting: &Setting,
+    steady: &TurningFit,
+) -> Result<TurningFit<'a>, TurningError> {
+    fit(run, survey, setting, Held::default(), &|_, at| {
+        at.border[THETA] = steady.at.border[THETA];
+        at.border[SPEED] = steady.at.border[SPEED];
+    })
+}
+
+/// A fit in which γ across the eccentricity is held where it is not seen.
+fn fit_seen<'a>(
+    run: &'a Run,
+    survey: &'a Survey,
+    setting: &Setting,
+    start: &Begin,
+) -> Result<TurningFit<'a>, TurningError> {
+    let free = fit(run, survey, setting, Held::default(), start);
+    if run.angle.is_some() || !setting.growing {
+        return free;
+    }
+    let seen = free.as_ref().is_ok_and(|fit| {
+        let j = fit.problem.band_count() + ACROSS_E;
+        let variance = fit.inverse[(j, j)] * fit.squares / fit.freedom();
+        fit.across().powi(2) > ACROSS_SEEN.powi(2) * variance
+    });
+    if seen {
+        return free;
+    }
+    let hold = Held {
+        across: true,
+        ..Held::default()
+    };
+    fit(run, survey, setting, hold, &|problem, at| {
+        start(problem, at);
+        at.border[ACROSS_E] = 0.0;
+    })
+}
+
+/// Fits from a start.
+pub(super) fn fit<'a>(
+    run: &'a Run,
+    survey: &'a Survey,
+    setting: &Setting,
+    hold: Held,
+    start: &Begin,
+) -> Result<TurningFit<'a>, TurningError> {
+    setting.check()?;
+    let problem = TurningProblem::new(run, setting, &survey.frame, hold)?;
+    let mut at = Parameters::zeros(problem.band_count(), problem.border_count());
+    start(&problem, &mut at);
+    let options = Minimisation {
+        max_iterations: MOST_STEPS,
+        ..Minimisation::structured()
+    };
+    let result = fit_structured(&problem, at, &options)?;
+    let covariance = result
+        .covariance()
+        .ok_or_else(|| TurningError::NotConverged {
+            ending: result.ending.to_string(),
+        })?;
+    let (n, q) = (problem.band_count(), problem.border_count());
+    let mut inverse = DMatrix::zeros(n + q, n + q);
+    for j in 0..n + q {
+        let (band, border) = match j.checked_sub(n) {
+            None => covariance.times(&[(j, 1.0)], &[]),
+            Some(k) if problem.held()[k] => continue,
+            Some(k) => covariance.times(&[], &[(k, 1.0)]),
+        };
+        for (i, value) in band.into_iter().chain(border).enumerate() {
+            inverse[(i, j)] = value;
+        }
+    }
+    let at = result.parameters.clone();
+    let residuals = problem.residuals(&at);
+    Ok(TurningFit {
+        psi: problem.seen(&at),
+        squares: residuals.iter().map(|r| r * r).sum(),
+        unknowns: problem.free_count(),
+        iterations: result.iterations,
+        across_held: hold.across,
+        residuals,
+        inverse,
+        at,
+        problem,
+    })
+}
+
+fn put_bar(problem: &TurningProblem, at: &mut Parameters, bar: [f64; 3]) {
+    let places = [ECCENTRICITY, ALONG_E, ACROSS_E];
+    for (place, value) in places.into_iter().zip(bar) {
+        if !problem.held()[place] {
+            at.border[place] = value;
+        }
+    }
+}
+
+fn put_turn(
+    problem: &TurningProblem,
+    at: &mut Parameters,
+    coefficients: &dyn Fn(&crate::basis::bspline::CubicBSpline) -> Vec<f64>,
+) {
+    if let (Some(basis), Some(unknowns)) = (&problem.wave, problem.wave_unknowns.first()) {
+        for (j, value) in unknowns.iter().zip(coefficients(basis)) {
+            at.band[*j] = value;
+        }
+    }
+}

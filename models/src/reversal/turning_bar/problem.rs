@@ -1,0 +1,557 @@
+//! A run as a structured least-squares problem: splines in a band, the bar in the border.
+//!
+//! ```text
+//!     reading = F(x) + (e + γ₁ξ) cos ψ + γ₂ξ sin ψ + Σ_k [(a_k + a'_k ξ) cos kψ + (b_k + b'_k ξ) sin kψ]
+//!     ψ = φ − θ,   θ = θ_b(t) + θ₀ + ω'τ   or   θ_b(t) + u(t)
+//! ```
+//!
+//! F and u are cubic splines, θ_b the recorded or a steady turn, τ runs from −1 to 1 over the time and
+//! ξ = (x − x_r)/(half the travel). F holds the constant and the slope of the bar, u holds θ₀ and ω':
+//! both are taken out of the splines afterwards, as their least-squares lines.
+//!
+//! Coefficients of both splines stand in the order in which the run comes to them, so that a row sees
+//! neighbours only, whatever the number of cells of either.
+
+use std::ops::Range;
+
+use errsep_solvers::linear::banded::Tall;
+use errsep_solvers::linear::bordered::{Constraints, Share};
+use errsep_solvers::problem::NoValue;
+use errsep_solvers::structured::{Parameters, Sink, StructuredProblem};
+
+use super::error::TurningError;
+use super::run::Run;
+use super::setting::{Along, Setting, Wave};
+use crate::basis::bspline::{CubicBSpline, horner};
+
+/// Places of the unknowns in the border; those of the harmonics follow.
+pub const THETA: usize = 0;
+/// See [`THETA`].
+pub const SPEED: usize = 1;
+/// See [`THETA`].
+pub const ECCENTRICITY: usize = 2;
+/// See [`THETA`].
+pub const ALONG_E: usize = 3;
+/// See [`THETA`].
+pub const ACROSS_E: usize = 4;
+/// See [`THETA`].
+pub const HARMONICS: usize = 5;
+
+/// What is held beside what the setting holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Held {
+    /// γ across e is zero.
+    pub across: bool,
+    /// The speed is that of the base.
+    pub speed: bool,
+}
+
+/// Where the axes of a run have their zeros, and the angle from which the turn is counted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// x_r, mm: where e lies along side 0.
+    pub reference_mm: f64,
+    /// Half the travel, mm.
+    pub half_mm: f64,
+    /// Middle of the times.
+    pub middle: f64,
+    /// Half their range.
+    pub half_time: f64,
+    /// θ_b of every reading, rad.
+    pub base: Vec<f64>,
+    /// Least and greatest position, mm: the ends of the form.
+    pub range: (f64, f64),
+    /// First and last time: the ends of the turn.
+    pub times: (f64, f64),
+}
+
+impl Frame {
+    /// The frame of a run whose base angle is known.
+    pub fn new(run: &Run, base: Vec<f64>, reference_mm: f64) -> Self {
+        let ((first, last), (low, high)) = (run.times(), run.range());
+        Self {
+            reference_mm,
+            half_mm: 0.5 * (high - low),
+            middle: f64::midpoint(first, last),
+            half_time: 0.5 * (last - first),
+            base,
+            range: (low, high),
+            times: (first, last),
+        }
+    }
+
+    /// The frame of the readings of which `keep` says so.
+    #[must_use]
+    pub fn part(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let kept = self.base.iter().enumerate().filter(|(i, _)| keep(*i));
+        Self {
+            base: kept.map(|(_, b)| *b).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// ξ of a position.
+    pub fn xi(&self, x: f64) -> f64 {
+        (x - self.reference_mm) / self.half_mm
+    }
+
+    /// τ of a time.
+    pub fn tau(&self, time: f64) -> f64 {
+        (time - self.middle) / self.half_time
+    }
+}
+
+/// Readings that see the same coefficients.
+#[derive(Debug, Clone)]
+struct Piece {
+    readings: Range<usize>,
+    form_cell: usize,
+    wave_cell: usize,
+    /// Unknowns of the band, growing, and which of the local columns each is.
+    band: Vec<(usize, usize)>,
+}
+
+/// Readings, unknowns and bases.
+#[derive(Debug, Clone)]
+pub struct TurningProblem<'a> {
+    pub(super) run: &'a Run,
+    pub(super) setting: Setting,
+    pub(super) frame: &'a Frame,
+    pub(super) form: CubicBSpline,
+    /// In time of an unsteady turn, along the bar of a bent one.
+    pub(super) wave: Option<CubicBSpline>,
+    /// The unknown of each coefficient of F.
+    pub(super) form_unknowns: Vec<usize>,
+    /// Those of u, or of the amplitudes of cos ψ and sin ψ.
+    pub(super) wave_unknowns: Vec<Vec<usize>>,
+    held: Vec<bool>,
+    /// Border unknowns that are free.
+    free: Vec<usize>,
+    pieces: Vec<Piece>,
+    width: usize,
+    constraints: Constraints,
+}
+
+impl<'a> TurningProblem<'a> {
+    /// The problem of a run.
+    ///
+    /// # Errors
+    /// Splines that these readings cannot carry.
+    pub fn new(
+        run: &'a Run,
+        setting: &Setting,
+        frame: &'a Frame,
+        hold: Held,
+    ) -> Result<Self, TurningError> {
+        let ((low, high), (first, last)) = (frame.range, frame.times);
+        let form = CubicBSpline::uniform(low, high, setting.form_cells.max(1))?;
+        let (wave, splines) = match setting.wave {
+            Wave::Steady => (None, 0),
+            Wave::Unsteady { cells } => {
+                (Some(CubicBSpline::uniform(first, last, cells.max(1))?), 1)
+            }
+            Wave::Bent { cells } => (Some(CubicBSpline::uniform(low, high, cells.max(1))?), 2),
+        };
+        let border = HARMONICS + setting.per_harmonic() * setting.harmonics.len();
+        let mut held = vec![false; border];
+        let bent = matches!(setting.wave, Wave::Bent { .. });
+        held[THETA] = !matches!(setting.wave, Wave::Steady);
+        held[SPEED] = held[THETA] || run.angle.is_some() || hold.speed;
+        held[ECCENTRICITY] = bent;
+        held[ALONG_E] = bent || !setting.growing;
+        held[ACROSS_E] = held[ALONG_E] || hold.across;
+        let free: Vec<usize> = (0..border).filter(|j| !held[*j]).collect();
+        let (form_unknowns, wave_unknowns) = in_order(run, setting, &form, wave.as_ref(), splines);
+        let mut problem = Self {
+            run,
+            setting: setting.clone(),
+            frame,
+            form,
+            wave,
+            form_unknowns,
+            wave_unknowns,
+            held,
+            free,
+            pieces: Vec::new(),
+            width: 0,
+            constraints: Constraints::none(border),
+        };
+        problem.cut();
+        let unknowns = problem.free_count();
+        if run.len() < unknowns + FEWEST_FREE {
+            return Err(TurningError::TooManyUnknowns {
+                readings: run.len(),
+                unknowns,
+            });
+        }
+        Ok(problem)
+    }
+
+    /// Unknowns that are not held.
+    pub fn free_count(&self) -> usize {
+        self.band_count() + self.free.len()
+    }
+
+    /// Cuts the readings where a row sees other coefficients than the row before.
+    fn cut(&mut self) {
+        let cells = |i: usize| {
+            let wave = self
+                .wave
+                .as_ref()
+                .map_or(0, |basis| basis.cell_of(self.wave_at(i)));
+            (self.form.cell_of(self.run.x[i]), wave)
+        };
+        let mut pieces: Vec<Piece> = Vec::new();
+        let mut from = 0;
+        for i in 1..=self.run.len() {
+            if i < self.run.len() && cells(i) == cells(from) {
+                continue;
+            }
+            let (form_cell, wave_cell) = cells(from);
+            let local = (0..4).map(|k| self.form_unknowns[form_cell + k]).chain(
+                self.wave_unknowns
+                    .iter()
+                    .flat_map(|of| (0..4).map(move |k| of[wave_cell + k])),
+            );
+            let mut band: Vec<(usize, usize)> =
+                local.enumerate().map(|(l, unknown)| (unknown, l)).collect();
+            band.sort_unstable();
+            pieces.push(Piece {
+                readings: from..i,
+                form_cell,
+                wave_cell,
+                band,
+            });
+            from = i;
+        }
+        let mut highest = 0;
+        for piece in &pieces {
+            let (Some(low), Some(high)) = (piece.band.first(), piece.band.last()) else {
+                continue;
+            };
+            highest = highest.max(high.0);
+            self.width = self.width.max(highest + 1 - low.0);
+        }
+        self.pieces = pieces;
+    }
+
+    /// What the spline of the wave is over, at a reading.
+    fn wave_at(&self, i: usize) -> f64 {
+        match self.setting.wave {
+            Wave::Bent { .. } => self.run.x[i],
+            _ => self.run.time[i],
+        }
+    }
+
+    /// The unknowns of another problem of the same unknowns, whose band may be in another order.
+    pub fn taken_over(&self, other: &Self, at: &Parameters) -> Parameters {
+        let mut own = Parameters::zeros(self.band_count(), self.border_count());
+        own.border.clone_from(&at.border);
+        let mut put = |to: &[usize], from: &[usize]| {
+            for (to, from) in to.iter().zip(from) {
+                own.band[*to] = at.band[*from];
+            }
+        };
+        put(&self.form_unknowns, &other.form_unknowns);
+        for (to, from) in self.wave_unknowns.iter().zip(&other.wave_unknowns) {
+            put(to, from);
+        }
+        own
+    }
+
+    /// Coefficients of a spline of the wave: of u in rad.
+    pub fn wave_of(&self, at: &Parameters, which: usize) -> Vec<f64> {
+        let of = self.wave_unknowns.get(which);
+        of.map_or_else(Vec::new, |of| of.iter().map(|j| at.band[*j]).collect())
+    }
+
+    /// ψ of every reading, rad.
+    pub fn seen(&self, at: &Parameters) -> Vec<f64> {
+        let turn = self.wave_of(at, 0);
+        (0..self.run.len())
+            .map(|i| {
+                let stray = match (&self.wave, self.setting.wave) {
+                    (Some(basis), Wave::Unsteady { .. }) => {
+                        basis.evaluate(&turn, self.run.time[i]).0
+                    }
+                    _ => at.border[THETA] + at.border[SPEED] * self.frame.tau(self.run.time[i]),
+                };
+                self.setting.indicator_rad - self.frame.base[i] - stray
+            })
+            .collect()
+    }
+
+    /// Reading less model, µm, of every reading.
+    pub fn residuals(&self, at: &Parameters) -> Vec<f64> {
+        let mut row = vec![0.0; self.columns()];
+        let mut residuals = Vec::with_capacity(self.run.len());
+        for piece in &self.pieces {
+            for i in piece.readings.clone() {
+                self.local(i, piece, at, &mut row);
+                residuals.push(-row[row.len() - 1]);
+            }
+        }
+        residuals
+    }
+
+    /// Hands out the derivatives of the model at every reading by the unknowns that it sees: the band's
+    /// numbers first, those of the border after all of the band's.
+    pub fn rows(&self, at: &Parameters, mut take: impl FnMut(usize, &[(usize, f64)])) {
+        let mut row = vec![0.0; self.columns()];
+        let mut sparse = Vec::new();
+        let (band, n) = (4 * (1 + self.wave_unknowns.len()), self.band_count());
+        for piece in &self.pieces {
+            for i in piece.readings.clone() {
+                self.local(i, piece, at, &mut row);
+                sparse.clear();
+                sparse.extend(piece.band.iter().map(|(j, l)| (*j, row[*l])));
+                let border = self.free.iter().enumerate();
+                sparse.extend(border.map(|(l, j)| (n + j, row[band + l])));
+                take(i, &sparse);
+            }
+        }
+    }
+
+    /// Local columns: band, free border, residual.
+    fn columns(&self) -> usize {
+        4 * (1 + self.wave_unknowns.len()) + self.free.len() + 1
+    }
+
+    /// The local columns of a reading: model less reading last.
+    fn local(&self, i: usize, piece: &Piece, at: &Parameters, row: &mut [f64]) {
+        let (x, time) = (self.run.x[i], self.run.time[i]);
+        let (xi, tau) = (self.frame.xi(x), self.frame.tau(time));
+        let mut model = 0.0;
+        for (k, value) in values_in(&self.form, piece.form_cell, x)
+            .into_iter()
+            .enumerate()
+        {
+            row[k] = value;
+            model += value * at.band[self.form_unknowns[piece.form_cell + k]];
+        }
+        let second = self
+            .wave
+            .as_ref()
+            .map(|basis| values_in(basis, piece.wave_cell, self.wave_at(i)));
+        let mut stray = at.border[THETA] + at.border[SPEED] * tau;
+        if let (Some(values), Wave::Unsteady { .. }) = (second, self.setting.wave) {
+            let own = &self.wave_unknowns[0][piece.wave_cell..];
+            stray = values.iter().zip(own).map(|(v, j)| v * at.band[*j]).sum();
+        }
+        let psi = self.setting.indicator_rad - self.frame.base[i] - stray;
+        let (sin, cos) = psi.sin_cos();
+        let along = at.border[ECCENTRICITY] + at.border[ALONG_E] * xi;
+        let across = at.border[ACROSS_E] * xi;
+        model += along * cos + across * sin;
+        // By ψ; the angle of the spindle counts against it.
+        let mut by_psi = across * cos - along * sin;
+        let border = 4 * (1 + self.wave_unknowns.len());
+        let mut free = self.free.iter().enumerate();
+        // Those before the harmonics are filled when the derivative by ψ is whole.
+        for _ in 0..self.free.iter().filter(|j| **j < HARMONICS).count() {
+            free.next();
+        }
+        let per = self.setting.per_harmonic();
+        for (h, k) in self.setting.harmonics.iter().enumerate() {
+            let k = *k as f64;
+            let (s, c) = (k * psi).sin_cos();
+            let harmonic = match self.setting.along {
+                Along::Constant => [c, s, 0.0, 0.0],
+                Along::Linear => [c, s, xi * c, xi * s],
+            };
+            let turned = [-k * s, k * c, -k * xi * s, k * xi * c];
+            for l in 0..per {
+                let value = at.border[HARMONICS + per * h + l];
+                model += value * harmonic[l];
+                by_psi += value * turned[l];
+                if let Some((column, _)) = free.next() {
+                    row[border + column] = harmonic[l];
+                }
+            }
+        }
+        match (second, self.setting.wave) {
+            (Some(values), Wave::Unsteady { .. }) => {
+                for k in 0..4 {
+                    row[4 + k] = -by_psi * values[k];
+                }
+            }
+            (Some(values), Wave::Bent { .. }) => {
+                for (s, factor) in [cos, sin].into_iter().enumerate() {
+                    for k in 0..4 {
+                        let unknown = self.wave_unknowns[s][piece.wave_cell + k];
+                        row[4 + 4 * s + k] = factor * values[k];
+                        model += factor * values[k] * at.band[unknown];
+                    }
+                }
+            }
+            _ => {}
+        }
+        for (column, j) in self
+            .free
+            .iter()
+            .enumerate()
+            .take_while(|(_, j)| **j < HARMONICS)
+        {
+            row[border + column] = match *j {
+                THETA => -by_psi,
+                SPEED => -by_psi * tau,
+                ECCENTRICITY => cos,
+                ALONG_E => xi * cos,
+                _ => xi * sin,
+            };
+        }
+        let last = row.len() - 1;
+        row[last] = model - self.run.value[i];
+    }
+}
+
+/// Fewest readings beyond the unknowns.
+const FEWEST_FREE: usize = 20;
+
+/// The four values of a basis in a cell.
+fn values_in(basis: &CubicBSpline, cell: usize, at: f64) -> [f64; 4] {
+    let (left, width) = basis.cell(cell);
+    let t = (at - left) / width;
+    basis.polynomials(cell).map(|p| horner(&p, t))
+}
+
+/// Numbers the coefficients in the order in which the run comes to them.
+fn in_order(
+    run: &Run,
+    setting: &Setting,
+    form: &CubicBSpline,
+    wave: Option<&CubicBSpline>,
+    splines: usize,
+) -> (Vec<usize>, Vec<Vec<usize>>) {
+    // The values of the line t → t at the coefficients are their places.
+    let reached = |place: f64, over_x: bool| {
+        if over_x {
+            let towards = run.direction * place;
+            run.x.partition_point(|x| run.direction * x < towards)
+        } else {
+            run.time.partition_point(|t| *t < place)
+        }
+    };
+    let over_x = matches!(setting.wave, Wave::Bent { .. });
+    let mut all: Vec<(usize, usize, usize)> = Vec::new();
+    for (k, place) in form.line(0.0, 1.0).into_iter().enumerate() {
+        all.push((reached(place, true), 0, k));
+    }
+    for which in 0..splines {
+        let places = wave.map(|basis| basis.line(0.0, 1.0)).unwrap_or_default();
+        for (k, place) in places.into_iter().enumerate() {
+            all.push((reached(place, over_x), 1 + which, k));
+        }
+    }
+    // Of coefficients at one reading those of a spline stay in the order of the run.
+    all.sort_by_key(|(at, spline, k)| {
+        let falls = run.direction < 0.0 && (*spline == 0 || over_x);
+        (*at, if falls { usize::MAX - *k } else { *k }, *spline)
+    });
+    let mut form_unknowns = vec![0; form.coefficient_count()];
+    let mut wave_unknowns = vec![vec![0; wave.map_or(0, CubicBSpline::coefficient_count)]; splines];
+    for (unknown, (_, spline, k)) in all.into_iter().enumerate() {
+        match spline {
+            0 => form_unknowns[k] = unknown,
+            s => wave_unknowns[s - 1][k] = unknown,
+        }
+    }
+    (form_unknowns, wave_unknowns)
+}
+
+impl StructuredProblem for TurningProblem<'_> {
+    type Prepared = Parameters;
+
+    fn band_count(&self) -> usize {
+        self.form_unknowns.len() + self.wave_unknowns.iter().map(Vec::len).sum::<usize>()
+    }
+
+    fn border_count(&self) -> usize {
+        self.held.len()
+    }
+
+    fn constraints(&self) -> &Constraints {
+        &self.constraints
+    }
+
+    fn held(&self) -> &[bool] {
+        &self.held
+    }
+
+    fn prepare(&self, at: &Parameters) -> Result<Parameters, NoValue> {
+        if at.band.iter().chain(&at.border).all(|v| v.is_finite()) {
+            Ok(at.clone())
+        } else {
+            Err(NoValue::new("an unknown is not finite"))
+        }
+    }
+
+    fn band_width(&self, _: &Parameters) -> usize {
+        self.width
+    }
+
+    fn task_count(&self, _: &Parameters) -> usize {
+        self.pieces.len()
+    }
+
+    fn task(&self, at: &Parameters, index: usize, sink: &mut Sink) -> Result<(), NoValue> {
+        let piece = &self.pieces[index];
+        let columns = self.columns();
+        let band = piece.band.len();
+        let mut row = vec![0.0; columns];
+        sink.open(columns);
+        let mut first = piece.readings.start;
+        while first < piece.readings.end {
+            let last = piece.readings.end.min(first + Tall::CAPACITY);
+            let batch = sink.batch(last - first);
+            for i in first..last {
+                self.local(i, piece, at, &mut row);
+                for (column, (_, l)) in piece.band.iter().enumerate() {
+                    batch.column_mut(column)[i - first] = row[*l];
+                }
+                for column in band..columns {
+                    batch.column_mut(column)[i - first] = row[column];
+                }
+            }
+            sink.push();
+            first = last;
+        }
+        let shares = self.free.iter().enumerate().map(|(l, j)| Share {
+            column: (band + l) as u32,
+            unknown: *j as u32,
+            weight: 1.0,
+        });
+        sink.close(
+            piece.band.iter().map(|(j, _)| Some(*j)).collect(),
+            shares.collect(),
+            0,
+        );
+        Ok(())
+    }
+
+    fn border_name(&self, index: usize) -> String {
+        match index {
+            THETA => "angle of the spindle".to_owned(),
+            SPEED => "speed of the spindle".to_owned(),
+            ECCENTRICITY => "eccentricity".to_owned(),
+            ALONG_E => "gamma along the eccentricity".to_owned(),
+            ACROSS_E => "gamma across the eccentricity".to_owned(),
+            other => {
+                let per = self.setting.per_harmonic();
+                let h = (other - HARMONICS) / per;
+                format!(
+                    "harmonic {} of the section",
+                    self.setting.harmonics.get(h).copied().unwrap_or(0)
+                )
+            }
+        }
+    }
+
+    fn band_name(&self, index: usize) -> String {
+        if self.form_unknowns.contains(&index) {
+            "the form along the slide".to_owned()
+        } else {
+            "the turn of the spindle".to_owned()
+        }
+    }
+}

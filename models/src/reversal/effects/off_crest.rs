@@ -4,9 +4,10 @@
 //! y = y₀ + x (α·t(φ) + γ·t(ψ)), t(a) = (−sin a, cos a): y₀ of the indicator, α of the slide and γ of the
 //! bar, which turns with the spindle; it loses y²/2R. The square of γ·t(ψ) is form of a side, and that of
 //! α·t(φ) the same in all positions; what is left is the square of the position with α·t(φ) γ·t(ψ), of the
-//! four channels with the sign of the spindle position. Where y₀ is not zero a line comes with it that
-//! differs by channel. Free: the loss by the square for each product of α and γ that channels see; of the
-//! four channels the line too, as far as it is a cone.
+//! four channels with the sign of the spindle position. Where the stylus stands beside the crest at mid
+//! travel too a line comes with it: of the four channels a cone counts, of designs α·t(φ) γ·t(ψ) again, as
+//! stylus, slide and bar meet the crest elsewhere than at mid travel. Free: the loss by the square for each
+//! product of α and γ that channels see, and by the line.
 
 use super::{FirstOrder, part_of_travel};
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Place, Shape};
@@ -16,8 +17,7 @@ use crate::reversal::diagnosable::{Arrangement, Seat};
 pub(super) struct OffCrest {
     /// Components of t(φ) and t(ψ) whose product some channel sees.
     products: Vec<[usize; 2]>,
-    /// Whether a cone is gap.
-    lines: bool,
+    four: bool,
 }
 
 /// Variant of indicators that stand beside the crest at mid travel too.
@@ -30,7 +30,7 @@ impl OffCrest {
         let sees = |own: &[usize; 2]| channels.seats().iter().any(|s| across(s, *own) != 0.0);
         Self {
             products: all.into_iter().filter(sees).collect(),
-            lines: channels.is_four(),
+            four: channels.is_four(),
         }
     }
 }
@@ -69,29 +69,33 @@ impl Effect<FirstOrder> for OffCrest {
         let loss = |own: &[usize; 2]| Parameter::symmetric(name(own), "um", 500.0);
         let mut all: Vec<Parameter> = self.products.iter().map(loss).collect();
         if shape.variant == BESIDE {
-            all.push(Parameter::symmetric("loss-along-line", "um", 500.0));
+            let lines = if self.four { 1 } else { self.products.len() };
+            let line = Parameter::symmetric("loss-along-line", "um", 500.0);
+            all.extend(std::iter::repeat_n(line, lines));
         }
         all
     }
 
     fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
-        match self.lines {
-            true => vec![Shape::variant(BESIDE - shape.variant.min(BESIDE))],
-            false => Vec::new(),
-        }
+        vec![Shape::variant(BESIDE - shape.variant.min(BESIDE))]
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
-        let square = |own: &[usize; 2]| {
+        let of = |own: &[usize; 2], power: i32| {
             Column::from_places(model.places(), |_, place| {
-                -across(model.seat(place), *own) * part_of_travel(model, place.x).powi(2)
+                -across(model.seat(place), *own) * part_of_travel(model, place.x).powi(power)
             })
         };
-        let mut columns: Vec<Column> = self.products.iter().map(square).collect();
-        if shape.variant == BESIDE {
+        let mut columns: Vec<Column> = self.products.iter().map(|own| of(own, 2)).collect();
+        if shape.variant != BESIDE {
+            return columns;
+        }
+        if self.four {
             // Of the lines of the four channels only the sum, a cone, is not taken up by forms and tilts.
             let line = |_: usize, place: &Place| part_of_travel(model, place.x);
             columns.push(Column::from_places(model.places(), line));
+        } else {
+            columns.extend(self.products.iter().map(|own| of(own, 1)));
         }
         columns
     }

@@ -135,6 +135,9 @@ pub struct Joined {
     /// With them.
     #[serde(skip)]
     pub after: Vec<f64>,
+    /// What the effects change in every reading.
+    #[serde(skip)]
+    pub change: Vec<f64>,
 }
 
 /// Fits effects of a catalogue along with a model.
@@ -333,6 +336,7 @@ fn told<M: FittedModel>(
         notes,
         before: meter.residuals(readings),
         after: meter.residuals(&clean),
+        change: change.as_slice().to_vec(),
     })
 }
 

@@ -334,24 +334,286 @@ fn bad_input_is_told() {
     }
 }
 
+/// Eight channels of a simulation with a jump of the bottom indicator by 0.6 µm in its third trace.
+fn with_a_jump() -> Folder {
+    let folder = simulated(
+        EIGHT,
+        &["--repeats", "2", "--positions", "40", "--noise", "0.05"],
+    );
+    let text = std::fs::read_to_string(folder.path().join("made/readings.csv")).unwrap();
+    let mut lines = text.lines();
+    let mut jumped = format!("{}\n", lines.next().unwrap());
+    for line in lines {
+        let fields: Vec<&str> = line.split(',').collect();
+        let (x, reading): (f64, f64) = (fields[4].parse().unwrap(), fields[5].parse().unwrap());
+        let after = fields[..3] == ["270", "180", "2"] && x > 100.0;
+        let reading = if after { reading + 0.6 } else { reading };
+        jumped += &format!("{},{reading}\n", fields[..5].join(","));
+    }
+    std::fs::write(folder.path().join("jump.csv"), jumped).unwrap();
+    folder
+}
+
+#[test]
+fn a_design_is_diagnosed_alone_and_beside_its_answer() {
+    let folder = with_a_jump();
+    let output = run(&folder, &["diagnose", "jump.csv", "--format", "json"]);
+    assert_eq!(output.status, 0, "{}", output.stderr);
+    let alone: Value = serde_json::from_str(&output.stdout).unwrap();
+    assert_eq!(alone["verdict"]["effects"][0], "zero-jump");
+    assert_eq!(alone["candidates"][0]["variant"], "channel 270/180");
+    assert_eq!(
+        alone["fit_with"],
+        "errsep reversal jump.csv --simultaneous --with zero-jump"
+    );
+    let beside = solved(&folder, &["jump.csv", "--simultaneous", "--diagnose"]);
+    assert_eq!(beside["schema"], "errsep.reversal/2");
+    assert_eq!(beside["diagnosis"]["verdict"], alone["verdict"]);
+    let page = run(&folder, &["diagnose", "jump.csv", "--out", "told"]);
+    assert_eq!(page.status, 0, "{}", page.stderr);
+    let page = std::fs::read_to_string(folder.path().join("told/report.html")).unwrap();
+    assert!(page.contains("270/180 before") && page.contains("zero-jump"));
+}
+
+#[test]
+fn an_effect_joins_the_fit_of_a_design_and_leaves_its_readings() {
+    let folder = with_a_jump();
+    let arguments = [
+        "jump.csv",
+        "--simultaneous",
+        "--with",
+        "zero-jump",
+        "--corrected",
+        "clean.csv",
+    ];
+    let answer = solved(&folder, &arguments);
+    let effect = &answer["effects"][0];
+    assert_eq!(effect["effect"], "zero-jump");
+    let jump = &effect["parameters"][0];
+    let (value, std) = (
+        jump["value"].as_f64().unwrap(),
+        jump["std"].as_f64().unwrap(),
+    );
+    // k·u: one seed, five standard uncertainties.
+    assert!((value - 0.6).abs() < 5.0 * std && std < 0.1, "{jump}");
+    // The file without it: of each reading what the fit says, nothing elsewhere.
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    let (before, after) = (read("jump.csv"), read("clean.csv"));
+    assert!(after.starts_with("# readings of jump.csv less what zero-jump changes"));
+    let mut changed = 0;
+    for (old, new) in before.lines().skip(1).zip(after.lines().skip(2)) {
+        let reading = |line: &str| line.rsplit(',').next().unwrap().parse::<f64>().unwrap();
+        let change = reading(old) - reading(new);
+        let fields: Vec<&str> = old.split(',').collect();
+        let x: f64 = fields[4].parse().unwrap();
+        if fields[..3] == ["270", "180", "2"] && x > 110.0 {
+            changed += 1;
+            // ε·κ: sums of numbers of a hundred, 1e-9.
+            assert!((change - value).abs() < 1e-9, "{old}: {change}");
+        } else if fields[..3] != ["270", "180", "2"] {
+            assert!(change == 0.0, "{old}: {change}");
+        }
+    }
+    assert!(changed > 20, "{changed}");
+    let cleaned = run(&folder, &["diagnose", "clean.csv", "--format", "json"]);
+    let cleaned: Value = serde_json::from_str(&cleaned.stdout).unwrap();
+    assert_eq!(cleaned["verdict"]["kind"], "none", "{}", cleaned["verdict"]);
+}
+
 #[test]
 fn what_a_design_cannot_have_is_told() {
     let folder = simulated(EIGHT, &[]);
-    for option in ["--diagnose", "--with=taper"] {
-        let output = run(
-            &folder,
-            &["reversal", "made/readings.csv", "--simultaneous", option],
-        );
-        assert_eq!(output.status, 2, "{option}");
+    let fitted = "[artefact]\nthickness = 40.0\nfit_thickness = true\n";
+    std::fs::write(folder.path().join("fitted.toml"), fitted).unwrap();
+    std::fs::write(
+        folder.path().join("single.csv"),
+        "indicator,spindle,x,reading\n0,0,0,1\n0,0,10,2\n0,0,20,4\n0,0,30,3\n0,0,40,3\n\
+         0,90,0,1\n0,90,10,2\n0,90,20,3\n0,90,30,2\n0,90,40,1\n",
+    )
+    .unwrap();
+    let data = "made/readings.csv";
+    let cases: [(&[&str], i32, &str); 5] = [
+        (
+            &["reversal", data, "--setup", "fitted.toml"],
+            2,
+            "fit_thickness is for the channels",
+        ),
+        (
+            &["reversal", data, "--simultaneous", "--with=taper"],
+            1,
+            "absorbs `taper`",
+        ),
+        (
+            &["reversal", data, "--simultaneous", "--with=zero-jmp"],
+            2,
+            "did you mean `zero-jump`?",
+        ),
+        (
+            &["diagnose", data, "--without=tapir"],
+            2,
+            "there is no effect `tapir`",
+        ),
+        (
+            &["diagnose", "single.csv"],
+            2,
+            "leave nothing over from the fit",
+        ),
+    ];
+    for (arguments, status, told) in cases {
+        let output = run(&folder, arguments);
+        assert_eq!(output.status, status, "{arguments:?}: {}", output.stderr);
         assert!(
-            output.stderr.contains("is for the channels 1A, 1B, 2A, 2B"),
-            "{}",
+            output.stderr.contains(told),
+            "{arguments:?}: {}",
             output.stderr
         );
+        assert!(output.stdout.is_empty(), "{arguments:?}: {}", output.stdout);
     }
     for design in ["0/0,0/360", "0/x", "0/nan", ""] {
         let output = run(&folder, &["simulate", "reversal", "--design", design]);
         assert_eq!(output.status, 2, "{design}: {}", output.stdout);
         assert!(output.stderr.contains("--design"), "{}", output.stderr);
+    }
+}
+
+const PLAN: &str =
+    "noise = 0.02\ntravel = 300.0\npositions = 31\nrepeats = 2\nboth_directions = true\n";
+
+fn planned(plan: &str) -> Value {
+    let folder = Folder::with(&[("p.toml", plan)]);
+    let output = run(&folder, &["plan", "p.toml", "--format", "json"]);
+    assert_eq!(output.status, 0, "{}", output.stderr);
+    serde_json::from_str(&output.stdout).unwrap()
+}
+
+#[test]
+fn a_plan_compares_designs() {
+    let designs = format!(
+        "{PLAN}seconds_a_trace = 100.0\nseconds_a_turn = 10.0\nseconds_an_indicator = 1.0\nindicators = 2\n\
+         [[design]]\nname = \"four\"\nchannels = \"0/0,180/0,0/180,180/180\"\n\
+         [[design]]\nname = \"eight\"\nchannels = \"{EIGHT}\"\n\
+         [[design]]\nname = \"one\"\nchannels = \"0/0,0/90,0/180,0/270\"\n"
+    );
+    let answer = planned(&designs);
+    assert_eq!(answer["schema"], "errsep.plan/2");
+    let [four, eight, one] = &answer["designs"].as_array().unwrap()[..] else {
+        panic!("{answer}");
+    };
+    let std = |design: &Value, quantity: &str| {
+        let wanted = design["wanted"].as_array().unwrap();
+        let own = wanted.iter().find(|w| w["quantity"] == quantity).unwrap();
+        own["std"].as_f64()
+    };
+    // σ/(2 √Σ(x − x̄)²) over two repeats in both directions, µm/mm: the slope of four channels.
+    let spread: f64 = (0..31).map(|k| (10.0 * f64::from(k) - 150.0).powi(2)).sum();
+    let alpha = 1e-3 * 0.02 / (2.0 * spread.sqrt() * 2.0);
+    for (design, quantity) in [(four, "alpha_h"), (eight, "alpha_h"), (eight, "alpha_v")] {
+        let own = std(design, quantity).unwrap();
+        // The gauge of the forms weighs the two ends by half: 3 % of 31 positions.
+        assert!(
+            (own / alpha - 1.0).abs() < 0.03,
+            "{quantity}: {own} {alpha}"
+        );
+    }
+    for (design, quantity) in [
+        (four, "alpha_v"),
+        (one, "alpha_h"),
+        (one, "M_h"),
+        (one, "S"),
+    ] {
+        assert_eq!(std(design, quantity), None, "{quantity}");
+    }
+    assert_eq!(one["not_determined"][0]["combination"], "M_h against all S");
+    assert!(
+        one["not_determined"][0]["remedy"]
+            .as_str()
+            .unwrap()
+            .contains("180°")
+    );
+    // By hand: passes × 100 s, turns × 10 s, indicators × 1 s; the eight with two indicators at once
+    // go round twice.
+    for (design, seconds) in [(four, 812.0), (eight, 1634.0), (one, 1631.0)] {
+        assert_eq!(design["time"]["seconds"], seconds, "{}", design["name"]);
+    }
+    let seen = |design: &Value, effect: &str| {
+        let effects = design["effects"].as_array().unwrap();
+        let own = effects.iter().find(|e| e["effect"] == effect).unwrap();
+        own["detectable"].as_f64()
+    };
+    for design in [four, eight] {
+        assert!(seen(design, "zero-jump").unwrap() < 0.5);
+        assert_eq!(seen(design, "gravity-sag"), None);
+    }
+    // One design alone is told without a list of others.
+    let folder = Folder::with(&[(
+        "p.toml",
+        &format!("design = \"0/0,180/0,0/180,180/180\"\n{PLAN}"),
+    )]);
+    let output = run(&folder, &["plan", "p.toml"]);
+    assert_eq!(output.status, 0, "{}", output.stderr);
+    assert!(
+        output.stdout.contains("forms 3 of 3 (1 to spare)"),
+        "{}",
+        output.stdout
+    );
+    assert!(
+        !output.stdout.contains("told apart by another"),
+        "{}",
+        output.stdout
+    );
+    let named = "[channels]\nN = { indicator = 0, spindle = 0 }\nF = { indicator = 180, spindle = 0 }\n\
+                 M = { indicator = 0, spindle = 180 }\nG = { indicator = 180, spindle = 180 }\n";
+    let named = planned(&format!("{PLAN}{named}"));
+    let (own, other) = (
+        std(&named["designs"][0], "alpha_h").unwrap(),
+        std(four, "alpha_h").unwrap(),
+    );
+    // The same angles by other names; other waves are drawn for the channels' order: 1e-6.
+    assert!((own / other - 1.0).abs() < 1e-6, "{own} {other}");
+}
+
+#[test]
+fn what_cannot_be_planned_is_told() {
+    let four = "design = \"0/0,180/0,0/180,180/180\"";
+    let many = "[[design]]\nchannels = \"0/0,180/0,0/180,180/180\"\n".repeat(9);
+    let cases: [(String, &[&str]); 8] = [
+        (
+            format!("design = \"0/0,x\"\n{PLAN}"),
+            &["p.toml:1:", "`x` is no channel"],
+        ),
+        (format!("design = 4\n{PLAN}"), &["p.toml:1:", "[[design]]"]),
+        (
+            format!("{four}\nwanted = [\"alpha\"]\n{PLAN}"),
+            &["p.toml:2:", "alpha_h"],
+        ),
+        (
+            format!("{four}\nseconds_a_turn = -1.0\n{PLAN}"),
+            &["p.toml:2:", "is no time"],
+        ),
+        (
+            format!("{four}\nindicators = 0\n{PLAN}"),
+            &["p.toml:2:", "1 or more"],
+        ),
+        (
+            format!("{four}\nslope = 1\n{PLAN}"),
+            &["p.toml:2:", "slopes"],
+        ),
+        (format!("{PLAN}{many}"), &["9 designs cannot be compared"]),
+        (
+            "design = \"0/0,0/180\"\nnoise = 0.1\ntravel = 100.0\npositions = 9\n".to_owned(),
+            &["design 0/0,0/180", "leave nothing over", "both directions"],
+        ),
+    ];
+    for (plan, told) in cases {
+        let folder = Folder::with(&[("p.toml", &plan)]);
+        let output = run(&folder, &["plan", "p.toml"]);
+        assert_eq!(output.status, 2, "{plan}: {}", output.stdout);
+        for part in told {
+            assert!(
+                output.stderr.contains(part),
+                "{plan}, {part}: {}",
+                output.stderr
+            );
+        }
     }
 }

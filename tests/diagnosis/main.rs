@@ -3,6 +3,7 @@
 mod agreement;
 #[path = "../command/mod.rs"]
 mod command;
+mod designs;
 mod effect_signatures;
 mod invariance;
 mod models;

@@ -1,14 +1,16 @@
 //! An effect that a model leaves out: what it is, its shapes and sizes, and its signature.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::Column;
 
 /// A parameter of an effect with its unit and the range in which it is physically plausible.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
     /// Name in tables and JSON.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// Unit.
     pub unit: &'static str,
     /// Smallest plausible value.
@@ -21,7 +23,7 @@ impl Parameter {
     /// A parameter of either sign.
     pub const fn symmetric(name: &'static str, unit: &'static str, reach: f64) -> Self {
         Self {
-            name,
+            name: Cow::Borrowed(name),
             unit,
             low: -reach,
             high: reach,
@@ -31,7 +33,7 @@ impl Parameter {
     /// A parameter between two plausible values.
     pub const fn between(name: &'static str, unit: &'static str, low: f64, high: f64) -> Self {
         Self {
-            name,
+            name: Cow::Borrowed(name),
             unit,
             low,
             high,
@@ -252,7 +254,7 @@ pub(crate) fn each<'v>(
     let named = parameters.zip(values).enumerate();
     named
         .map(|(k, (parameter, &value))| Estimate {
-            name: parameter.name.to_owned(),
+            name: parameter.name.into_owned(),
             value,
             std: variance(k).clamp(0.0, f64::INFINITY).sqrt(),
             unit: parameter.unit.to_owned(),

@@ -27,7 +27,7 @@ impl<M: FittedModel> Case<M> {
     pub(super) fn answer(self, args: &Args) -> Result<Answer, Message> {
         within_reach_of(&self.model, self.along, &args.data)?;
         if !args.with.is_empty() {
-            return self.with_effects(args);
+            return Ok(self.with_effects(args)?.0);
         }
         let catalogue = catalogue(args, &self.model)?;
         let known: Vec<String> = catalogue.iter().map(|e| e.name().to_owned()).collect();

@@ -12,13 +12,14 @@ use super::{Args, page, recognise};
 use crate::cli::{Answer, CommonArgs, progress};
 use crate::diagnosis::{Joined, JoinedEffect, NotJoined, Options, for_people, joined};
 use crate::io::message::{list, nearest};
+use crate::io::reversal::ColumnMap;
 use crate::io::{CsvTable, Message, Status};
 use crate::report::diagnosis as sheet;
 use crate::report::number::probability;
 
 impl<M: FittedModel> Case<M> {
     /// The fit with the effects that are given.
-    pub(super) fn with_effects(self, args: &Args) -> Result<Answer, Message> {
+    pub(super) fn with_effects(self, args: &Args) -> Result<(Answer, Joined), Message> {
         let options = Options {
             seed: args.common.seed,
             ..Options::default()
@@ -45,7 +46,7 @@ impl<M: FittedModel> Case<M> {
                 &fit,
             )
         };
-        Ok(Answer {
+        let answer = Answer {
             text: format!(
                 "{}: {}, with {names} in the fit\n\n{}",
                 args.data.display(),
@@ -67,7 +68,8 @@ impl<M: FittedModel> Case<M> {
             setup: None,
             seed: Some(args.common.seed),
             status: Status::Done,
-        })
+        };
+        Ok((answer, fit))
     }
 }
 
@@ -83,6 +85,8 @@ pub(in crate::cli) struct Given<'a> {
     pub noise: Option<f64>,
     /// Length of the section, mm, where an option states it.
     pub length: Option<f64>,
+    /// Names and units of the columns of a reversal.
+    pub columns: Option<&'a ColumnMap>,
     pub common: &'a CommonArgs,
 }
 
@@ -101,6 +105,7 @@ impl<'a> Given<'a> {
             with,
             noise: None,
             length: None,
+            columns: None,
             common,
         }
     }
@@ -114,26 +119,39 @@ const HEADING: &str = "With the effects in the fit";
 ///
 /// # Errors
 /// The effects are not known, or the readings do not determine them beside the model.
-pub(in crate::cli) fn beside(mut answer: Answer, given: &Given<'_>) -> Result<Answer, Message> {
+pub(in crate::cli) fn beside(answer: Answer, given: &Given<'_>) -> Result<Answer, Message> {
     if given.with.is_empty() {
         return Ok(answer);
     }
-    let args = Args {
-        data: given.data.to_owned(),
-        setup: given.setup.map(Path::to_owned),
-        model: Some(given.model.to_owned()),
-        points: None,
-        columns: None,
-        without: Vec::new(),
-        with: given.with.to_vec(),
-        effects: None,
-        false_alarm: Options::default().false_alarm,
-        prove: None,
-        noise: given.noise,
-        length: given.length,
-        common: given.common.clone(),
-    };
+    let args = given.args();
     let joined = (recognise::model(&args)?.run)(&args)?;
+    Ok(followed_by(answer, joined))
+}
+
+impl Given<'_> {
+    /// The same as what `errsep diagnose --with` is given.
+    pub(super) fn args(&self) -> Args {
+        let given = self;
+        Args {
+            data: given.data.to_owned(),
+            setup: given.setup.map(Path::to_owned),
+            model: Some(given.model.to_owned()),
+            points: None,
+            columns: given.columns.cloned(),
+            without: Vec::new(),
+            with: given.with.to_vec(),
+            effects: None,
+            false_alarm: Options::default().false_alarm,
+            prove: None,
+            noise: given.noise,
+            length: given.length,
+            common: given.common.clone(),
+        }
+    }
+}
+
+/// An answer with that of a fit with effects behind it.
+pub(super) fn followed_by(mut answer: Answer, joined: Answer) -> Answer {
     let _ = write!(answer.text, "\n{HEADING}: {}", joined.text);
     if let (Value::Object(object), Value::Object(own)) = (&mut answer.json, joined.json) {
         let effects = own.get("effects").cloned().unwrap_or_default();
@@ -149,7 +167,7 @@ pub(in crate::cli) fn beside(mut answer: Answer, given: &Given<'_>) -> Result<An
             ..table
         }));
     answer.seed = joined.seed;
-    Ok(answer)
+    answer
 }
 
 fn refused(why: &NotJoined, file: &Path) -> Message {

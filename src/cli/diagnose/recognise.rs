@@ -26,9 +26,10 @@ pub(super) struct Model {
 pub(super) const MODELS: &[Model] = &[
     Model {
         name: "reversal",
-        tables: &["artefact", "indicator", "model", "columns"],
+        tables: &["artefact", "indicator", "model", "columns", "channels"],
         columns: &[
             &["channel", "x", "reading"],
+            &["indicator", "spindle", "x", "reading"],
             &["x", "1A"],
             &["x", "1B"],
             &["x", "2A"],

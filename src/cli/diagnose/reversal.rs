@@ -1,21 +1,35 @@
 //! A spindle and slideway reversal.
 
-use errsep_models::model::FittedModel;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use errsep_models::model::{FittedModel, Place};
+use errsep_models::reversal::Direction;
+use errsep_models::reversal::designs::DesignFit;
 use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder, NotDiagnosable};
 use errsep_models::reversal::effects::joins_the_fit;
 use serde_json::Value;
 
 use super::Args;
 use super::case::Case;
+use super::joined::{Given, followed_by};
+use super::within_reach_of;
 use crate::cli::Answer;
 use crate::io::Message;
-use crate::io::reversal::{ReversalSetup, read};
+use crate::io::reversal::{DesignData, Readings, ReversalSetup, read_any};
 use crate::report::number;
 
 pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     let mut setup = match &args.setup {
         Some(path) => ReversalSetup::read(path)?,
         None => ReversalSetup::default(),
+    };
+    if let Some(columns) = &args.columns {
+        setup.columns = columns.clone();
+    }
+    let data = match read_any(&args.data, &setup)? {
+        Readings::Four(data) => data,
+        Readings::Other(data) => return of_design(args, &setup, &data),
     };
     if !args.with.is_empty() {
         return Err(Message::bad_input(
@@ -27,10 +41,6 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
             args.with.join(",")
         )));
     }
-    if let Some(columns) = &args.columns {
-        setup.columns = columns.clone();
-    }
-    let data = read(&args.data, &setup.columns)?;
     let model = FirstOrder::new(&data.observations, assumptions(&setup))
         .map_err(|why| refusal(&why).in_file(&args.data))?;
     let notes = notes(&model);
@@ -43,14 +53,118 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     }
     .answer(args)?;
     if let Some(command) = with_command(args, &answer.json) {
-        answer.text += &format!(
-            "\nFor the answer with it, and its uncertainty, fit it along with tilts and forms: {command}\n"
-        );
-        if let Value::Object(object) = &mut answer.json {
-            object.insert("fit_with".to_owned(), command.into());
-        }
+        told_command(&mut answer, command);
     }
     Ok(answer)
+}
+
+fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<Answer, Message> {
+    let model = design_model(setup, data, None).map_err(|why| refusal(&why).in_file(&args.data))?;
+    let design = &data.observations.design;
+    let case = Case {
+        readings: format!(
+            "{}; {} channels of {} indicators in {} positions of the spindle",
+            data.dialect,
+            design.channels().len(),
+            design.indicators().len(),
+            design.positions().len()
+        ),
+        notes: notes(&model),
+        model,
+        along: ALONG,
+        inputs: Vec::new(),
+    };
+    let mut answer = case.answer(args)?;
+    let names = named(&answer.json);
+    if args.with.is_empty() && !names.is_empty() {
+        let mut command = format!("errsep reversal {}", args.data.display());
+        if let Some(setup) = &args.setup {
+            command += &format!(" --setup {}", setup.display());
+        }
+        command += &format!(" --simultaneous --with {}", names.join(","));
+        if args.columns.is_some() {
+            command += ", with the same --columns";
+        }
+        told_command(&mut answer, command);
+    }
+    Ok(answer)
+}
+
+/// The fitted model of a design, with the fit of its readings where there is one.
+///
+/// # Errors
+/// As [`FirstOrder::of_design`].
+pub fn design_model(
+    setup: &ReversalSetup,
+    data: &DesignData,
+    fit: Option<&DesignFit>,
+) -> Result<FirstOrder, NotDiagnosable> {
+    FirstOrder::of_design(&data.observations, setup.zero, fit, assumptions(setup))
+}
+
+/// A design's answer with the fit that effects have joined behind it, and what they change in each
+/// reading of the file, µm.
+///
+/// # Errors
+/// The effects are not known or the readings do not determine them; and why changes cannot be told
+/// reading by reading, where that is asked for.
+pub fn design_with(
+    answer: Answer,
+    given: &Given<'_>,
+    setup: &ReversalSetup,
+    data: &DesignData,
+    fit: &DesignFit,
+) -> Result<(Answer, Option<Vec<f64>>), Message> {
+    let model =
+        design_model(setup, data, Some(fit)).map_err(|why| refusal(&why).in_file(given.data))?;
+    within_reach_of(&model, ALONG, given.data)?;
+    let places = Arc::clone(&model.record().places);
+    let whole = model.gathered.is_none() && model.left_out == 0;
+    let case = Case {
+        readings: data.dialect.to_string(),
+        notes: notes(&model),
+        model,
+        along: ALONG,
+        inputs: Vec::new(),
+    };
+    let (joined, fitted) = case.with_effects(&given.args())?;
+    let changes = whole.then(|| by_reading(data, &places, &fitted.change));
+    Ok((followed_by(answer, joined), changes))
+}
+
+/// What is told at places, in the order of the file.
+fn by_reading(data: &DesignData, places: &[Place], told: &[f64]) -> Vec<f64> {
+    let key = |channel: usize, repeat: u32, backward: bool, x: f64| {
+        (channel, repeat, backward, (x * 1e4).round() as i64)
+    };
+    let of_place =
+        |(p, value): (&Place, &f64)| (key(p.channel, p.repeat, p.direction < 0.0, p.x), *value);
+    let known: HashMap<_, f64> = places.iter().zip(told).map(of_place).collect();
+    let readings = data.observations.readings.iter();
+    readings
+        .map(|r| {
+            let backward = r.direction == Direction::Backward;
+            let own = known.get(&key(r.channel, r.repeat, backward, r.x));
+            own.copied().unwrap_or(0.0)
+        })
+        .collect()
+}
+
+/// Adds the command that fits what was named along with the model.
+fn told_command(answer: &mut Answer, command: String) {
+    answer.text += &format!(
+        "\nFor the answer with it, and its uncertainty, fit it along with tilts and forms: {command}\n"
+    );
+    if let Value::Object(object) = &mut answer.json {
+        object.insert("fit_with".to_owned(), command.into());
+    }
+}
+
+/// The effects of a verdict.
+fn named(diagnosis: &Value) -> Vec<String> {
+    let names = diagnosis["verdict"]["effects"].as_array();
+    let words = names.into_iter().flatten().filter_map(Value::as_str);
+    words.map(str::to_owned).collect()
 }
 
 /// Name of the positions.
@@ -100,7 +214,9 @@ pub fn notes(model: &FirstOrder) -> Vec<String> {
         notes.push("No times are given: the readings are taken to follow each other evenly, first spindle position first, each repeat forward and then backward.".to_owned());
     }
     let channels = model.channel_names();
-    if channels.len() < 4 {
+    if !model.arrangement().is_four() {
+        notes.extend(notes_on_design(model));
+    } else if channels.len() < 4 {
         notes.push(format!(
             "Of the four channels only {} {} there, so nothing closes: only what differs between repeats and directions is diagnosed, and what comes back in all of them goes unnoticed.",
             channels.join(", "),
@@ -128,6 +244,21 @@ pub fn notes(model: &FirstOrder) -> Vec<String> {
     notes
 }
 
+/// What people should know of a design as it is diagnosed.
+fn notes_on_design(model: &FirstOrder) -> Vec<String> {
+    let determined = model.arrangement().determined();
+    let (forms, slopes) = (&determined.forms, &determined.slopes);
+    match (forms.to_spare(), slopes.to_spare()) {
+        (0, 0) => vec![
+            "Nothing closes in this design: only what differs between repeats and directions is diagnosed, and what comes back in all of them goes unnoticed.".to_owned(),
+        ],
+        (0, _) => vec![
+            "No forms close in this design: what comes back in all repeats shows in slopes alone.".to_owned(),
+        ],
+        _ => Vec::new(),
+    }
+}
+
 /// Why readings cannot be diagnosed, and what to do.
 pub fn refusal(why: &NotDiagnosable) -> Message {
     match why {
@@ -136,6 +267,6 @@ pub fn refusal(why: &NotDiagnosable) -> Message {
         NotDiagnosable::RangesDiffer => Message::bad_input(why.to_string())
             .remedy("read every channel over the same range of x, at five or more places"),
         NotDiagnosable::NothingLeft { .. } => Message::bad_input(why.to_string())
-            .remedy("add the missing channels, the other direction or repeats"),
+            .remedy("add the missing channels (in a design, such that something closes), the other direction or repeats"),
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use errsep_models::reversal::designs::DesignFit;
 use errsep_models::reversal::diagnosable::FirstOrder;
 use errsep_models::reversal::simultaneous::Simultaneous;
 use serde_json::Value;
@@ -10,7 +11,7 @@ use crate::cli::diagnose::{page, reversal, within_reach_of, words};
 use crate::cli::{Answer, CommonArgs};
 use crate::diagnosis::{Diagnosis, Options, diagnose};
 use crate::io::Message;
-use crate::io::reversal::{ReversalData, ReversalSetup};
+use crate::io::reversal::{DesignData, ReversalData, ReversalSetup};
 use crate::report::diagnosis as sheet;
 
 /// Heading of what the diagnosis adds.
@@ -34,6 +35,23 @@ impl Diagnosed {
     ) -> Result<Self, Message> {
         let model = FirstOrder::of_fit(&data.observations, fit, reversal::assumptions(setup))
             .map_err(|why| reversal::refusal(&why).in_file(file))?;
+        Self::made(file, model, seed)
+    }
+
+    /// The diagnosis of the fit of a design.
+    pub fn of_design(
+        file: &Path,
+        data: &DesignData,
+        setup: &ReversalSetup,
+        fit: &DesignFit,
+        seed: u64,
+    ) -> Result<Self, Message> {
+        let model = reversal::design_model(setup, data, Some(fit))
+            .map_err(|why| reversal::refusal(&why).in_file(file))?;
+        Self::made(file, model, seed)
+    }
+
+    fn made(file: &Path, model: FirstOrder, seed: u64) -> Result<Self, Message> {
         within_reach_of(&model, reversal::ALONG, file)?;
         let options = Options {
             seed,

@@ -112,7 +112,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let data = match read_any(&args.data, &setup)? {
         Readings::Four(data) => data,
         Readings::Other(data) => {
-            let answer = designs::answer(args, &setup, &data);
+            let answer = designs::answer(args, &setup, &data, corrected);
             progress.finish_and_clear();
             return answer;
         }

@@ -165,12 +165,7 @@ impl<M: FittedModel> Effect<M> for Tabulated {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "size",
-            unit: "1",
-            low: f64::MIN,
-            high: f64::MAX,
-        }]
+        vec![Parameter::between("size", "1", f64::MIN, f64::MAX)]
     }
 
     fn columns(&self, model: &M, _shape: &Shape) -> Vec<Column> {

@@ -37,6 +37,9 @@ pub struct Diagnosability {
     pub confused_with: Option<String>,
     /// Cosine of the angle between the two signatures.
     pub cosine: f64,
+    /// Every other effect that could imitate the smallest size seen, with that cosine.
+    #[serde(skip)]
+    pub rivals: Vec<(String, f64)>,
     /// Root mean square of the detectable effect in the readings.
     pub visible_rms: Option<f64>,
     /// Bias of each quantity per unit of amplitude, with its unit.
@@ -94,6 +97,7 @@ pub fn certificate<M: FittedModel>(
                 .map_or(String::new(), |p| p.unit.to_owned()),
             confused_with: None,
             cosine: 0.0,
+            rivals: Vec::new(),
             visible_rms: None,
             harm,
             harm_per_visible: Vec::new(),
@@ -119,6 +123,7 @@ pub fn certificate<M: FittedModel>(
                 else {
                     continue;
                 };
+                let mut nearest: f64 = 0.0;
                 for candidate in &dictionary.entries[rival.entries.clone()] {
                     let score = candidate.score(&adjoint);
                     let cosine = statistic(&candidate.gram, &score, false)
@@ -126,13 +131,19 @@ pub fn certificate<M: FittedModel>(
                         .sqrt();
                     // What it takes to imitate the smallest size that is seen must be plausible.
                     let needed = seen * cosine / candidate.gram[(0, 0)].sqrt();
-                    if cosine > row.cosine
-                        && needed <= greatest_plausible(other.as_ref())
-                        && matches!(candidate.meaning, Meaning::Effect(_))
+                    if needed > greatest_plausible(other.as_ref())
+                        || !matches!(candidate.meaning, Meaning::Effect(_))
                     {
+                        continue;
+                    }
+                    nearest = nearest.max(cosine);
+                    if cosine > row.cosine {
                         row.cosine = cosine;
                         row.confused_with = Some(other.name().to_owned());
                     }
+                }
+                if nearest > 0.0 {
+                    row.rivals.push((other.name().to_owned(), nearest));
                 }
             }
             let plausible = |size: &f64| *size <= greatest_plausible(effect.as_ref());

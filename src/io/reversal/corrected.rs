@@ -6,7 +6,8 @@ use std::path::Path;
 use super::columns::ColumnMap;
 use super::data::{Readings, channel_of, find_columns};
 use crate::io::dialect::{BYTE_ORDER_MARK, Decimal, Dialect, LineEnd};
-use crate::io::{Column, Message, TableReader};
+use crate::io::units::LengthUnit;
+use crate::io::{Column, Message, Row, TableReader};
 
 /// The table of `path` with `changes` (µm, one a reading in the order of the file) taken out of its
 /// readings, below a comment. Every other field stays as it is; comments and blank lines of the file are
@@ -21,8 +22,55 @@ pub fn corrected(
     changes: &[f64],
     comment: &str,
 ) -> Result<Vec<u8>, Message> {
-    let mut table = TableReader::open(path)?;
+    let table = TableReader::open(path)?;
     let columns = find_columns(&table, map)?;
+    let scales = columns.scales.reading_um;
+    rewritten(table, path, dialect, changes, comment, |row| {
+        Ok(match &columns.readings {
+            Readings::Tidy { channel, reading } => {
+                vec![(reading, scales[channel_of(row, channel)?.index()])]
+            }
+            Readings::Wide(wide) => {
+                let read = wide
+                    .iter()
+                    .filter(|(_, column)| !row.text(column).is_empty());
+                read.map(|(channel, column)| (column, scales[channel.index()]))
+                    .collect()
+            }
+        })
+    })
+}
+
+/// The same of a design: one reading a row.
+///
+/// # Errors
+/// As [`corrected`].
+pub fn corrected_design(
+    path: &Path,
+    map: &ColumnMap,
+    dialect: Dialect,
+    changes: &[f64],
+    comment: &str,
+) -> Result<Vec<u8>, Message> {
+    let table = TableReader::open(path)?;
+    let reading = table.column(map.column("reading").unwrap_or("reading"))?;
+    let unit = map.unit("reading").or(reading.length_unit());
+    let in_um = unit.unwrap_or(LengthUnit::Um).in_um();
+    let reading = reading.as_written();
+    rewritten(table, path, dialect, changes, comment, |_| {
+        Ok(vec![(&reading, in_um)])
+    })
+}
+
+/// A table with changes taken out of the fields that are told for each row, each with its unit in µm.
+fn rewritten<'c>(
+    mut table: TableReader,
+    path: &Path,
+    dialect: Dialect,
+    changes: &[f64],
+    comment: &str,
+    fields: impl Fn(Row<'_>) -> Result<Vec<(&'c Column, f64)>, Message>,
+) -> Result<Vec<u8>, Message> {
     let end = match dialect.line_end {
         LineEnd::Lf => "\n",
         LineEnd::CrLf => "\r\n",
@@ -31,24 +79,12 @@ pub fn corrected(
     let mut text = format!("# {comment}{end}{}{end}", table.header());
     let mut left = changes.iter();
     while let Some(row) = table.next_row()? {
-        let fields: Vec<(usize, &Column)> = match &columns.readings {
-            Readings::Tidy { channel, reading } => {
-                vec![(channel_of(row, channel)?.index(), reading)]
-            }
-            Readings::Wide(wide) => {
-                let read = wide
-                    .iter()
-                    .filter(|(_, column)| !row.text(column).is_empty());
-                read.map(|(channel, column)| (channel.index(), column))
-                    .collect()
-            }
-        };
+        let fields = fields(row)?;
         let mut values = Vec::with_capacity(fields.len());
-        for (channel, column) in fields {
+        for (column, unit) in fields {
             let Some(change) = left.next() else {
                 return Err(changed(path));
             };
-            let unit = columns.scales.reading_um[channel];
             values.push((column.index(), row.number(column)? - change / unit));
         }
         let delimiter = dialect.delimiter.byte();

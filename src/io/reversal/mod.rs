@@ -7,7 +7,7 @@ mod designs;
 mod setup;
 
 pub use columns::ColumnMap;
-pub use corrected::corrected;
+pub use corrected::{corrected, corrected_design};
 pub use data::{Layout, ReversalData, read};
 pub use designs::{DesignData, Readings, read_any};
-pub use setup::ReversalSetup;
+pub use setup::{Angles, ReversalSetup, channels};

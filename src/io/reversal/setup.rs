@@ -60,9 +60,9 @@ struct Indicator {
 }
 
 /// The angles of a channel, degrees.
-#[derive(Deserialize)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Angles {
+pub struct Angles {
     indicator: f64,
     spindle: f64,
 }
@@ -190,7 +190,7 @@ impl ReversalSetup {
 }
 
 /// The channels of a set-up, each with angles of its own.
-fn channels(
+pub fn channels(
     setup: &SetupFile,
     table: &BTreeMap<Spanned<String>, Spanned<Angles>>,
 ) -> Result<Vec<DesignChannel>, Message> {

@@ -26,6 +26,7 @@ pub mod staged;
 mod words;
 
 pub use analysis::Analysis;
+pub(in crate::reversal) use channel::direction;
 pub use channel::{Design, DesignChannel, DesignError, MOST_CHANNELS, SAME_ANGLE_DEG, angle_name};
 pub use closure::{DesignClosure, PositionSlope};
 pub use determined::{

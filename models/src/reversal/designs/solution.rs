@@ -2,6 +2,7 @@
 
 use errsep_solvers::linear::bordered::BorderedCovariance;
 use errsep_solvers::outcome::{Ending, Iteration};
+use errsep_solvers::problem::NoValue;
 use errsep_solvers::structured::{Parameters, StructuredFit};
 
 use super::analysis::Analysis;
@@ -14,9 +15,11 @@ use super::layout::{FormOf, Layout};
 use super::problem::DesignProblem;
 use super::readings::DesignObservations;
 use crate::basis::bspline::{Cubic, CubicBSpline, horner};
+use crate::reversal::forward::Attitude;
 use crate::reversal::simultaneous::Axis;
 use crate::reversal::simultaneous::fitted_knots::FittedKnots;
 use crate::reversal::staged::Value;
+use crate::units::{UM_PER_MM, mm_from_um};
 
 /// A fitted slope or constant: an unknown by itself, or with others that the design does not tell from
 /// it.
@@ -78,6 +81,8 @@ pub struct DesignFit {
     axis: Axis,
     parameters: Parameters,
     covariance: BorderedCovariance,
+    /// Half the thickness of the artefact, mm.
+    half_mm: f64,
     /// Variance of a weighted reading.
     variance: f64,
     /// ½ Σ r² of the weighted residuals.
@@ -148,6 +153,7 @@ impl DesignFit {
             axis: problem.axis,
             parameters: result.parameters.clone(),
             covariance,
+            half_mm: problem.half_mm,
             variance,
             cost: result.cost,
             noise_um,
@@ -252,6 +258,35 @@ impl DesignFit {
                 }
             })
             .collect()
+    }
+
+    /// What a channel, by its place in the design, would read at a slide position (mm), µm.
+    ///
+    /// # Errors
+    /// [`NoValue`] for a channel that is not in the design, or where the probe touches in two places.
+    pub fn predict(&self, channel: usize, x: f64) -> Result<f64, NoValue> {
+        let Some(side) = self.layout.side.get(channel).copied() else {
+            return Err(NoValue::new(format!("there is no channel {channel}")));
+        };
+        let border = &self.parameters.border;
+        let attitude = Attitude::new(self.layout.slope(channel, border), self.half_mm)?;
+        let touched = |u: f64| {
+            let basis = &self.bases[side];
+            let k = basis.cell_of(u);
+            let (left, width) = basis.cell(k);
+            let [a, b, c, d] = self.cubics[side][k];
+            let t = (u - left) / width;
+            let height = horner(&[a, b, c, d], t);
+            let slope = (b + t * (2.0 * c + 3.0 * t * d)) / width;
+            (mm_from_um(height), mm_from_um(slope))
+        };
+        let u = attitude.contact(x, touched)?;
+        let slide: f64 = self.layout.slides[channel]
+            .iter()
+            .map(|(form, factor)| factor * self.form_value(*form, x))
+            .sum();
+        let seen = UM_PER_MM * attitude.reading_mm(u, touched(u).0);
+        Ok(seen + slide + self.layout.constant(channel, border))
     }
 
     fn form_value(&self, form: usize, at: f64) -> f64 {

@@ -2,10 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{FirstOrder, Gauge, Smoothing, forms};
+use super::arrangement::Seat;
+use super::{FirstOrder, Gauge, Smoothing};
 use crate::model::{Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record};
-use crate::reversal::smooth_profile::SmoothProfile;
-use crate::reversal::{Channel, effects};
+use crate::reversal::designs::{Determined, SLOPES, Zero};
+use crate::reversal::effects;
 
 impl FittedModel for FirstOrder {
     fn name(&self) -> &'static str {
@@ -29,33 +30,29 @@ impl FittedModel for FirstOrder {
     }
 
     fn freedom(&self) -> Freedom {
-        let traces = self.record.traces.len();
         let n = self.positions.len();
         let mean_x = self.positions.iter().sum::<f64>() / n as f64;
-        let mut patterns = DMatrix::zeros(traces, 3);
-        for (t, channel) in self.trace_channels.iter().enumerate() {
-            patterns[(t, 0)] = channel.indicator_sign();
-            patterns[(t, 1)] = channel.side_sign();
-            patterns[(t, 2)] = 1.0;
-        }
-        let offsets = self.present.len();
-        let mut columns = DMatrix::zeros(
-            self.record.places.len(),
-            offsets + usize::from(!self.rigid()),
-        );
+        let (by_channel, withheld) = self.arrangement.patterns();
+        let patterns = DMatrix::from_fn(self.trace_channels.len(), by_channel.ncols(), |t, k| {
+            by_channel[(self.trace_channels[t], k)]
+        });
+        let constants = match self.arrangement.zero() {
+            Zero::Reset => DMatrix::identity(self.present().len(), self.present().len()),
+            Zero::Kept => self.arrangement.constants(),
+        };
+        let offsets = constants.ncols();
+        let beta = self.arrangement.has_beta();
+        let mut columns = DMatrix::zeros(self.record.places.len(), offsets + usize::from(beta));
         for (k, place) in self.record.places.iter().enumerate() {
-            columns[(k, place.channel)] = 1.0;
-            if !self.rigid() {
-                columns[(k, offsets)] = self.channel(place).spindle_sign() * (place.x - mean_x);
+            for j in 0..offsets {
+                columns[(k, j)] = constants[(place.channel, j)];
+            }
+            if beta {
+                columns[(k, offsets)] = self.seat(place).theta[0] * (place.x - mean_x);
             }
         }
-        // M's line is α and the line of S_A − S_B is γ, so those two functions may hold one; that
-        // of S_A + S_B is the cone, which only the rigid convention has.
-        let withheld = if self.rigid() {
-            Vec::new()
-        } else {
-            vec![(2, Gauge::of(&self.positions).slope)]
-        };
+        let line = Gauge::of(&self.positions).slope;
+        let withheld = withheld.into_iter().map(|k| (k, line.clone())).collect();
         Freedom {
             columns,
             profiles: Some(Profiles { patterns, withheld }),
@@ -71,7 +68,7 @@ impl FittedModel for FirstOrder {
                 .iter()
                 .zip(self.record.observed.iter())
                 .map(|(place, value)| {
-                    let slope = self.tilt(self.channel(place));
+                    let slope = self.tilt(place);
                     // A channel tilted by ψ climbs tan ψ per length, and its probe point lies h·ψ
                     // further along the artefact.
                     let climb = (slope - slope.atan()) * 1e3 * place.x;
@@ -81,24 +78,41 @@ impl FittedModel for FirstOrder {
     }
 
     fn channel_names(&self) -> Vec<String> {
-        self.present.iter().map(|c| c.name().to_owned()).collect()
+        self.present().iter().map(|s| s.name.clone()).collect()
     }
 
     fn patterns(&self) -> Vec<Pattern> {
-        let pattern = |name: &str, weight: fn(Channel) -> f64| Pattern {
+        let pattern = |name: &str, weight: fn(&Seat) -> f64| Pattern {
             name: name.to_owned(),
-            weights: self.present.iter().map(|c| weight(*c)).collect(),
+            weights: self.present().iter().map(weight).collect(),
         };
-        vec![
-            pattern("closure", Channel::spindle_sign),
-            pattern("M", Channel::indicator_sign),
-            pattern("S_A - S_B", Channel::side_sign),
-            pattern("S_A + S_B", |_| 1.0),
-        ]
+        if self.arrangement.is_four() {
+            return vec![
+                pattern("closure", |s| s.theta[0]),
+                pattern("M", |s| s.phi[0]),
+                pattern("S_A - S_B", |s| s.psi[0]),
+                pattern("S_A + S_B", |_| 1.0),
+            ];
+        }
+        let all = [
+            pattern("M_h", |s| s.phi[0]),
+            pattern("M_v", |s| s.phi[1]),
+            pattern("gamma_1", |s| s.psi[0]),
+            pattern("gamma_2", |s| s.psi[1]),
+            pattern("cone", |_| 1.0),
+        ];
+        let closures = self.arrangement.closures();
+        let seen = all
+            .into_iter()
+            .filter(|p| p.weights.iter().any(|w| *w != 0.0));
+        seen.chain(closures).collect()
     }
 
     fn quantities(&self) -> Vec<Quantity> {
-        if self.present.len() < 4 {
+        if !self.arrangement.is_four() {
+            return self.slopes_of_design();
+        }
+        if self.present().len() < 4 {
             return Vec::new();
         }
         let n = self.positions.len();
@@ -109,54 +123,39 @@ impl FittedModel for FirstOrder {
             .map(|x| (x - mean_x) / sxx)
             .collect();
         let gauge = Gauge::of(&self.positions);
-        let of_slope = |name: &str, sign: fn(Channel) -> f64, slope: &[f64]| Quantity {
-            name: name.to_owned(),
-            unit: "rad",
-            weights: DVector::from_iterator(
-                self.record.places.len(),
-                self.record.places.iter().map(|place| {
-                    let channel = self.channel(place);
-                    let traces = self
-                        .trace_channels
-                        .iter()
-                        .filter(|c| **c == channel)
-                        .count() as f64;
-                    // µm per mm is 10⁻³ rad.
-                    1e-3 * sign(channel) * slope[self.at(place)] / (4.0 * traces)
-                }),
-            ),
+        let of_slope = |name: &str, sign: fn(&Seat) -> f64, slope: &[f64]| {
+            self.slope_quantity(name, slope, |c| sign(&self.present()[c]) / 4.0)
         };
         let contrast =
-            |name: &str, sign: fn(Channel) -> f64| of_slope(name, sign, gauge.slope.as_slice());
-        if self.rigid() {
+            |name: &str, sign: fn(&Seat) -> f64| of_slope(name, sign, gauge.slope.as_slice());
+        if self.arrangement.has_beta() {
             vec![
-                contrast("alpha", Channel::indicator_sign),
-                contrast("setup", Channel::side_sign),
-                contrast("cone", |_| 1.0),
+                contrast("alpha", |s| s.phi[0]),
+                of_slope("beta", |s| s.theta[0], &closing),
+                contrast("gamma", |s| s.psi[0]),
             ]
         } else {
             vec![
-                contrast("alpha", Channel::indicator_sign),
-                of_slope("beta", Channel::spindle_sign, &closing),
-                contrast("gamma", Channel::side_sign),
+                contrast("alpha", |s| s.phi[0]),
+                contrast("setup", |s| s.psi[0]),
+                contrast("cone", |_| 1.0),
             ]
         }
     }
 
     fn profiles(&self) -> Vec<Profile> {
-        let per_channel = self.record.traces.len() as f64 / self.present.len() as f64;
-        let profile = |name: &str, form: &SmoothProfile, gain: f64| Profile {
-            name: name.to_owned(),
-            unit: "um",
-            positions: self.positions.clone(),
-            values: form.values.clone(),
-            noise_gain: gain / per_channel.sqrt(),
-        };
-        vec![
-            profile("M", &self.m, 0.5),
-            profile("S_A", &self.s_a, 0.5f64.sqrt()),
-            profile("S_B", &self.s_b, 0.5f64.sqrt()),
-        ]
+        let per_channel = self.record.traces.len() as f64 / self.present().len() as f64;
+        let forms = self.forms.iter().zip(self.arrangement.form_names());
+        forms
+            .enumerate()
+            .map(|(k, (form, name))| Profile {
+                name: name.clone(),
+                unit: "um",
+                positions: self.positions.clone(),
+                values: form.values.clone(),
+                noise_gain: self.arrangement.noise_gain(k) / per_channel.sqrt(),
+            })
+            .collect()
     }
 
     fn zero_may_jump(&self) -> bool {
@@ -190,11 +189,9 @@ impl FittedModel for FirstOrder {
     }
 
     fn roughened(mut self, noise: &DVector<f64>) -> Self {
-        let drawn = forms(&self.channel_means(noise, None), self.positions.len());
-        for (form, noise) in [&mut self.m, &mut self.s_a, &mut self.s_b]
-            .into_iter()
-            .zip(&drawn)
-        {
+        let means = self.channel_means(noise, None);
+        let drawn = self.arrangement.forms(&means, self.positions.len());
+        for (form, noise) in self.forms.iter_mut().zip(drawn.iter().flatten()) {
             *form = self.smoother.roughened(form, noise);
         }
         self.settle();
@@ -211,6 +208,50 @@ impl FittedModel for FirstOrder {
     }
 
     fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
-        effects::all()
+        effects::all(&self.arrangement)
+    }
+}
+
+impl FirstOrder {
+    /// A slope as a linear function of the readings, by the weights of the channels on it.
+    fn slope_quantity(&self, name: &str, slope: &[f64], weight: impl Fn(usize) -> f64) -> Quantity {
+        let traces = |channel: usize| {
+            let own = self.trace_channels.iter().filter(|c| **c == channel);
+            own.count() as f64
+        };
+        let by_channel: Vec<f64> = (0..self.present().len())
+            .map(|c| weight(c) / traces(c))
+            .collect();
+        Quantity {
+            name: name.to_owned(),
+            unit: "rad",
+            weights: DVector::from_iterator(
+                self.record.places.len(),
+                // µm per mm is 10⁻³ rad.
+                (self.record.places.iter())
+                    .map(|p| 1e-3 * by_channel[p.channel] * slope[self.at(p)]),
+            ),
+        }
+    }
+
+    /// What a design determines of α, γ, τ and κ.
+    fn slopes_of_design(&self) -> Vec<Quantity> {
+        let slopes = &self.arrangement.determined().slopes;
+        let weights = slopes.weights();
+        let gauge = Gauge::of(&self.positions);
+        let mut names: Vec<(usize, String)> =
+            Determined::names(slopes).into_iter().enumerate().collect();
+        // Those of the slide first.
+        names.sort_by_key(|(_, name)| {
+            SLOPES
+                .iter()
+                .position(|s| name.split(' ').next() == Some(s))
+        });
+        names
+            .into_iter()
+            .map(|(p, name)| {
+                self.slope_quantity(&name, gauge.slope.as_slice(), |c| weights[(p, c)])
+            })
+            .collect()
     }
 }

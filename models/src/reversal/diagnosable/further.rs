@@ -1,7 +1,8 @@
 //! Measurements that could be made beside the present one.
 
 use super::{FirstOrder, Gathered};
-use crate::reversal::{Direction, Observations, Reading};
+use crate::reversal::Direction;
+use crate::reversal::designs::{DesignObservations, DesignReading};
 
 /// Further tilt of the artefact, µm/mm.
 const TILT: f64 = 1.0;
@@ -9,12 +10,12 @@ const TILT: f64 = 1.0;
 impl FirstOrder {
     /// The fitted model of a measurement like this one with something changed, as the smooth state
     /// predicts it; nothing where that cannot be fitted.
-    fn predicted(&self, change: impl Fn(usize, &mut Vec<Reading>)) -> Option<Self> {
+    fn predicted(&self, change: impl Fn(usize, &mut Vec<DesignReading>)) -> Option<Self> {
         let mut readings = Vec::new();
         for k in 0..self.record.places.len() {
             let place = &self.record.places[k];
-            readings.push(Reading {
-                channel: self.channel(place),
+            readings.push(DesignReading {
+                channel: place.channel,
                 repeat: place.repeat,
                 direction: if place.direction < 0.0 {
                     Direction::Backward
@@ -27,7 +28,12 @@ impl FirstOrder {
             });
             change(k, &mut readings);
         }
-        let mut model = Self::new(&Observations { readings }, self.assumptions).ok()?;
+        let observations = DesignObservations {
+            design: self.arrangement.design().clone(),
+            readings,
+        };
+        let arrangement = self.arrangement.clone();
+        let mut model = Self::beside(&observations, arrangement, self.assumptions, None).ok()?;
         // Each of its readings is the mean of as many; the moments of these are not planned.
         model.gathered = self.gathered.clone().map(Gathered::planned);
         Some(model)
@@ -36,18 +42,19 @@ impl FirstOrder {
     /// Further measurements that a shop can make, in words and as the model fitted to each.
     pub(super) fn further_measurements(&self) -> Vec<(String, Self)> {
         let turned = self.record.places.iter().any(|p| p.direction < 0.0);
-        let backward = |_: usize, readings: &mut Vec<Reading>| {
+        let backward = |_: usize, readings: &mut Vec<DesignReading>| {
             if let Some(last) = readings.last().copied() {
-                readings.push(Reading {
+                readings.push(DesignReading {
                     direction: Direction::Backward,
                     time: last.time.map(|t| 2.0 * self.duration - t),
                     ..last
                 });
             }
         };
-        let tilted = |k: usize, readings: &mut Vec<Reading>| {
+        let tilted = |k: usize, readings: &mut Vec<DesignReading>| {
             if let Some(last) = readings.last_mut() {
-                let side = self.channel(&self.record.places[k]).side_sign();
+                let [first, second] = self.seat(&self.record.places[k]).psi;
+                let side = first + second;
                 last.value += side * TILT * (last.x - self.middle);
             }
         };

@@ -7,12 +7,12 @@
 
 use std::collections::BTreeMap;
 
-use super::NotDiagnosable;
+use super::arrangement::Arrangement;
 use super::sorting::{TraceKey, trace_key};
+use super::{Assumptions, NotDiagnosable};
+use crate::reversal::designs::{self, DesignFit, DesignObservations, DesignOptions, DesignReading};
 use crate::reversal::simultaneous::{self, Knots, Noise, Options, Simultaneous, Thickness};
-use crate::reversal::{Direction, Observations, Reading};
-
-use super::Assumptions;
+use crate::reversal::{Channel, Direction, Observations, Reading};
 
 /// Gathered readings of all traces, about: what a diagnosis takes a second for.
 const MOST_READINGS: usize = 5000;
@@ -50,7 +50,7 @@ impl Gathered {
 pub(super) type Traces = BTreeMap<TraceKey, Vec<usize>>;
 
 /// The traces of some readings.
-pub(super) fn traces_of(observations: &Observations) -> Traces {
+pub(super) fn traces_of(observations: &DesignObservations) -> Traces {
     let mut traces = Traces::new();
     for (k, reading) in observations.readings.iter().enumerate() {
         traces.entry(trace_key(reading)).or_default().push(k);
@@ -68,9 +68,38 @@ fn most_cells(traces: usize) -> usize {
     (MOST_READINGS / traces.max(1)).clamp(CELLS.0, CELLS.1)
 }
 
-/// The simultaneous fit of readings under the same assumptions.
-pub(super) fn fit(
-    observations: &Observations,
+/// A simultaneous fit of the readings.
+pub(super) enum Carrier<'a> {
+    /// Of the four channels.
+    Four(&'a Simultaneous),
+    /// Of another design.
+    Design(&'a DesignFit),
+}
+
+impl Carrier<'_> {
+    /// What a channel would read at a slide position, µm.
+    fn predict(&self, channel: usize, name: &str, x: f64) -> Result<f64, NotDiagnosable> {
+        let predicted = match self {
+            Self::Design(fit) => fit.predict(channel, x),
+            Self::Four(fit) => match Channel::from_name(name) {
+                Some(four) => fit.predict(four, x).map(|there| there.value),
+                None => return Err(NotDiagnosable::NoFit(format!("{name} is no channel of it"))),
+            },
+        };
+        predicted.map_err(|why| NotDiagnosable::NoFit(why.to_string()))
+    }
+
+    fn residuals(&self) -> &[f64] {
+        match self {
+            Self::Four(fit) => &fit.residuals,
+            Self::Design(fit) => &fit.residuals,
+        }
+    }
+}
+
+/// The simultaneous fit of the four channels under the same assumptions.
+pub(super) fn fit_four(
+    observations: &DesignObservations,
     assumptions: Assumptions,
 ) -> Result<Simultaneous, NotDiagnosable> {
     let options = Options {
@@ -82,15 +111,49 @@ pub(super) fn fit(
         knots: Knots::Chosen,
         ..Options::default()
     };
-    simultaneous::fit(observations, &options).map_err(|why| NotDiagnosable::NoFit(why.to_string()))
+    simultaneous::fit(&as_four(observations), &options)
+        .map_err(|why| NotDiagnosable::NoFit(why.to_string()))
+}
+
+/// Readings of 1A, 1B, 2A, 2B as theirs.
+fn as_four(observations: &DesignObservations) -> Observations {
+    let channels = observations.design.channels();
+    let reading = |r: &DesignReading| {
+        Some(Reading {
+            channel: Channel::from_name(&channels[r.channel].name)?,
+            repeat: r.repeat,
+            direction: r.direction,
+            time: r.time,
+            x: r.x,
+            value: r.value,
+        })
+    };
+    Observations {
+        readings: observations.readings.iter().filter_map(reading).collect(),
+    }
+}
+
+/// The simultaneous fit of another design.
+pub(super) fn fit_design(
+    observations: &DesignObservations,
+    arrangement: &Arrangement,
+    assumptions: Assumptions,
+) -> Result<DesignFit, NotDiagnosable> {
+    let options = DesignOptions {
+        zero: arrangement.zero(),
+        thickness_mm: assumptions.thickness.unwrap_or(0.0),
+        noise_um: assumptions.noise,
+        ..DesignOptions::default()
+    };
+    designs::fit(observations, &options).map_err(|why| NotDiagnosable::NoFit(why.to_string()))
 }
 
 /// Gathers readings by a fit to them.
 pub(super) fn gather(
-    observations: &Observations,
+    observations: &DesignObservations,
     mut traces: Traces,
-    fit: &Simultaneous,
-) -> Result<(Observations, Gathered), NotDiagnosable> {
+    fit: &Carrier<'_>,
+) -> Result<(DesignObservations, Gathered), NotDiagnosable> {
     let readings = &observations.readings;
     for rows in traces.values_mut() {
         rows.sort_by(|a, b| readings[*a].x.total_cmp(&readings[*b].x));
@@ -109,18 +172,18 @@ pub(super) fn gather(
         members.push((*key, inside));
     }
     let centres: Vec<f64> = sums.iter().map(|(sum, count)| sum / count).collect();
-    let mut made = Observations::default();
+    let names = observations.design.channels();
+    let residuals = fit.residuals();
+    let mut made = Vec::new();
     let mut spans = Vec::new();
     for ((channel, repeat, backward), inside) in &members {
         for (own, centre) in inside.iter().zip(&centres) {
             let count = own.len() as f64;
             let mean =
                 |value: &dyn Fn(usize) -> f64| own.iter().map(|k| value(*k)).sum::<f64>() / count;
-            let there = fit
-                .predict(*channel, *centre)
-                .map_err(|why| NotDiagnosable::NoFit(why.to_string()))?;
+            let there = fit.predict(*channel, &names[*channel].name, *centre)?;
             let times: Option<Vec<f64>> = own.iter().map(|k| readings[*k].time).collect();
-            made.readings.push(Reading {
+            made.push(DesignReading {
                 channel: *channel,
                 repeat: *repeat,
                 direction: if *backward {
@@ -130,7 +193,7 @@ pub(super) fn gather(
                 },
                 time: times.as_ref().map(|t| t.iter().sum::<f64>() / count),
                 x: *centre,
-                value: there.value + mean(&|k| fit.residuals[k]),
+                value: there + mean(&|k| residuals[k]),
             });
             let (first, last) = times
                 .iter()
@@ -155,12 +218,16 @@ pub(super) fn gather(
         beyond: readings.len() - held as usize,
         spans,
     };
+    let made = DesignObservations {
+        design: observations.design.clone(),
+        readings: made,
+    };
     Ok((made, gathered))
 }
 
 /// Leaves out traces so short that the others together lose more readings by them than they bring;
 /// of every channel the longest stays.
-fn drop_short(traces: &mut Traces, readings: &[Reading]) {
+fn drop_short(traces: &mut Traces, readings: &[DesignReading]) {
     let span = |rows: &[usize]| match (rows.first(), rows.last()) {
         (Some(first), Some(last)) => readings[*last].x - readings[*first].x,
         _ => 0.0,
@@ -170,7 +237,7 @@ fn drop_short(traces: &mut Traces, readings: &[Reading]) {
         .map(|(key, rows)| (span(rows), *key))
         .collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let longest: BTreeMap<_, _> = order.iter().map(|(_, key)| (key.0, *key)).collect();
+    let longest: BTreeMap<usize, TraceKey> = order.iter().map(|(_, key)| (key.0, *key)).collect();
     let spare: Vec<TraceKey> = order
         .into_iter()
         .map(|(_, key)| key)
@@ -199,7 +266,10 @@ fn drop_short(traces: &mut Traces, readings: &[Reading]) {
 }
 
 /// The range that all traces have.
-fn common<'a>(traces: impl Iterator<Item = &'a Vec<usize>>, readings: &[Reading]) -> (f64, f64) {
+fn common<'a>(
+    traces: impl Iterator<Item = &'a Vec<usize>>,
+    readings: &[DesignReading],
+) -> (f64, f64) {
     traces.fold((f64::NEG_INFINITY, f64::INFINITY), |(low, high), rows| {
         let at = |k: Option<&usize>| k.map_or(f64::NAN, |k| readings[*k].x);
         (low.max(at(rows.first())), high.min(at(rows.last())))
@@ -207,7 +277,7 @@ fn common<'a>(traces: impl Iterator<Item = &'a Vec<usize>>, readings: &[Reading]
 }
 
 /// Rows, in order of position, between two positions.
-fn within<'a>(rows: &'a [usize], readings: &[Reading], low: f64, high: f64) -> &'a [usize] {
+fn within<'a>(rows: &'a [usize], readings: &[DesignReading], low: f64, high: f64) -> &'a [usize] {
     let from = rows.partition_point(|k| readings[*k].x < low);
     let to = rows.partition_point(|k| readings[*k].x <= high);
     &rows[from..to.max(from)]
@@ -217,7 +287,7 @@ fn within<'a>(rows: &'a [usize], readings: &[Reading], low: f64, high: f64) -> &
 ///
 /// Cells of equally many readings of all traces, and cells about each position of the trace with the fewest: those
 /// of the two that leave more once every cell without readings of some trace is joined to its neighbour.
-fn edges(traces: &Traces, readings: &[Reading]) -> Option<Vec<f64>> {
+fn edges(traces: &Traces, readings: &[DesignReading]) -> Option<Vec<f64>> {
     let (low, high) = common(traces.values(), readings);
     // Ends of scanned traces differ by a spacing or so: what lies a spacing outside belongs to the end.
     let spacing = traces
@@ -287,7 +357,7 @@ fn joined(edges: Vec<f64>, positions: &[Vec<f64>]) -> Vec<f64> {
 }
 
 /// The rows of a trace in each cell.
-fn by_cell<'a>(rows: &'a [usize], readings: &[Reading], edges: &[f64]) -> Vec<&'a [usize]> {
+fn by_cell<'a>(rows: &'a [usize], readings: &[DesignReading], edges: &[f64]) -> Vec<&'a [usize]> {
     let mut at = rows.partition_point(|k| readings[*k].x < edges[0]);
     let cells = edges.len() - 1;
     (0..cells)

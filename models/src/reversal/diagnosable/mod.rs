@@ -1,10 +1,13 @@
 //! The first-order reversal model, fitted and laid open to the diagnosis.
 //!
-//! I = i·M(x) + `S_side(x)` + (iα + pβ + ipγ)·x + b. The forms are free at every position and hold
+//! Of the four channels I = i·M(x) + `S_side(x)` + (iα + pβ + ipγ)·x + b; of another design
+//! M·n(φ) + S_ψ(x) + (α·n(φ) + γ·n(ψ) + τ + κ)·x + b. The forms are free at every position and hold
 //! no straight line, so nothing about their smoothness is assumed; what the fit leaves is the
-//! closure profile (pattern + + − − over 1A 1B 2A 2B, less its line), the fourth slope contrast,
-//! and everything that differs between repeats or directions of one channel.
+//! closure profiles (of four channels the pattern + + − − over 1A 1B 2A 2B, less its line), the slopes
+//! that a rigid artefact cannot have, and everything that differs between repeats or directions of one
+//! channel.
 
+mod arrangement;
 mod fitted;
 mod further;
 mod gathering;
@@ -16,10 +19,13 @@ use nalgebra::DVector;
 use thiserror::Error;
 
 use super::cells::cell_width;
+use super::designs::{DesignFit, DesignObservations, DesignReading, Zero};
 use super::simultaneous::Simultaneous;
 use super::smooth_profile::{SmoothProfile, Smoother};
-use super::{Channel, Convention, Observations};
+use super::{Convention, Observations};
 use crate::model::{Column, FittedModel, Place, Record};
+pub use arrangement::{Arrangement, Seat, indicator_name};
+use gathering::Carrier;
 pub use gathering::Gathered;
 use sorting::Sorted;
 
@@ -79,25 +85,25 @@ struct ChannelLine {
 pub struct FirstOrder {
     assumptions: Assumptions,
     record: Record,
-    trace_channels: Vec<Channel>,
+    arrangement: Arrangement,
+    trace_channels: Vec<usize>,
     positions: Vec<f64>,
     smoother: Smoother,
-    lines: [ChannelLine; 4],
-    m: SmoothProfile,
-    s_a: SmoothProfile,
-    s_b: SmoothProfile,
+    /// By channel.
+    lines: Vec<ChannelLine>,
+    /// In the order of the arrangement.
+    forms: Vec<SmoothProfile>,
     /// The smooth reading of every cell.
     smooth: Vec<f64>,
     /// What effects add to the smooth reading before it is seen, by reading.
     beneath: Option<DVector<f64>>,
-    present: Vec<Channel>,
     span: f64,
     reach: f64,
     duration: f64,
     repeats: Vec<u32>,
     middle: f64,
     /// The smooth reading of every channel at mid travel.
-    mid_readings: [f64; 4],
+    mid_readings: Vec<f64>,
     /// Whether the readings came with times.
     pub timed: bool,
     /// Readings at positions that not every trace has: not used.
@@ -116,7 +122,7 @@ impl FirstOrder {
         observations: &Observations,
         assumptions: Assumptions,
     ) -> Result<Self, NotDiagnosable> {
-        Self::beside(observations, assumptions, None)
+        Self::four(observations, assumptions, None)
     }
 
     /// The same where the readings have been fitted already.
@@ -128,45 +134,102 @@ impl FirstOrder {
         fit: &Simultaneous,
         assumptions: Assumptions,
     ) -> Result<Self, NotDiagnosable> {
-        Self::beside(observations, assumptions, Some(fit))
+        Self::four(observations, assumptions, Some(fit))
     }
 
-    fn beside(
+    /// The same of any design, with the fit of its readings where there is one; a rigid artefact
+    /// whatever the convention of the assumptions.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_design(
+        observations: &DesignObservations,
+        zero: Zero,
+        fit: Option<&DesignFit>,
+        assumptions: Assumptions,
+    ) -> Result<Self, NotDiagnosable> {
+        let arrangement = Arrangement::new(observations.design.clone(), zero, None);
+        let carrier = fit.map(Carrier::Design);
+        Self::beside(observations, arrangement, assumptions, carrier)
+    }
+
+    fn four(
         observations: &Observations,
         assumptions: Assumptions,
         fit: Option<&Simultaneous>,
     ) -> Result<Self, NotDiagnosable> {
+        let present = observations.channels();
+        let design = arrangement::of_four(&present).ok_or(NotDiagnosable::RangesDiffer)?;
+        let reading = |r: &super::Reading| DesignReading {
+            channel: present.iter().position(|c| *c == r.channel).unwrap_or(0),
+            repeat: r.repeat,
+            direction: r.direction,
+            time: r.time,
+            x: r.x,
+            value: r.value,
+        };
+        let observations = DesignObservations {
+            design: design.clone(),
+            readings: observations.readings.iter().map(reading).collect(),
+        };
+        let arrangement = Arrangement::new(design, Zero::Reset, Some(assumptions.convention));
+        let carrier = fit.map(Carrier::Four);
+        Self::beside(&observations, arrangement, assumptions, carrier)
+    }
+
+    fn beside(
+        observations: &DesignObservations,
+        arrangement: Arrangement,
+        assumptions: Assumptions,
+        fit: Option<Carrier<'_>>,
+    ) -> Result<Self, NotDiagnosable> {
         let traces = gathering::traces_of(observations);
         let shared = sorting::shared(observations, traces.len());
+        let positions: Vec<usize> = arrangement.seats().iter().map(|s| s.position).collect();
         if !gathering::is_needed(traces.len(), shared.len(), observations.readings.len()) {
-            return Self::sorted(Sorted::new(observations, &shared), assumptions);
+            let sorted = Sorted::new(observations, &positions, &shared);
+            return Self::sorted(sorted, arrangement, assumptions);
         }
-        let own;
+        let (four, design);
         let fit = match fit {
             Some(fit) => fit,
+            None if arrangement.is_four() => {
+                four = gathering::fit_four(observations, assumptions)?;
+                Carrier::Four(&four)
+            }
             None => {
-                own = gathering::fit(observations, assumptions)?;
-                &own
+                design = gathering::fit_design(observations, &arrangement, assumptions)?;
+                Carrier::Design(&design)
             }
         };
-        let (made, gathered) = gathering::gather(observations, traces, fit)?;
+        let (made, gathered) = gathering::gather(observations, traces, &fit)?;
         let shared = sorting::shared(&made, gathering::traces_of(&made).len());
-        let mut model = Self::sorted(Sorted::new(&made, &shared), assumptions)?;
+        let sorted = Sorted::new(&made, &positions, &shared);
+        let mut model = Self::sorted(sorted, arrangement, assumptions)?;
         model.left_out = gathered.beyond;
         model.gathered = Some(gathered);
         Ok(model)
     }
 
-    fn sorted(sorted: Sorted, assumptions: Assumptions) -> Result<Self, NotDiagnosable> {
+    fn sorted(
+        sorted: Sorted,
+        arrangement: Arrangement,
+        assumptions: Assumptions,
+    ) -> Result<Self, NotDiagnosable> {
         if sorted.positions.len() < FEWEST_POSITIONS {
             return Err(NotDiagnosable::RangesDiffer);
         }
         let smoother = Smoother::new(&sorted.positions).ok_or(NotDiagnosable::RangesDiffer)?;
-        let present: Vec<Channel> = Channel::ALL
-            .into_iter()
-            .filter(|c| sorted.trace_channels.contains(c))
-            .collect();
-        if present.len() < 4 && sorted.traces.len() == present.len() {
+        let channels = arrangement.seats().len();
+        // Nothing closes, and nothing is read twice.
+        let (patterns, withheld) = arrangement.patterns();
+        let closes = patterns.ncols() < channels || !withheld.is_empty();
+        let spare = if arrangement.is_four() {
+            channels == 4
+        } else {
+            closes
+        };
+        if !spare && sorted.traces.len() == channels {
             return Err(NotDiagnosable::NothingLeft {
                 readings: sorted.values.len(),
             });
@@ -185,19 +248,17 @@ impl FirstOrder {
             duration: last.max(f64::MIN_POSITIVE),
             repeats: repeats.into_iter().collect(),
             middle: sorted.positions.iter().sum::<f64>() / n as f64,
-            mid_readings: [0.0; 4],
+            mid_readings: vec![0.0; channels],
             assumptions,
             record: Record::new(sorted.places, sorted.traces, DVector::zeros(0)),
             trace_channels: sorted.trace_channels,
             positions: sorted.positions,
             smoother,
-            lines: [flat.clone(), flat.clone(), flat.clone(), flat],
-            m: nothing.clone(),
-            s_a: nothing.clone(),
-            s_b: nothing,
+            lines: vec![flat; channels],
+            forms: vec![nothing; arrangement.form_names().len()],
+            arrangement,
             smooth: Vec::new(),
             beneath: None,
-            present,
             timed: sorted.timed,
             left_out: sorted.left_out,
             gathered: None,
@@ -210,10 +271,9 @@ impl FirstOrder {
         &self,
         values: &DVector<f64>,
         repeat: Option<u32>,
-    ) -> [Option<DVector<f64>>; 4] {
+    ) -> Vec<Option<DVector<f64>>> {
         let n = self.positions.len();
-        let mut sums = [const { None }; 4];
-        for channel in &self.present {
+        let of = |channel: usize| {
             let mut sum = DVector::zeros(n);
             let mut count = 0.0;
             for (trace, _) in self
@@ -221,15 +281,15 @@ impl FirstOrder {
                 .traces
                 .iter()
                 .zip(&self.trace_channels)
-                .filter(|(_, c)| *c == channel)
+                .filter(|(_, c)| **c == channel)
                 .filter(|(t, _)| repeat.is_none_or(|r| self.record.places[t.start].repeat == r))
             {
                 sum += values.rows(trace.start, n);
                 count += 1.0;
             }
-            sums[channel.index()] = (count > 0.0).then(|| sum / count);
-        }
-        sums
+            (count > 0.0).then(|| sum / count)
+        };
+        (0..self.present().len()).map(of).collect()
     }
 
     /// Fits the readings.
@@ -237,10 +297,9 @@ impl FirstOrder {
         let means = self.channel_means(&self.record.observed, None);
         let n = self.positions.len();
         let gauge = Gauge::of(&self.positions);
-        let mut residual: [Option<DVector<f64>>; 4] = [const { None }; 4];
-        for channel in &self.present {
-            let k = channel.index();
-            let Some(mean) = &means[k] else { continue };
+        let mut residual: Vec<Option<DVector<f64>>> = vec![None; means.len()];
+        for (k, mean) in means.iter().enumerate() {
+            let Some(mean) = mean else { continue };
             let slope = gauge.slope.dot(mean);
             let offset = gauge.height.dot(mean) - slope * gauge.center;
             self.lines[k] = ChannelLine { slope, offset };
@@ -251,31 +310,31 @@ impl FirstOrder {
                     .map(|(y, x)| y - offset - slope * x),
             ));
         }
-        let raw = forms(&residual, n);
-        [self.m, self.s_a, self.s_b] = match smoothing {
+        let nothing = || vec![DVector::zeros(n); self.forms.len()];
+        let raw = (self.arrangement.forms(&residual, n)).unwrap_or_else(nothing);
+        self.forms = match smoothing {
             Smoothing::Chosen => {
-                let singles: Vec<[DVector<f64>; 3]> = self
-                    .repeats
-                    .iter()
-                    .map(|repeat| {
-                        forms(&self.channel_means(&self.record.observed, Some(*repeat)), n)
-                    })
-                    .collect();
-                [0, 1, 2].map(|k| {
+                let of = |repeat: &u32| {
+                    let means = self.channel_means(&self.record.observed, Some(*repeat));
+                    self.arrangement.forms(&means, n)
+                };
+                let singles: Vec<Vec<DVector<f64>>> = self.repeats.iter().filter_map(of).collect();
+                let smoothed = |(k, raw): (usize, &DVector<f64>)| {
                     let own: Vec<&DVector<f64>> = singles.iter().map(|forms| &forms[k]).collect();
-                    self.smoother.smooth_repeated(&raw[k], &own)
-                })
+                    self.smoother.smooth_repeated(raw, &own)
+                };
+                raw.iter().enumerate().map(smoothed).collect()
             }
             Smoothing::Kept => {
-                let smooth =
-                    |form: &SmoothProfile, k: usize| self.smoother.smooth_as(form, &raw[k]);
-                [
-                    smooth(&self.m, 0),
-                    smooth(&self.s_a, 1),
-                    smooth(&self.s_b, 2),
-                ]
+                let forms = self.forms.iter().zip(&raw);
+                forms
+                    .map(|(form, raw)| self.smoother.smooth_as(form, raw))
+                    .collect()
             }
-            Smoothing::None => raw.map(|form| self.smoother.through(form)),
+            Smoothing::None => {
+                let through = raw.into_iter().map(|form| self.smoother.through(form));
+                through.collect()
+            }
         };
         self.beneath = None;
         self.settle();
@@ -283,20 +342,20 @@ impl FirstOrder {
 
     /// What follows from lines and forms.
     fn settle(&mut self) {
-        self.smooth = (0..self.positions.len() * self.present.len())
-            .map(|cell| {
-                let n = self.positions.len();
-                self.smooth_at(self.present[cell / n], cell % n)
+        let n = self.positions.len();
+        self.smooth = (0..n * self.present().len())
+            .map(|cell| self.smooth_at(cell / n, cell % n))
+            .collect();
+        self.mid_readings = (0..self.present().len())
+            .map(|channel| {
+                let line = &self.lines[channel];
+                let at = |form: &SmoothProfile| form.at(&self.positions, self.middle);
+                line.offset
+                    + line.slope * self.middle
+                    + self.slide_sum(channel, at)
+                    + at(self.side(channel))
             })
             .collect();
-        self.mid_readings = Channel::ALL.map(|channel| {
-            let line = &self.lines[channel.index()];
-            let at = |form: &SmoothProfile| form.at(&self.positions, self.middle);
-            line.offset
-                + line.slope * self.middle
-                + channel.indicator_sign() * at(&self.m)
-                + at(self.side(channel))
-        });
         self.span = self.find_span();
         self.reach = self
             .smooth
@@ -305,8 +364,11 @@ impl FirstOrder {
             .fold(f64::MIN_POSITIVE, f64::max);
     }
 
-    fn rigid(&self) -> bool {
-        self.assumptions.convention == Convention::Rigid
+    /// What a channel sees of the forms of the slide.
+    fn slide_sum(&self, channel: usize, of: impl Fn(&SmoothProfile) -> f64) -> f64 {
+        let seen = self.arrangement.slides(channel).iter();
+        seen.map(|(form, factor)| factor * of(&self.forms[*form]))
+            .sum()
     }
 
     /// Positions at which every trace was read, mm.
@@ -321,13 +383,18 @@ impl FirstOrder {
     }
 
     /// The channel of a place.
-    pub fn channel(&self, place: &Place) -> Channel {
-        self.present[place.channel]
+    pub fn seat(&self, place: &Place) -> &Seat {
+        &self.arrangement.seats()[place.channel]
     }
 
     /// The channels with readings.
-    pub fn present(&self) -> &[Channel] {
-        &self.present
+    pub fn present(&self) -> &[Seat] {
+        self.arrangement.seats()
+    }
+
+    /// The channels and what they have in common.
+    pub fn arrangement(&self) -> &Arrangement {
+        &self.arrangement
     }
 
     /// Index of a place among the positions.
@@ -384,25 +451,25 @@ impl FirstOrder {
         })
     }
 
-    fn smooth_at(&self, channel: Channel, k: usize) -> f64 {
-        let line = &self.lines[channel.index()];
+    fn smooth_at(&self, channel: usize, k: usize) -> f64 {
+        let line = &self.lines[channel];
         line.offset
             + line.slope * self.positions[k]
-            + channel.indicator_sign() * self.m.values[k]
+            + self.slide_sum(channel, |form| form.values[k])
             + self.side(channel).values[k]
     }
 
     /// Slope of the smooth reading along the travel, µm/mm.
     pub fn reading_slope(&self, place: &Place) -> f64 {
-        let (channel, k) = (self.channel(place), self.at(place));
-        self.lines[channel.index()].slope
-            + channel.indicator_sign() * self.m.slopes[k]
+        let (channel, k) = (place.channel, self.at(place));
+        self.lines[channel].slope
+            + self.slide_sum(channel, |form| form.slopes[k])
             + self.side(channel).slopes[k]
     }
 
     /// Slope of the artefact's form under a channel, µm/mm.
     pub fn side_slope(&self, place: &Place) -> f64 {
-        self.side(self.channel(place)).slopes[self.at(place)]
+        self.side(place.channel).slopes[self.at(place)]
     }
 
     /// Change of the artefact's form under a channel when the probed point moves along it by
@@ -411,7 +478,7 @@ impl FirstOrder {
         if shift.abs() < 1e-9 * self.travel() {
             return self.side_slope(place);
         }
-        let side = self.side(self.channel(place));
+        let side = self.side(place.channel);
         let moved = side.at(&self.positions, place.x + shift);
         (moved - side.values[self.at(place)]) / shift
     }
@@ -420,10 +487,13 @@ impl FirstOrder {
     pub fn reading_chord(&self, reading: usize, shift: f64) -> f64 {
         let place = &self.record.places[reading];
         let shift = self.chord_length(shift);
-        let (channel, k) = (self.channel(place), self.at(place));
-        let moved = self.m.at(&self.positions, place.x + shift) - self.m.values[k];
-        self.lines[channel.index()].slope
-            + channel.indicator_sign() * moved / shift
+        let (channel, k) = (place.channel, self.at(place));
+        let moved = |form: &SmoothProfile| {
+            let moved = form.at(&self.positions, place.x + shift) - form.values[k];
+            moved / shift
+        };
+        self.lines[channel].slope
+            + self.slide_sum(channel, moved)
             + self.probed_chord(reading, shift)
     }
 
@@ -458,17 +528,13 @@ impl FirstOrder {
         (there - beneath[reading]) / shift
     }
 
-    /// The tilt of a channel, mm/mm.
-    pub fn tilt(&self, channel: Channel) -> f64 {
-        self.lines[channel.index()].slope * 1e-3
+    /// The tilt of a place's channel, mm/mm.
+    pub fn tilt(&self, place: &Place) -> f64 {
+        self.lines[place.channel].slope * 1e-3
     }
 
-    fn side(&self, channel: Channel) -> &SmoothProfile {
-        if channel.is_side_a() {
-            &self.s_a
-        } else {
-            &self.s_b
-        }
+    fn side(&self, channel: usize) -> &SmoothProfile {
+        &self.forms[self.arrangement.side_form(channel)]
     }
 
     /// Smallest to greatest smooth reading of all channels about their middles, µm.
@@ -513,7 +579,7 @@ impl FirstOrder {
 
     /// The smooth reading of a place's channel at mid travel, µm.
     pub fn mid_reading(&self, place: &Place) -> f64 {
-        self.mid_readings[self.channel(place).index()]
+        self.mid_readings[place.channel]
     }
 }
 
@@ -542,23 +608,4 @@ impl Gauge {
             height,
         }
     }
-}
-
-/// M, `S_A` and `S_B` from the channels' residuals; with fewer channels the part that they show.
-fn forms(residual: &[Option<DVector<f64>>; 4], n: usize) -> [DVector<f64>; 3] {
-    let [a1, b1, a2, b2] = residual;
-    let mean = |first: &Option<DVector<f64>>, second: &Option<DVector<f64>>| match (first, second) {
-        (Some(p), Some(q)) => (p + q) / 2.0,
-        (Some(p), None) | (None, Some(p)) => p.clone(),
-        (None, None) => DVector::zeros(n),
-    };
-    let s_a = mean(a1, a2);
-    let s_b = mean(b1, b2);
-    let m = match (a1, b1, a2, b2) {
-        (Some(a1), Some(b1), Some(a2), Some(b2)) => (a1 - b1 - a2 + b2) / 4.0,
-        (Some(a1), _, Some(a2), _) => (a1 - a2) / 2.0,
-        (_, Some(b1), _, Some(b2)) => (b2 - b1) / 2.0,
-        _ => DVector::zeros(n),
-    };
-    [m, s_a, s_b]
 }

@@ -4,20 +4,21 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::model::Place;
-use crate::reversal::{Channel, Direction, Observations, Reading};
+use crate::reversal::Direction;
+use crate::reversal::designs::{DesignObservations, DesignReading};
 
 /// Seconds between readings where the file has no times.
 const ASSUMED_INTERVAL: f64 = 1.0;
 
-/// Channel, repeat, and whether it runs backward.
-pub(super) type TraceKey = (Channel, u32, bool);
+/// Channel by its place, repeat, and whether it runs backward.
+pub(super) type TraceKey = (usize, u32, bool);
 
 /// Readings in traces.
 pub(super) struct Sorted {
     pub values: Vec<f64>,
     pub places: Vec<Place>,
     pub traces: Vec<Range<usize>>,
-    pub trace_channels: Vec<Channel>,
+    pub trace_channels: Vec<usize>,
     pub positions: Vec<f64>,
     pub timed: bool,
     pub left_out: usize,
@@ -27,8 +28,8 @@ pub(super) struct Sorted {
 type Sample = (f64, f64, Option<f64>);
 
 impl Sorted {
-    /// The readings at positions that all traces share.
-    pub fn new(observations: &Observations, shared: &[i64]) -> Self {
+    /// The readings at positions that all traces share; `positions`: by channel, that of the spindle.
+    pub fn new(observations: &DesignObservations, positions: &[usize], shared: &[i64]) -> Self {
         let mut traces: BTreeMap<TraceKey, BTreeMap<i64, Sample>> = BTreeMap::new();
         for reading in &observations.readings {
             let sample = (reading.x, reading.value, reading.time);
@@ -40,8 +41,7 @@ impl Sorted {
         // Clocks may count from anywhere.
         let began = observations.readings.iter().filter_map(|r| r.time);
         let began = began.fold(f64::INFINITY, f64::min);
-        let order = assumed_order(traces.keys());
-        let present: Vec<Channel> = observations.channels();
+        let order = assumed_order(traces.keys(), positions);
         let mut sorted = Self {
             values: Vec::new(),
             places: Vec::new(),
@@ -53,7 +53,6 @@ impl Sorted {
         };
         for (key, trace) in &traces {
             let (channel, repeat, backward) = *key;
-            let channel_index = present.iter().position(|c| *c == channel).unwrap_or(0);
             let start = sorted.values.len();
             for (k, place) in shared.iter().enumerate() {
                 let Some(&(x, value, time)) = trace.get(place) else {
@@ -63,7 +62,7 @@ impl Sorted {
                 let assumed = (order[key] * n + step) as f64 * ASSUMED_INTERVAL;
                 sorted.values.push(value);
                 sorted.places.push(Place {
-                    channel: channel_index,
+                    channel,
                     x,
                     time: if timed {
                         time.map_or(assumed, |time| time - began)
@@ -72,7 +71,7 @@ impl Sorted {
                     },
                     repeat,
                     direction: if backward { -1.0 } else { 1.0 },
-                    cell: channel_index * n + k,
+                    cell: channel * n + k,
                 });
                 if sorted.traces.is_empty() {
                     sorted.positions.push(x);
@@ -87,7 +86,7 @@ impl Sorted {
 }
 
 /// The positions that all of so many traces have, ascending.
-pub(super) fn shared(observations: &Observations, traces: usize) -> Vec<i64> {
+pub(super) fn shared(observations: &DesignObservations, traces: usize) -> Vec<i64> {
     let mut numbers: BTreeMap<TraceKey, u32> = BTreeMap::new();
     let mut seen: Vec<(i64, u32)> = Vec::with_capacity(observations.readings.len());
     for reading in &observations.readings {
@@ -104,7 +103,7 @@ pub(super) fn shared(observations: &Observations, traces: usize) -> Vec<i64> {
 }
 
 /// The trace of a reading.
-pub(super) fn trace_key(reading: &Reading) -> TraceKey {
+pub(super) fn trace_key(reading: &DesignReading) -> TraceKey {
     let backward = reading.direction == Direction::Backward;
     (reading.channel, reading.repeat, backward)
 }
@@ -114,12 +113,13 @@ fn position_key(x: f64) -> i64 {
     (x * 1e4).round() as i64
 }
 
-/// The order in which traces are taken where no times are given: first all repeats in the first
-/// spindle position, then in the second, each forward and then backward, both indicators at once.
+/// The order in which traces are taken where no times are given: all repeats in the first spindle
+/// position, then in the next, each forward and then backward, all indicators at once.
 fn assumed_order<'a>(
     keys: impl Iterator<Item = &'a TraceKey> + Clone,
+    positions: &[usize],
 ) -> BTreeMap<TraceKey, usize> {
-    let pass = |key: &TraceKey| (key.0.spindle_sign() < 0.0, key.1, key.2);
+    let pass = |key: &TraceKey| (positions[key.0], key.1, key.2);
     let mut passes: Vec<_> = keys.clone().map(pass).collect();
     passes.sort_unstable();
     passes.dedup();

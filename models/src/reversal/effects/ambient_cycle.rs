@@ -6,12 +6,12 @@
 
 use nalgebra::DMatrix;
 
-use super::indicators::{apart, others, scopes, signs};
-use super::{FirstOrder, rotating, rotations};
+use super::FirstOrder;
+use super::indicators::{ALL, Indicators};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Parameter, Shape};
 
 /// See the head of the file. Variants: the indicators.
-pub(super) struct AmbientCycle;
+pub(super) struct AmbientCycle(pub Indicators);
 
 /// Cycles between neighbouring starts of the search.
 const STRIDE: f64 = 0.3;
@@ -33,11 +33,11 @@ impl Effect<FirstOrder> for AmbientCycle {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        rotations(2, 500.0)
+        self.0.rotations(ALL, 500.0)
     }
 
     fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
-        rotations(signs(shape.variant).len(), 500.0)
+        self.0.rotations(shape.variant, 500.0)
     }
 
     fn shape_parameters(&self) -> Vec<Parameter> {
@@ -45,21 +45,21 @@ impl Effect<FirstOrder> for AmbientCycle {
     }
 
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
-        let count = ((most(model) - 1.0) / STRIDE).floor() as usize;
+        let count = ((self.most(model) - 1.0) / STRIDE).floor() as usize;
         let at = |k: usize| Shape {
-            variant: scopes(model)[0],
+            variant: self.0.fullest(),
             values: vec![1.0 + STRIDE * k as f64],
             steps: vec![0.5 * STRIDE],
         };
         (0..=count).map(at).collect()
     }
 
-    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
         let other = |variant| Shape {
             variant,
             ..shape.clone()
         };
-        others(model, shape.variant).map(other).collect()
+        self.0.others(shape.variant).map(other).collect()
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
@@ -67,14 +67,14 @@ impl Effect<FirstOrder> for AmbientCycle {
         let turn = std::f64::consts::TAU * cycles / model.duration();
         let wave = |function: fn(f64) -> f64| {
             let whole = Column::from_places(model.places(), |_, p| function(turn * p.time));
-            apart(model, shape.variant, &whole)
+            self.0.apart(model, shape.variant, &whole)
         };
         let pairs = wave(f64::cos).into_iter().zip(wave(f64::sin));
         pairs.flat_map(|(cosine, sine)| [cosine, sine]).collect()
     }
 
     fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
-        let reach = 0.9..=most(model);
+        let reach = 0.9..=self.most(model);
         shape
             .values
             .first()
@@ -92,9 +92,8 @@ impl Effect<FirstOrder> for AmbientCycle {
         amplitudes: &[f64],
         covariance: &DMatrix<f64>,
     ) -> Vec<Estimate> {
-        let waves = signs(shape.variant).len();
-        rotating(
-            waves,
+        self.0.rotating(
+            shape.variant,
             shape,
             amplitudes,
             covariance,
@@ -103,9 +102,11 @@ impl Effect<FirstOrder> for AmbientCycle {
     }
 }
 
-/// Most cycles: short of one in the time of two traces, where a sinusoid is the position that goes
-/// forward and back.
-fn most(model: &FirstOrder) -> f64 {
-    let indicators = signs(scopes(model)[0]).len();
-    (0.5 * (model.traces().len() / indicators) as f64 - APART).max(1.0)
+impl AmbientCycle {
+    /// Most cycles: short of one in the time of two traces, where a sinusoid is the position that goes
+    /// forward and back.
+    fn most(&self, model: &FirstOrder) -> f64 {
+        let passes = model.traces().len() / self.0.count();
+        (0.5 * passes as f64 - APART).max(1.0)
+    }
 }

@@ -24,12 +24,7 @@ impl Effect<FirstOrder> for CommonGain {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "gain",
-            unit: "1",
-            low: -0.5,
-            high: 0.5,
-        }]
+        vec![Parameter::between("gain", "1", -0.5, 0.5)]
     }
 
     fn absorbed(&self) -> bool {

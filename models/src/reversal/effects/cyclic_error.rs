@@ -8,15 +8,40 @@
 
 use nalgebra::DMatrix;
 
-use super::indicators::{BOTH, FAR, NEAR, apart, scopes, signs};
-use super::{FirstOrder, rotating, rotations};
+use super::FirstOrder;
+use super::indicators::{ALL, Indicators};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Link, Parameter, Shape};
+use crate::reversal::designs::angle_name;
+use crate::reversal::diagnosable::Arrangement;
 
-/// See the head of the file. Variants: the indicators, then [`DRIVE`].
-pub(super) struct CyclicError;
+/// See the head of the file. Variants: the indicators, then a period of the position in one position of
+/// the spindle; of two positions the fit spreads it over both.
+pub(super) struct CyclicError {
+    indicators: Indicators,
+    /// Positions of the spindle in which a period of the position is sought.
+    positions: Vec<f64>,
+}
 
-/// Variant of a period of the position.
-const DRIVE: usize = 3;
+impl CyclicError {
+    pub fn new(channels: &Arrangement) -> Self {
+        let all = channels.positions();
+        let told = if all.len() > 2 { all.len() } else { 1 };
+        Self {
+            indicators: Indicators::new(channels),
+            positions: all[..told].to_vec(),
+        }
+    }
+
+    /// The position of the spindle of a variant that is a period of the position.
+    fn drive(&self, variant: usize) -> Option<usize> {
+        variant.checked_sub(self.indicators.scope_count())
+    }
+
+    fn drives(&self) -> impl Iterator<Item = usize> + use<> {
+        let first = self.indicators.scope_count();
+        first..first + self.positions.len()
+    }
+}
 
 /// Cycles between neighbouring starts of the search: the peak of a period is one cycle wide.
 const STRIDE: f64 = 0.4;
@@ -46,22 +71,22 @@ impl Effect<FirstOrder> for CyclicError {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        self.amplitudes_at(&Shape::variant(BOTH))
+        self.amplitudes_at(&Shape::variant(ALL))
     }
 
     fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
-        rotations(if shape.variant == BOTH { 2 } else { 1 }, 100.0)
+        self.indicators.rotations(self.waves(shape), 100.0)
     }
 
     fn shape_parameters(&self) -> Vec<Parameter> {
         vec![Parameter::between("cycles", "1", 1.0, 1e6)]
     }
 
-    /// Both indicators are found from either.
+    /// All indicators are found from either.
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
-        let alone = scopes(model).iter().copied().filter(|s| *s != BOTH);
+        let alone = self.indicators.scopes().filter(|s| *s != ALL);
         let mut shapes = Vec::new();
-        for variant in alone.chain([DRIVE]) {
+        for variant in alone.chain(self.drives()) {
             let mut cycles = FEWEST;
             while cycles <= highest(model) {
                 shapes.push(Shape {
@@ -75,16 +100,15 @@ impl Effect<FirstOrder> for CyclicError {
         shapes
     }
 
-    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
-        let other = |variant: &usize| Shape {
-            variant: *variant,
+    fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+        let other = |variant: usize| Shape {
+            variant,
             ..shape.clone()
         };
-        if shape.variant == DRIVE {
+        if self.drive(shape.variant).is_some() {
             return Vec::new();
         }
-        let others = scopes(model).iter().filter(|s| **s != shape.variant);
-        others.map(other).collect()
+        self.indicators.others(shape.variant).map(other).collect()
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
@@ -92,13 +116,12 @@ impl Effect<FirstOrder> for CyclicError {
             return Vec::new();
         };
         let turn = std::f64::consts::TAU * cycles;
-        if shape.variant == DRIVE {
+        if let Some(position) = self.drive(shape.variant) {
             let first = model.positions().first().copied().unwrap_or(0.0);
             let per_mm = turn / model.travel();
-            // In one spindle position only; the fit spreads it over both.
             let wave = |function: fn(f64) -> f64| {
                 Column::from_places(model.places(), |_, place| {
-                    let seen = model.channel(place).spindle_sign() > 0.0;
+                    let seen = model.seat(place).position == position;
                     f64::from(seen) * function(per_mm * (place.x - first))
                 })
             };
@@ -107,7 +130,7 @@ impl Effect<FirstOrder> for CyclicError {
         let per_um = turn / model.reading_span();
         let wave = |function: fn(f64) -> f64| {
             let whole = model.of_reading(|reading| function(per_um * reading));
-            apart(model, shape.variant, &whole)
+            self.indicators.apart(model, shape.variant, &whole)
         };
         // The cosine and the sine of each indicator stand together.
         let pairs = wave(f64::cos).into_iter().zip(wave(f64::sin));
@@ -128,7 +151,7 @@ impl Effect<FirstOrder> for CyclicError {
         };
         let steepest = std::f64::consts::TAU * cycles / model.reading_span();
         let holds = |wave: &[f64]| wave[0].hypot(wave[1]) * steepest < STEEPEST;
-        shape.variant == DRIVE || amplitudes.chunks_exact(2).all(holds)
+        self.drive(shape.variant).is_some() || amplitudes.chunks_exact(2).all(holds)
     }
 
     /// A period of the reading is told by its cycles over the span of the readings.
@@ -140,7 +163,7 @@ impl Effect<FirstOrder> for CyclicError {
         amplitudes: &[f64],
     ) -> (Shape, Vec<f64>) {
         let mut shape = shape.clone();
-        if shape.variant != DRIVE {
+        if self.drive(shape.variant).is_none() {
             let grown = to.reading_span() / from.reading_span();
             shape.values.iter_mut().for_each(|cycles| *cycles *= grown);
         }
@@ -149,16 +172,19 @@ impl Effect<FirstOrder> for CyclicError {
 
     fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
         let cycles = shape.values.first()?;
+        if let Some(position) = self.drive(shape.variant) {
+            let at = match self.positions.len() {
+                1 => String::new(),
+                _ => format!(", spindle at {}°", angle_name(self.positions[position])),
+            };
+            return Some(format!(
+                "period {:.4} mm of the travel{at}",
+                model.travel() / cycles
+            ));
+        }
         let of = match shape.variant {
-            DRIVE => {
-                return Some(format!(
-                    "period {:.4} mm of the travel",
-                    model.travel() / cycles
-                ));
-            }
-            NEAR => "near indicator's reading",
-            FAR => "far indicator's reading",
-            _ => "reading",
+            ALL => "reading".to_owned(),
+            one => format!("{} indicator's reading", self.indicators.name(one - 1)),
         };
         Some(format!(
             "period {:.4} µm of the {of}",
@@ -172,18 +198,23 @@ impl Effect<FirstOrder> for CyclicError {
         amplitudes: &[f64],
         covariance: &DMatrix<f64>,
     ) -> Vec<Estimate> {
-        let waves = if shape.variant == DRIVE {
-            1
-        } else {
-            signs(shape.variant).len()
-        };
-        rotating(
-            waves,
+        self.indicators.rotating(
+            self.waves(shape),
             shape,
             amplitudes,
             covariance,
             &self.shape_parameters(),
         )
+    }
+}
+
+impl CyclicError {
+    /// The scope with as many waves as a shape has.
+    fn waves(&self, shape: &Shape) -> usize {
+        match self.drive(shape.variant) {
+            Some(_) => 1,
+            None => shape.variant,
+        }
     }
 }
 

@@ -1,10 +1,14 @@
-//! Near and far indicator have different gains.
+//! The indicators have different gains.
+//!
+//! Two: one amplitude, their difference. More: each but the first against the first, or one of them
+//! against all others. A gain common to all is `common-gain`.
 
 use super::FirstOrder;
+use super::indicators::{ALL, Indicators};
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
-/// See the head of the file.
-pub(super) struct GainMismatch;
+/// See the head of the file. Variants: all indicators, then one alone; two indicators have but one.
+pub(super) struct GainMismatch(pub Indicators);
 
 impl Effect<FirstOrder> for GainMismatch {
     fn name(&self) -> &str {
@@ -15,7 +19,7 @@ impl Effect<FirstOrder> for GainMismatch {
         About {
             physics: "one indicator reads a larger part of the same displacement than the other",
             confirm: "swap the indicators, or calibrate both against the same gauge blocks",
-            source: "I (1 + i g / 2): near and far gain differ by g",
+            source: "I (1 + i g / 2): near and far gain differ by g; I (1 + g) of one of more",
         }
     }
 
@@ -24,22 +28,62 @@ impl Effect<FirstOrder> for GainMismatch {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "mismatch",
-            unit: "1",
-            low: -0.2,
-            high: 0.2,
-        }]
+        self.amplitudes_at(&Shape::only())
+    }
+
+    fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
+        let mismatch = Parameter::symmetric("mismatch", "1", 0.2);
+        match (self.0.count(), shape.variant) {
+            (0..=2, _) => vec![mismatch],
+            (_, ALL) => self.0.sizes(ALL, &mismatch, "mismatch").split_off(1),
+            (_, one) => self.0.sizes(one, &mismatch, "mismatch"),
+        }
+    }
+
+    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+        match self.0.count() {
+            0 | 1 => Vec::new(),
+            2 => vec![Shape::only()],
+            _ => self.0.scopes().map(Shape::variant).collect(),
+        }
+    }
+
+    fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+        match self.0.count() {
+            0..=2 => Vec::new(),
+            _ => self.0.others(shape.variant).map(Shape::variant).collect(),
+        }
     }
 
     fn is_linear_in_state(&self) -> bool {
         true
     }
 
-    fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
-        vec![Column::from_places(model.places(), |k, place| {
-            0.5 * model.channel(place).indicator_sign()
-                * (model.smooth_reading(k) - model.mid_reading(place))
-        })]
+    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+        let two = self.0.count() == 2;
+        let all = Column::from_places(model.places(), |k, place| {
+            let share = match (two, model.seat(place).indicator) {
+                (false, _) => 1.0,
+                (true, 0) => 0.5,
+                (true, _) => -0.5,
+            };
+            share * (model.smooth_reading(k) - model.mid_reading(place))
+        });
+        if two {
+            return vec![all];
+        }
+        let mut own = self.0.apart(model, shape.variant, &all);
+        if shape.variant == ALL {
+            own.remove(0);
+        }
+        own
+    }
+
+    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+        match (self.0.count(), shape.variant) {
+            (0..=2, _) => None,
+            (_, ALL) => Some(format!("each against the {} indicator", self.0.name(0))),
+            (_, one) => Some(self.0.words(one)),
+        }
     }
 }

@@ -20,12 +20,7 @@ impl Effect<FirstOrder> for GravitySag {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "end-sag",
-            unit: "um",
-            low: -1000.0,
-            high: 1000.0,
-        }]
+        vec![Parameter::between("end-sag", "um", -1000.0, 1000.0)]
     }
 
     fn absorbed(&self) -> bool {
@@ -33,10 +28,13 @@ impl Effect<FirstOrder> for GravitySag {
     }
 
     fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
+        let vertical = model.present().iter().any(|s| s.phi[1] != 0.0);
         vec![Column::from_places(model.places(), |_, place| {
             let u = place.x / model.travel();
             let sag = u * u * (6.0 - 4.0 * u + u * u) / 3.0;
-            model.channel(place).indicator_sign() * sag
+            // Downwards where an indicator sees it; across, no reversal sees it at all.
+            let [across, up] = model.seat(place).phi;
+            if vertical { -up * sag } else { across * sag }
         })]
     }
 }

@@ -10,11 +10,11 @@ use std::ops::Range;
 use nalgebra::DVector;
 
 use super::FirstOrder;
-use super::indicators::{BOTH, others, scopes, signs, sizes, words};
+use super::indicators::{ALL, Indicators};
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file. Variants: the indicators.
-pub(super) struct Hysteresis;
+pub(super) struct Hysteresis(pub Indicators);
 
 /// A pointer moves where its slope is at least this part of the other direction's.
 const MOVING: f64 = 0.5;
@@ -37,35 +37,33 @@ impl Effect<FirstOrder> for Hysteresis {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        self.amplitudes_at(&Shape::variant(BOTH))
+        self.amplitudes_at(&Shape::variant(ALL))
     }
 
     fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
         let width = Parameter::between("width", "um", 0.0, 50.0);
-        sizes(shape.variant, ["width", "near-width", "far-width"], &width)
+        self.0.sizes(shape.variant, &width, "width")
     }
 
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
         let span = model.reading_span();
-        let of = |scope: &usize| {
-            let scope = *scope;
+        let of = |scope: usize| {
             let parts = [1e-3, 1e-2, 3e-2, 1e-1].into_iter();
-            parts.map(move |part| started(model, scope, &[part * span, part * span]))
+            parts.map(move |part| self.started(model, scope, &|_| part * span))
         };
-        scopes(model).iter().flat_map(of).collect()
+        self.0.scopes().flat_map(of).collect()
     }
 
     fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
-        let count = signs(shape.variant).len();
+        let count = self.0.of(shape.variant).len();
         let (widths, beginnings) = shape.values.split_at(count.min(shape.values.len()));
         let other = |variant: usize| {
-            let near_far = match widths {
-                [near, far] => [*near, *far],
-                [one] => [*one, *one],
-                _ => [0.0, 0.0],
+            let width = |indicator: usize| match widths {
+                [one] => *one,
+                each => each.get(indicator).copied().unwrap_or(0.0),
             };
-            let mut other = started(model, variant, &near_far);
-            let from = signs(variant).len();
+            let mut other = self.started(model, variant, &width);
+            let from = self.0.of(variant).len();
             // Where its own pointers stand is known already.
             let own = |k: usize| shape.steps.get(count + k).is_some_and(|s| *s != 0.0);
             for (k, begins) in beginnings.iter().enumerate().filter(|(k, _)| own(*k)) {
@@ -75,25 +73,26 @@ impl Effect<FirstOrder> for Hysteresis {
             }
             other
         };
-        others(model, shape.variant).map(other).collect()
+        self.0.others(shape.variant).map(other).collect()
     }
 
     fn allowed(&self, _model: &FirstOrder, shape: &Shape) -> bool {
-        let beginnings = shape.values.iter().skip(signs(shape.variant).len());
+        let beginnings = shape.values.iter().skip(self.0.of(shape.variant).len());
         beginnings.into_iter().all(|v| (-1.0..=1.0).contains(v))
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
-        let signs = signs(shape.variant);
-        if shape.values.len() < signs.len() {
+        let own = self.0.of(shape.variant);
+        if shape.values.len() < own.len() {
             return Vec::new();
         }
-        let of = |(sign, width): (&f64, &f64)| lag(model, shape, *sign, *width);
-        signs.iter().zip(&shape.values).map(of).collect()
+        let first = own.len();
+        let of = |(indicator, width): (usize, &f64)| lag(model, shape, first, indicator, *width);
+        own.zip(&shape.values).map(of).collect()
     }
 
     fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
-        Some(words(shape.variant).to_owned())
+        Some(self.0.words(shape.variant))
     }
 
     /// Where the stylus turns round within the play the pointer stands still and tells nothing of
@@ -151,41 +150,40 @@ impl Effect<FirstOrder> for Hysteresis {
     }
 }
 
-/// The start of a search: widths of the near and the far indicator, as far as the variant has them,
-/// then the beginnings. The play is taken up in the direction in which a trace begins, as the slide
-/// comes from before its first position; where the form is level there, the search finds the side.
-fn started(model: &FirstOrder, variant: usize, near_far: &[f64; 2]) -> Shape {
-    let signs = signs(variant);
-    let mut values: Vec<f64> = signs
-        .iter()
-        .map(|sign| near_far[usize::from(*sign < 0.0)])
-        .collect();
-    let mut steps = vec![0.0; values.len()];
-    let mut beginnings = vec![(0.0, 0.0); 2 * model.present().len()];
-    for trace in model.traces() {
-        let place = &model.places()[first_of(model, trace)];
-        if signs.contains(&model.channel(place).indicator_sign()) {
-            let begins = -(place.direction * model.reading_slope(place)).signum();
-            beginnings[beginning_of(model, trace)] = (begins, 1.0);
+impl Hysteresis {
+    /// The start of a search: widths of the indicators that the variant has, then the beginnings. The play
+    /// is taken up in the direction in which a trace begins, as the slide comes from before its first
+    /// position; where the form is level there, the search finds the side.
+    fn started(&self, model: &FirstOrder, variant: usize, width: &dyn Fn(usize) -> f64) -> Shape {
+        let own = self.0.of(variant);
+        let mut values: Vec<f64> = own.clone().map(width).collect();
+        let mut steps = vec![0.0; values.len()];
+        let mut beginnings = vec![(0.0, 0.0); 2 * model.present().len()];
+        for trace in model.traces() {
+            let place = &model.places()[first_of(model, trace)];
+            if own.contains(&model.seat(place).indicator) {
+                let begins = -(place.direction * model.reading_slope(place)).signum();
+                beginnings[beginning_of(model, trace)] = (begins, 1.0);
+            }
         }
-    }
-    values.extend(beginnings.iter().map(|b| b.0));
-    steps.extend(beginnings.iter().map(|b| b.1));
-    Shape {
-        variant,
-        values,
-        steps,
+        values.extend(beginnings.iter().map(|b| b.0));
+        steps.extend(beginnings.iter().map(|b| b.1));
+        Shape {
+            variant,
+            values,
+            steps,
+        }
     }
 }
 
-/// How far the pointers of one indicator are behind, per unit of its play.
-fn lag(model: &FirstOrder, shape: &Shape, sign: f64, width: f64) -> Column {
+/// How far the pointers of one indicator are behind, per unit of its play; `first`: where the
+/// beginnings stand in the shape.
+fn lag(model: &FirstOrder, shape: &Shape, first: usize, indicator: usize, width: f64) -> Column {
     let half = 0.5 * width.max(1e-6 * model.reading_span());
     let places = model.places();
-    let first = signs(shape.variant).len();
     let mut column = Column::default();
     for trace in model.traces() {
-        if model.channel(&places[trace.start]).indicator_sign() != sign {
+        if model.seat(&places[trace.start]).indicator != indicator {
             continue;
         }
         let begins = shape

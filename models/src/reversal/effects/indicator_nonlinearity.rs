@@ -6,12 +6,12 @@
 //! Free: a deviation for each indicator and power.
 
 use super::FirstOrder;
-use super::indicators::{SCOPES, apart, scopes, sizes, words};
+use super::indicators::Indicators;
 use crate::model::{About, Column, Effect, Link, Parameter, Shape};
 
-/// See the head of the file. Variants: the indicators, quadratic, from [`SCOPES`] on cubic, and from
-/// twice that on both.
-pub(super) struct IndicatorNonlinearity;
+/// See the head of the file. Variants: the indicators, quadratic, beyond the scopes cubic, and beyond
+/// twice as many both.
+pub(super) struct IndicatorNonlinearity(pub Indicators);
 
 /// Powers of the reading, by the kind of a variant.
 const KINDS: [&[i32]; 3] = [&[2], &[3], &[2, 3]];
@@ -42,36 +42,26 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
 
     fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
         let deviation = Parameter::symmetric("deviation", "um", 200.0);
-        let of = |names| sizes(shape.variant, names, &deviation);
-        if powers(shape).len() == 1 {
-            return of(["deviation", "near-deviation", "far-deviation"]);
+        let of = |name| self.0.sizes(shape.variant, &deviation, name);
+        if self.powers(shape).len() == 1 {
+            return of("deviation");
         }
-        let square = of([
-            "deviation-of-square",
-            "near-deviation-of-square",
-            "far-deviation-of-square",
-        ]);
-        let cube = of([
-            "deviation-of-cube",
-            "near-deviation-of-cube",
-            "far-deviation-of-cube",
-        ]);
-        [square, cube].concat()
+        [of("deviation-of-square"), of("deviation-of-cube")].concat()
     }
 
-    fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
-        let kinds = [0, SCOPES].into_iter();
+    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+        let kinds = [0, self.0.scope_count()].into_iter();
         kinds
             .flat_map(|kind| {
-                scopes(model)
-                    .iter()
-                    .map(move |scope| Shape::variant(kind + scope))
+                let scopes = self.0.scopes();
+                scopes.map(move |scope| Shape::variant(kind + scope))
             })
             .collect()
     }
 
     fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
-        let mixed = scopes(model).iter().map(|s| Shape::variant(2 * SCOPES + s));
+        let kind = 2 * self.0.scope_count();
+        let mixed = self.0.scopes().map(|s| Shape::variant(kind + s));
         let mut all = self.grid(model);
         all.extend(mixed);
         all.retain(|other| other.variant != shape.variant);
@@ -82,17 +72,18 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
         let reach = model.reading_reach();
         let bend = |power: &i32| {
             let bend = model.of_reading(|reading| (reading / reach).powi(*power));
-            apart(model, shape.variant, &bend)
+            self.0.apart(model, shape.variant, &bend)
         };
-        powers(shape).iter().flat_map(bend).collect()
+        self.powers(shape).iter().flat_map(bend).collect()
     }
 
     /// The reading rises with what the indicator sees: 1 + Σ p aₚ qᵖ⁻¹/R > 0 for q from −1 to 1.
     fn possible(&self, model: &FirstOrder, shape: &Shape, amplitudes: &[f64]) -> bool {
         let reach = model.reading_reach();
-        let count = amplitudes.len() / powers(shape).len();
+        let count = amplitudes.len() / self.powers(shape).len();
         (0..count).all(|own| {
-            let terms = powers(shape)
+            let terms = self
+                .powers(shape)
                 .iter()
                 .zip(amplitudes[own..].iter().step_by(count));
             let (mut square, mut cube) = (0.0, 0.0);
@@ -119,8 +110,9 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
         amplitudes: &[f64],
     ) -> (Shape, Vec<f64>) {
         let grown = to.reading_reach() / from.reading_reach();
-        let count = amplitudes.len() / powers(shape).len();
-        let powers = powers(shape)
+        let count = amplitudes.len() / self.powers(shape).len();
+        let powers = self
+            .powers(shape)
             .iter()
             .flat_map(|p| std::iter::repeat_n(*p, count));
         let carried = amplitudes
@@ -131,15 +123,17 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
     }
 
     fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
-        let kind = match powers(shape) {
+        let kind = match self.powers(shape) {
             [2] => "quadratic",
             [3] => "cubic",
             _ => MIXED,
         };
-        Some(format!("{kind}, {}", words(shape.variant)))
+        Some(format!("{kind}, {}", self.0.words(shape.variant)))
     }
 }
 
-fn powers(shape: &Shape) -> &'static [i32] {
-    KINDS[(shape.variant / SCOPES).min(KINDS.len() - 1)]
+impl IndicatorNonlinearity {
+    fn powers(&self, shape: &Shape) -> &'static [i32] {
+        KINDS[(shape.variant / self.0.scope_count()).min(KINDS.len() - 1)]
+    }
 }

@@ -1,7 +1,8 @@
 //! What the first-order reversal model leaves out: one file an effect.
 //!
-//! To add an effect, write its file and add it to [`all`]; the tests that inject every effect
-//! blind find it there.
+//! Effects are told by the angles of indicators, spindle and sides: one catalogue serves the four
+//! channels and any design. To add an effect, write its file and add it to [`all`]; the tests that
+//! inject every effect blind find it there.
 
 mod ambient_cycle;
 mod axis_backlash;
@@ -16,6 +17,7 @@ mod indicators;
 mod lateral_backlash;
 mod local_contamination;
 mod off_crest;
+mod oval_cone;
 mod reversal_shift;
 mod stick_slip;
 mod taper;
@@ -26,33 +28,39 @@ mod zero_jump;
 
 use nalgebra::DMatrix;
 
-use super::diagnosable::FirstOrder;
+use super::diagnosable::{Arrangement, FirstOrder};
 use super::simultaneous;
-use crate::model::{Effect, Estimate, Parameter, Shape};
+use crate::model::{Effect, Shape};
+use indicators::Indicators;
 
-/// The catalogue.
-pub fn all() -> Vec<Box<dyn Effect<FirstOrder>>> {
-    vec![
-        Box::new(ambient_cycle::AmbientCycle),
+/// The catalogue for readings of these channels.
+pub fn all(channels: &Arrangement) -> Vec<Box<dyn Effect<FirstOrder>>> {
+    let indicators = || Indicators::new(channels);
+    let mut effects: Vec<Box<dyn Effect<FirstOrder>>> = vec![
+        Box::new(ambient_cycle::AmbientCycle(indicators())),
         Box::new(axis_backlash::AxisBacklash),
         Box::new(common_gain::CommonGain),
-        Box::new(cyclic_error::CyclicError),
-        Box::new(gain_mismatch::GainMismatch),
+        Box::new(cyclic_error::CyclicError::new(channels)),
+        Box::new(gain_mismatch::GainMismatch(indicators())),
         Box::new(gravity_sag::GravitySag),
-        Box::new(hysteresis::Hysteresis),
-        Box::new(indexing_error::IndexingError),
-        Box::new(indicator_nonlinearity::IndicatorNonlinearity),
-        Box::new(lateral_backlash::LateralBacklash),
-        Box::new(local_contamination::LocalContamination),
-        Box::new(off_crest::OffCrest),
-        Box::new(reversal_shift::ReversalShift),
+        Box::new(hysteresis::Hysteresis(indicators())),
+        Box::new(indexing_error::IndexingError::new(channels)),
+        Box::new(indicator_nonlinearity::IndicatorNonlinearity(indicators())),
+        Box::new(lateral_backlash::LateralBacklash::new(channels)),
+        Box::new(local_contamination::LocalContamination::new(channels)),
+        Box::new(off_crest::OffCrest::new(channels)),
+        Box::new(reversal_shift::ReversalShift::new(channels)),
         Box::new(stick_slip::StickSlip),
         Box::new(taper::Taper),
-        Box::new(thermal_drift::ThermalDrift),
+        Box::new(thermal_drift::ThermalDrift(indicators())),
         Box::new(thickness_shift::ThicknessShift),
         Box::new(tip_radius::TipRadius),
-        Box::new(zero_jump::ZeroJump),
-    ]
+        Box::new(zero_jump::ZeroJump(indicators())),
+    ];
+    if !channels.is_four() {
+        effects.push(Box::new(oval_cone::OvalCone::new(channels)));
+    }
+    effects
 }
 
 /// Whether `simultaneous::effects` has an effect too, in the variant that a diagnosis tells in words: a
@@ -99,52 +107,4 @@ fn spread(covariance: &DMatrix<f64>, weights: &[(usize, f64)]) -> f64 {
         .iter()
         .flat_map(|(i, w)| weights.iter().map(move |(j, v)| w * v * at(*i, *j)));
     terms.sum::<f64>().clamp(0.0, f64::INFINITY).sqrt()
-}
-
-/// The amplitudes of waves: a cosine and a sine for one indicator, or for each.
-fn rotations(waves: usize, reach: f64) -> Vec<Parameter> {
-    let names: &[&'static str] = if waves == 1 {
-        &["cosine", "sine"]
-    } else {
-        &["near-cosine", "near-sine", "far-cosine", "far-sine"]
-    };
-    let part = |name: &&'static str| Parameter::symmetric(name, "um", reach);
-    names.iter().map(part).collect()
-}
-
-/// What is told of waves: the amplitude of each, then the parameters of their shape.
-fn rotating(
-    waves: usize,
-    shape: &Shape,
-    amplitudes: &[f64],
-    covariance: &DMatrix<f64>,
-    parameters: &[Parameter],
-) -> Vec<Estimate> {
-    let names: &[&str] = if waves == 1 {
-        &["amplitude"]
-    } else {
-        &["near-amplitude", "far-amplitude"]
-    };
-    let pairs = amplitudes.chunks_exact(2).enumerate();
-    let mut told: Vec<Estimate> = pairs
-        .zip(names)
-        .map(|((k, pair), name)| {
-            let size = pair[0].hypot(pair[1]).max(f64::MIN_POSITIVE);
-            let along = [(2 * k, pair[0] / size), (2 * k + 1, pair[1] / size)];
-            Estimate {
-                name: (*name).to_owned(),
-                value: size,
-                std: spread(covariance, &along),
-                unit: "um".to_owned(),
-            }
-        })
-        .collect();
-    let shapes = shape.values.iter().zip(parameters).enumerate();
-    told.extend(shapes.map(|(k, (value, parameter))| Estimate {
-        name: parameter.name.to_owned(),
-        value: *value,
-        std: spread(covariance, &[(amplitudes.len() + k, 1.0)]),
-        unit: parameter.unit.to_owned(),
-    }));
-    told
 }

@@ -24,12 +24,7 @@ impl Effect<FirstOrder> for Taper {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "half-angle",
-            unit: "rad",
-            low: -0.1,
-            high: 0.1,
-        }]
+        vec![Parameter::between("half-angle", "rad", -0.1, 0.1)]
     }
 
     fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {

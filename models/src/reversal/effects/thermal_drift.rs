@@ -7,12 +7,12 @@
 
 use nalgebra::DMatrix;
 
-use super::indicators::{SCOPES, apart, scopes, signs, sizes};
+use super::indicators::{ALL, Indicators};
 use super::{FirstOrder, spread};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Parameter, Shape};
 
-/// See the head of the file. Variants: the indicators, and from [`SCOPES`] on two time constants.
-pub(super) struct ThermalDrift;
+/// See the head of the file. Variants: the indicators, and beyond the scopes two time constants.
+pub(super) struct ThermalDrift(pub Indicators);
 
 /// Two time constants are told apart from here on.
 const APART: f64 = 1.3;
@@ -31,13 +31,13 @@ impl Effect<FirstOrder> for ThermalDrift {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        let drift = Parameter::symmetric("drift", "um", 500.0);
-        sizes(0, ["drift", "near-drift", "far-drift"], &drift)
+        self.amplitudes_at(&Shape::variant(ALL))
     }
 
     fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
         let drift = Parameter::symmetric("drift", "um", 500.0);
-        sizes(shape.variant, ["drift", "near-drift", "far-drift"], &drift).repeat(stages(shape))
+        let one = self.0.sizes(shape.variant, &drift, "drift");
+        (0..self.stages(shape)).flat_map(|_| one.clone()).collect()
     }
 
     fn shape_parameters(&self) -> Vec<Parameter> {
@@ -48,7 +48,7 @@ impl Effect<FirstOrder> for ThermalDrift {
 
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
         let at = |part: f64| Shape {
-            variant: scopes(model)[0],
+            variant: self.0.fullest(),
             values: vec![(part * model.duration()).ln()],
             // Beyond twenty times the duration a drift is a straight line.
             steps: vec![if part > 5.0 { 0.0 } else { 0.2 }],
@@ -67,9 +67,15 @@ impl Effect<FirstOrder> for ThermalDrift {
         match *shape.values.as_slice() {
             [one] => {
                 let one = if shape.free() == 0 { one - 3.0 } else { one };
-                vec![with(shape.variant + SCOPES, vec![one - 0.7, one + 0.7])]
+                vec![with(
+                    shape.variant + self.0.scope_count(),
+                    vec![one - 0.7, one + 0.7],
+                )]
             }
-            [one, two] => vec![with(shape.variant % SCOPES, vec![0.5 * (one + two)])],
+            [one, two] => vec![with(
+                shape.variant % self.0.scope_count(),
+                vec![0.5 * (one + two)],
+            )],
             _ => Vec::new(),
         }
     }
@@ -83,7 +89,7 @@ impl Effect<FirstOrder> for ThermalDrift {
             let warming = Column::from_places(model.places(), |_, place| {
                 (-place.time / constant).exp_m1() / whole
             });
-            apart(model, shape.variant, &warming)
+            self.0.apart(model, shape.variant, &warming)
         };
         shape.values.iter().flat_map(stage).collect()
     }
@@ -98,7 +104,7 @@ impl Effect<FirstOrder> for ThermalDrift {
     fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
         let linear = shape.free() == 0;
         Some(
-            match (stages(shape), linear) {
+            match (self.stages(shape), linear) {
                 (2, _) => "two time constants",
                 (_, true) => "straight in time",
                 _ => "one time constant",
@@ -114,7 +120,7 @@ impl Effect<FirstOrder> for ThermalDrift {
         amplitudes: &[f64],
         covariance: &DMatrix<f64>,
     ) -> Vec<Estimate> {
-        let count = signs(shape.variant).len();
+        let count = self.0.of(shape.variant).len();
         let estimate = |name: &str, value: f64, std: f64, unit: &str| Estimate {
             name: name.to_owned(),
             value,
@@ -130,19 +136,21 @@ impl Effect<FirstOrder> for ThermalDrift {
                     .map(|k| (k, 1.0))
                     .collect();
                 let whole = parts.iter().map(|(k, _)| amplitudes[*k]).sum();
-                estimate(parameter.name, whole, spread(covariance, &parts), "um")
+                estimate(&parameter.name, whole, spread(covariance, &parts), "um")
             })
             .collect();
         let constants = shape.values.iter().zip(self.shape_parameters()).enumerate();
         told.extend(constants.map(|(k, (value, parameter))| {
             let std = spread(covariance, &[(amplitudes.len() + k, 1.0)]);
-            estimate(parameter.name, *value, std, parameter.unit)
+            estimate(&parameter.name, *value, std, parameter.unit)
         }));
         told
     }
 }
 
-/// Number of time constants.
-fn stages(shape: &Shape) -> usize {
-    1 + shape.variant / SCOPES
+impl ThermalDrift {
+    /// Number of time constants.
+    fn stages(&self, shape: &Shape) -> usize {
+        1 + shape.variant / self.0.scope_count()
+    }
 }

@@ -24,12 +24,7 @@ impl Effect<FirstOrder> for ThicknessShift {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "thickness",
-            unit: "mm",
-            low: 0.0,
-            high: 500.0,
-        }]
+        vec![Parameter::between("thickness", "mm", 0.0, 500.0)]
     }
 
     fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
@@ -43,7 +38,7 @@ impl Effect<FirstOrder> for ThicknessShift {
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let thickness = shape.values.first().copied().unwrap_or(0.0);
         let change = |k: usize, place: &Place| {
-            let per_mm = 0.5 * model.tilt(model.channel(place));
+            let per_mm = 0.5 * model.tilt(place);
             per_mm * model.probed_chord(k, per_mm * thickness)
         };
         vec![if model.lies_beneath() {

@@ -20,12 +20,7 @@ impl Effect<FirstOrder> for TipRadius {
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "radius",
-            unit: "mm",
-            low: 0.0,
-            high: 50.0,
-        }]
+        vec![Parameter::between("radius", "mm", 0.0, 50.0)]
     }
 
     fn absorbed(&self) -> bool {

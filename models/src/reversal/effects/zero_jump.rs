@@ -3,13 +3,16 @@
 //! It stays in every trace that the indicator reads from then on, in both spindle positions; or,
 //! where the indicator is set to zero anew when the spindle is turned, in the channel being read. If
 //! all traces of the first spindle position are taken before those of the second, the two are the
-//! same: the zero of a whole channel is free. Free: the jump, its time, the indicator or channel.
+//! same: the zero of a whole channel is free; where zeros are kept it lasts in any case. Free: the jump,
+//! its time, the indicator or channel.
 
 use super::FirstOrder;
+use super::indicators::Indicators;
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+use crate::reversal::designs::Zero;
 
-/// See the head of the file. Variants: the channel, then the near and the far indicator.
-pub(super) struct ZeroJump;
+/// See the head of the file. Variants: the channels, then the indicators.
+pub(super) struct ZeroJump(pub Indicators);
 
 /// Readings between neighbouring starts of the search.
 const STRIDE: usize = 8;
@@ -38,17 +41,12 @@ impl Effect<FirstOrder> for ZeroJump {
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
         let mut shapes = Vec::new();
         let channels = model.present().len();
-        for variant in 0..channels + 2 {
+        for variant in 0..channels + self.0.count() {
             if variant >= channels && !alternating(model, variant) {
                 continue;
             }
             let times = times_of(model, variant);
-            // An indicator reads two channels.
-            let stride = if variant < channels {
-                STRIDE
-            } else {
-                2 * STRIDE
-            };
+            let stride = STRIDE * read_channels(model, variant).count();
             for (k, pair) in times.windows(2).enumerate().step_by(stride) {
                 let next = times[(k + stride).min(times.len() - 1)];
                 shapes.push(Shape {
@@ -98,9 +96,8 @@ impl Effect<FirstOrder> for ZeroJump {
     fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
         let channels = model.present();
         Some(match channels.get(shape.variant) {
-            Some(channel) => format!("channel {}", channel.name()),
-            None if shape.variant == channels.len() => "near indicator".to_owned(),
-            None => "far indicator".to_owned(),
+            Some(channel) => format!("channel {}", channel.name),
+            None => format!("{} indicator", self.0.name(shape.variant - channels.len())),
         })
     }
 }
@@ -111,20 +108,28 @@ fn read_by(model: &FirstOrder, variant: usize, channel: usize) -> bool {
     if variant < channels.len() {
         return channel == variant;
     }
-    let sign = if variant == channels.len() { 1.0 } else { -1.0 };
-    channels[channel].indicator_sign() == sign
+    channels[channel].indicator == variant - channels.len()
 }
 
-/// Whether an indicator goes back to a spindle position after it has read in the other.
+/// The channels of a variant.
+fn read_channels(model: &FirstOrder, variant: usize) -> impl Iterator<Item = usize> {
+    let all = 0..model.present().len();
+    all.filter(move |channel| read_by(model, variant, *channel))
+}
+
+/// Whether a jump of an indicator is another than one of a channel: it goes back to a spindle position
+/// after it has read in another, or zeros are kept.
 fn alternating(model: &FirstOrder, variant: usize) -> bool {
-    let ranges: Vec<(f64, f64)> = (0..model.present().len())
-        .filter(|channel| read_by(model, variant, *channel))
+    let ranges: Vec<(f64, f64)> = read_channels(model, variant)
         .filter_map(|channel| {
             let times = times_of(model, channel);
             Some((*times.first()?, *times.last()?))
         })
         .collect();
-    matches!(ranges.as_slice(), [one, two] if one.0 < two.1 && two.0 < one.1)
+    let meet = |one: &(f64, f64), two: &(f64, f64)| one.0 < two.1 && two.0 < one.1;
+    let mut pairs = (0..ranges.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
+    let kept = model.arrangement().zero() == Zero::Kept && ranges.len() > 1;
+    kept || pairs.any(|(a, b)| meet(&ranges[a], &ranges[b]))
 }
 
 /// The times of a variant's readings, in order.

@@ -400,3 +400,34 @@ fn endings_are_told() {
         "{many}"
     );
 }
+
+#[test]
+fn a_prediction_and_its_residual_make_the_reading() {
+    let (made, _) = simulate(&DesignPlan {
+        design: Design::parse("0/0,90/0,120/0,0/180,90/180,120/180").unwrap(),
+        slopes_rad: [2e-3, -1e-3, 3e-3, 1e-3, 5e-4, 0.0, 0.0],
+        kept_um: None,
+        thickness_mm: 40.0,
+        length_mm: 200.0,
+        positions: 31,
+        repeats: 1,
+        noise_um: 0.1,
+        forms_um: [2.0, 1.0],
+        seed: 5,
+    })
+    .unwrap();
+    let options = DesignOptions {
+        thickness_mm: 40.0,
+        ..DesignOptions::default()
+    };
+    let found = fit(&made, &options).unwrap();
+    for (reading, residual) in made.readings.iter().zip(&found.residuals) {
+        let predicted = found.predict(reading.channel, reading.x).unwrap();
+        // ε·κ: readings of 1e3 µm, the point of contact by two ways of finding it.
+        assert!(
+            (predicted + residual - reading.value).abs() < 1e-8,
+            "{reading:?}: {predicted} {residual}"
+        );
+    }
+    assert!(found.predict(6, 0.0).is_err());
+}

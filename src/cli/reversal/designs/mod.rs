@@ -12,11 +12,14 @@ use errsep_models::reversal::simultaneous::{KnotVerdict, Knots};
 use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
 
 use super::Args;
+use super::diagnosed::Diagnosed;
 use super::refusal::OTHER_UNITS;
 use crate::cli::Answer;
+use crate::cli::diagnose::joined::Given;
+use crate::cli::diagnose::reversal::design_with;
 use crate::cli::quantity::COVERAGE;
-use crate::io::reversal::{DesignData, ReversalSetup};
-use crate::io::{CsvTable, Message, Status};
+use crate::io::reversal::{DesignData, ReversalSetup, corrected_design};
+use crate::io::{CsvTable, Message, OutFile, Status};
 use crate::report::number;
 
 /// More positions than this of a form are not seen apart.
@@ -38,19 +41,18 @@ struct Outcome<'a> {
 ///
 /// # Errors
 /// What these options cannot do here, or readings that determine no answer.
-pub fn answer(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<Answer, Message> {
-    let asked = [
-        (!args.with.is_empty(), "--with"),
-        (args.diagnose, "--diagnose"),
-        (args.corrected.is_some(), "--corrected"),
-        (setup.fit_thickness, "fit_thickness"),
-    ];
-    if let Some((_, option)) = asked.iter().find(|a| a.0) {
-        return Err(Message::bad_input(format!(
-            "{option} is for the channels 1A, 1B, 2A, 2B alone"
-        ))
-        .in_file(&args.data)
-        .remedy("leave it out, or give those four channels without other angles"));
+pub fn answer(
+    args: &Args,
+    setup: &ReversalSetup,
+    data: &DesignData,
+    corrected: Option<OutFile>,
+) -> Result<Answer, Message> {
+    if setup.fit_thickness {
+        return Err(
+            Message::bad_input("fit_thickness is for the channels 1A, 1B, 2A, 2B alone")
+                .in_file(&args.data)
+                .remedy("leave it out, or give those four channels without other angles"),
+        );
     }
     let options = DesignOptions {
         zero: setup.zero,
@@ -70,7 +72,7 @@ pub fn answer(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<A
     };
     let mut inputs = vec![args.data.clone()];
     inputs.extend(args.setup.clone());
-    Ok(Answer {
+    let answer = Answer {
         text: text::text(&args.data, &outcome)?,
         json: json::json(&outcome)?,
         page: page::page(&args.data, setup, &outcome)?,
@@ -79,7 +81,51 @@ pub fn answer(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<A
         setup: None,
         seed: None,
         status: Status::Done,
-    })
+    };
+    let fit = &outcome.fit;
+    if args.diagnose {
+        let seed = args.common.seed;
+        return Diagnosed::of_design(&args.data, data, setup, fit, seed)?
+            .beside(answer, &args.common);
+    }
+    if args.with.is_empty() {
+        return Ok(answer);
+    }
+    let given = Given {
+        setup: args.setup.as_deref(),
+        columns: args.columns.as_ref(),
+        ..Given::to("reversal", &args.data, &args.with, &args.common)
+    };
+    let (answer, changes) = design_with(answer, &given, setup, data, fit)?;
+    if let Some(file) = corrected {
+        write_corrected(args, setup, data, changes.as_deref(), file)?;
+    }
+    Ok(answer)
+}
+
+/// Writes the readings less what the effects change in them.
+fn write_corrected(
+    args: &Args,
+    setup: &ReversalSetup,
+    data: &DesignData,
+    changes: Option<&[f64]>,
+    file: OutFile,
+) -> Result<(), Message> {
+    let Some(changes) = changes else {
+        return Err(Message::not_determined(
+            "the traces have positions of their own: what the effects change is known at common places, \
+             not reading by reading",
+        )
+        .in_file(&args.data)
+        .remedy("leave --corrected out, or read all channels at the same positions"));
+    };
+    let comment = format!(
+        "readings of {} less what {} changes in them by the fit of these same readings: no independent evidence",
+        args.data.display().to_string().replace(['\n', '\r'], " "),
+        args.with.join(" and ")
+    );
+    let content = corrected_design(&args.data, &setup.columns, data.dialect, changes, &comment)?;
+    file.write(&content)
 }
 
 impl Outcome<'_> {

@@ -1,4 +1,8 @@
-//! `errsep plan`: what a reversal could show of every effect, before any reading is taken.
+//! `errsep plan`: what a reversal could show of every effect, before any reading is taken; and designs
+//! of it side by side.
+
+mod compared;
+mod designs;
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -33,6 +37,20 @@ The set-up says what is planned and what is expected:
     both_directions = false
     tilts = [50.0, 0.0, 20.0]   # alpha, beta, gamma expected, urad
     forms = [1.0, 1.0]          # slide, artefact expected, um RMS
+
+Designs of other angles are compared with each other, each as indicator/spindle in degrees:
+
+    wanted = [\"alpha_h\", \"alpha_v\", \"M_h\", \"S\"]
+    seconds_a_trace = 60.0      # one trace in one direction
+    seconds_a_turn = 30.0       # turning the spindle
+    seconds_an_indicator = 300.0
+    indicators = 2              # that read at once
+    [[design]]
+    name = \"near and far\"
+    channels = \"0/0,180/0,0/180,180/180\"
+    [[design]]
+    name = \"one indicator, every 90 degrees\"
+    channels = \"0/0,0/90,0/180,0/270\"
 
 Example: errsep plan plan.toml --out plan")]
 pub struct Args {
@@ -156,7 +174,11 @@ const DRAWS: usize = 400;
 /// # Errors
 /// The set-up is bad, or the plan leaves nothing over to diagnose.
 pub fn run(args: &Args) -> Result<Answer, Message> {
-    let planned = Planned::read(&SetupFile::read(&args.plan)?)?;
+    let setup = SetupFile::read(&args.plan)?;
+    if compared::is_asked(&setup)? {
+        return compared::run(args, &setup);
+    }
+    let planned = Planned::read(&setup)?;
     let rows = certified(&planned, args.common.seed).map_err(|m| m.in_file(&args.plan))?;
     let extras = extras(&planned)
         .into_iter()

@@ -12,17 +12,22 @@
 //! Coefficients of both splines stand in the order in which the run comes to them, so that a row sees
 //! neighbours only, whatever the number of cells of either.
 
+mod frame;
+mod order;
+mod tasks;
+
 use std::ops::Range;
 
-use errsep_solvers::linear::banded::Tall;
-use errsep_solvers::linear::bordered::{Constraints, Share};
-use errsep_solvers::problem::NoValue;
-use errsep_solvers::structured::{Parameters, Sink, StructuredProblem};
+pub use frame::Frame;
+use order::{in_order, values_in};
+
+use errsep_solvers::linear::bordered::Constraints;
+use errsep_solvers::structured::{Parameters, StructuredProblem};
 
 use super::error::TurningError;
 use super::run::Run;
 use super::setting::{Along, Setting, Wave};
-use crate::basis::bspline::{CubicBSpline, horner};
+use crate::basis::bspline::CubicBSpline;
 
 /// Places of the unknowns in the border; those of the harmonics follow.
 pub const THETA: usize = 0;
@@ -44,61 +49,6 @@ pub struct Held {
     pub across: bool,
     /// The speed is that of the base.
     pub speed: bool,
-}
-
-/// Where the axes of a run have their zeros, and the angle from which the turn is counted.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
-    /// x_r, mm: where e lies along side 0.
-    pub reference_mm: f64,
-    /// Half the travel, mm.
-    pub half_mm: f64,
-    /// Middle of the times.
-    pub middle: f64,
-    /// Half their range.
-    pub half_time: f64,
-    /// θ_b of every reading, rad.
-    pub base: Vec<f64>,
-    /// Least and greatest position, mm: the ends of the form.
-    pub range: (f64, f64),
-    /// First and last time: the ends of the turn.
-    pub times: (f64, f64),
-}
-
-impl Frame {
-    /// The frame of a run whose base angle is known.
-    pub fn new(run: &Run, base: Vec<f64>, reference_mm: f64) -> Self {
-        let ((first, last), (low, high)) = (run.times(), run.range());
-        Self {
-            reference_mm,
-            half_mm: 0.5 * (high - low),
-            middle: f64::midpoint(first, last),
-            half_time: 0.5 * (last - first),
-            base,
-            range: (low, high),
-            times: (first, last),
-        }
-    }
-
-    /// The frame of the readings of which `keep` says so.
-    #[must_use]
-    pub fn part(&self, keep: impl Fn(usize) -> bool) -> Self {
-        let kept = self.base.iter().enumerate().filter(|(i, _)| keep(*i));
-        Self {
-            base: kept.map(|(_, b)| *b).collect(),
-            ..self.clone()
-        }
-    }
-
-    /// ξ of a position.
-    pub fn xi(&self, x: f64) -> f64 {
-        (x - self.reference_mm) / self.half_mm
-    }
-
-    /// τ of a time.
-    pub fn tau(&self, time: f64) -> f64 {
-        (time - self.middle) / self.half_time
-    }
 }
 
 /// Readings that see the same coefficients.
@@ -407,151 +357,3 @@ impl<'a> TurningProblem<'a> {
 
 /// Fewest readings beyond the unknowns.
 const FEWEST_FREE: usize = 20;
-
-/// The four values of a basis in a cell.
-fn values_in(basis: &CubicBSpline, cell: usize, at: f64) -> [f64; 4] {
-    let (left, width) = basis.cell(cell);
-    let t = (at - left) / width;
-    basis.polynomials(cell).map(|p| horner(&p, t))
-}
-
-/// Numbers the coefficients in the order in which the run comes to them.
-fn in_order(
-    run: &Run,
-    setting: &Setting,
-    form: &CubicBSpline,
-    wave: Option<&CubicBSpline>,
-    splines: usize,
-) -> (Vec<usize>, Vec<Vec<usize>>) {
-    // The values of the line t → t at the coefficients are their places.
-    let reached = |place: f64, over_x: bool| {
-        if over_x {
-            let towards = run.direction * place;
-            run.x.partition_point(|x| run.direction * x < towards)
-        } else {
-            run.time.partition_point(|t| *t < place)
-        }
-    };
-    let over_x = matches!(setting.wave, Wave::Bent { .. });
-    let mut all: Vec<(usize, usize, usize)> = Vec::new();
-    for (k, place) in form.line(0.0, 1.0).into_iter().enumerate() {
-        all.push((reached(place, true), 0, k));
-    }
-    for which in 0..splines {
-        let places = wave.map(|basis| basis.line(0.0, 1.0)).unwrap_or_default();
-        for (k, place) in places.into_iter().enumerate() {
-            all.push((reached(place, over_x), 1 + which, k));
-        }
-    }
-    // Of coefficients at one reading those of a spline stay in the order of the run.
-    all.sort_by_key(|(at, spline, k)| {
-        let falls = run.direction < 0.0 && (*spline == 0 || over_x);
-        (*at, if falls { usize::MAX - *k } else { *k }, *spline)
-    });
-    let mut form_unknowns = vec![0; form.coefficient_count()];
-    let mut wave_unknowns = vec![vec![0; wave.map_or(0, CubicBSpline::coefficient_count)]; splines];
-    for (unknown, (_, spline, k)) in all.into_iter().enumerate() {
-        match spline {
-            0 => form_unknowns[k] = unknown,
-            s => wave_unknowns[s - 1][k] = unknown,
-        }
-    }
-    (form_unknowns, wave_unknowns)
-}
-
-impl StructuredProblem for TurningProblem<'_> {
-    type Prepared = Parameters;
-
-    fn band_count(&self) -> usize {
-        self.form_unknowns.len() + self.wave_unknowns.iter().map(Vec::len).sum::<usize>()
-    }
-
-    fn border_count(&self) -> usize {
-        self.held.len()
-    }
-
-    fn constraints(&self) -> &Constraints {
-        &self.constraints
-    }
-
-    fn held(&self) -> &[bool] {
-        &self.held
-    }
-
-    fn prepare(&self, at: &Parameters) -> Result<Parameters, NoValue> {
-        if at.band.iter().chain(&at.border).all(|v| v.is_finite()) {
-            Ok(at.clone())
-        } else {
-            Err(NoValue::new("an unknown is not finite"))
-        }
-    }
-
-    fn band_width(&self, _: &Parameters) -> usize {
-        self.width
-    }
-
-    fn task_count(&self, _: &Parameters) -> usize {
-        self.pieces.len()
-    }
-
-    fn task(&self, at: &Parameters, index: usize, sink: &mut Sink) -> Result<(), NoValue> {
-        let piece = &self.pieces[index];
-        let columns = self.columns();
-        let band = piece.band.len();
-        let mut row = vec![0.0; columns];
-        sink.open(columns);
-        let mut first = piece.readings.start;
-        while first < piece.readings.end {
-            let last = piece.readings.end.min(first + Tall::CAPACITY);
-            let batch = sink.batch(last - first);
-            for i in first..last {
-                self.local(i, piece, at, &mut row);
-                for (column, (_, l)) in piece.band.iter().enumerate() {
-                    batch.column_mut(column)[i - first] = row[*l];
-                }
-                for column in band..columns {
-                    batch.column_mut(column)[i - first] = row[column];
-                }
-            }
-            sink.push();
-            first = last;
-        }
-        let shares = self.free.iter().enumerate().map(|(l, j)| Share {
-            column: (band + l) as u32,
-            unknown: *j as u32,
-            weight: 1.0,
-        });
-        sink.close(
-            piece.band.iter().map(|(j, _)| Some(*j)).collect(),
-            shares.collect(),
-            0,
-        );
-        Ok(())
-    }
-
-    fn border_name(&self, index: usize) -> String {
-        match index {
-            THETA => "angle of the spindle".to_owned(),
-            SPEED => "speed of the spindle".to_owned(),
-            ECCENTRICITY => "eccentricity".to_owned(),
-            ALONG_E => "gamma along the eccentricity".to_owned(),
-            ACROSS_E => "gamma across the eccentricity".to_owned(),
-            other => {
-                let per = self.setting.per_harmonic();
-                let h = (other - HARMONICS) / per;
-                format!(
-                    "harmonic {} of the section",
-                    self.setting.harmonics.get(h).copied().unwrap_or(0)
-                )
-            }
-        }
-    }
-
-    fn band_name(&self, index: usize) -> String {
-        if self.form_unknowns.contains(&index) {
-            "the form along the slide".to_owned()
-        } else {
-            "the turn of the spindle".to_owned()
-        }
-    }
-}

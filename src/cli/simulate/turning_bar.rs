@@ -10,7 +10,7 @@ use crate::cli::{Answer, CommonArgs};
 use crate::io::{CsvTable, Message};
 
 /// Microradians in a radian, as the options are given.
-const URAD: f64 = 1e-6;
+const URAD_PER_RAD: f64 = 1e6;
 
 /// A bar that turns in the spindle while the slide feeds, one indicator against it.
 #[derive(Debug, clap::Args)]
@@ -113,9 +113,9 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         readings: args.readings,
         turns: args.turns,
         rpm: args.rpm,
-        slope_rad: URAD * args.slope,
+        slope_rad: args.slope / URAD_PER_RAD,
         eccentricity_um: args.eccentricity,
-        gamma_rad: [URAD * along, URAD * across],
+        gamma_rad: [along / URAD_PER_RAD, across / URAD_PER_RAD],
         oval_um: args.oval,
         form_um: args.form,
         stray_rad: args.stray.to_radians(),

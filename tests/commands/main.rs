@@ -16,6 +16,7 @@ mod fourier;
 mod machine;
 mod measured_reversals;
 mod parts_of_nistir;
+mod plan_of_designs;
 mod positioning;
 mod report;
 mod reversal;

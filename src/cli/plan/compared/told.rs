@@ -135,7 +135,7 @@ fn open(p: &Promise) -> Vec<String> {
 }
 
 pub(super) fn text(promises: &[Promise], told: &[ToldApart]) -> String {
-    let mut text = String::new();
+    let mut text = format!("{}\n\n", sentence(promises));
     for (k, p) in promises.iter().enumerate() {
         let _ = writeln!(text, "{}  {}: {}", letter(k), p.name, described(p));
         for line in open(p) {
@@ -293,42 +293,61 @@ pub(super) fn page(args: &Args, promises: &[Promise], told: &[ToldApart]) -> Pag
 /// Uncertainties within this share of the smallest are the same to people: the quicker design counts.
 const AS_GOOD: f64 = 1.01;
 
-/// Which design knows the first quantity best, and which is quickest.
+/// Which designs determine most of what is wanted, which of them knows the first of it best, and which
+/// is quickest.
 fn sentence(promises: &[Promise]) -> String {
-    let known: Vec<(usize, f64, f64)> = promises
-        .iter()
-        .enumerate()
-        .filter_map(|(k, p)| Some((k, p.wanted.first()?.std?, p.time.seconds)))
+    let count = |p: &Promise| p.wanted.iter().filter(|w| w.std.is_some()).count();
+    let most = promises.iter().map(count).max().unwrap_or(0);
+    let able: Vec<usize> = (0..promises.len())
+        .filter(|k| count(&promises[*k]) == most)
         .collect();
-    let quickest = |of: &mut dyn Iterator<Item = &(usize, f64, f64)>| {
-        of.min_by(|a, b| a.2.total_cmp(&b.2)).copied()
+    let shared = |place: usize| {
+        able.iter()
+            .all(|k| promises[*k].wanted[place].std.is_some())
     };
-    let least = known.iter().map(|k| k.1).fold(f64::INFINITY, f64::min);
-    let best = quickest(&mut known.iter().filter(|k| k.1 <= AS_GOOD * least));
-    let quick = quickest(&mut known.iter());
-    let first = promises.first().and_then(|p| p.wanted.first());
-    let (Some(best), Some(quick), Some(first)) = (best, quick, first) else {
-        return "What is wanted first is determined by none of these designs.".to_owned();
+    let wanted = promises.first().map_or(&[][..], |p| &p.wanted[..]);
+    let Some(place) = (0..wanted.len()).find(|place| most > 0 && shared(*place)) else {
+        return match most {
+            0 => "None of these designs determines anything of what is wanted.".to_owned(),
+            _ => "No design determines all that is wanted, and each another part of it.".to_owned(),
+        };
     };
-    let to = |own: (usize, f64, f64)| {
-        format!(
-            "to {} in {}",
-            size(Some(own.1), first.unit),
-            duration(own.2)
-        )
+    let known = |k: usize| promises[k].wanted[place].std.unwrap_or(f64::INFINITY);
+    let quickest = |of: &mut dyn Iterator<Item = &usize>| {
+        let time = |k: &&usize| promises[**k].time.seconds;
+        of.min_by(|a, b| time(a).total_cmp(&time(b))).copied()
     };
-    let text = format!(
-        "{} knows {} best, {}",
-        letter(best.0),
-        first.quantity,
+    let least = able.iter().map(|k| known(*k)).fold(f64::INFINITY, f64::min);
+    let best = quickest(&mut able.iter().filter(|k| known(**k) <= AS_GOOD * least));
+    let (Some(best), Some(quick)) = (best, quickest(&mut able.iter())) else {
+        return String::new();
+    };
+    let to = |k: usize| {
+        let std = size(Some(known(k)), wanted[place].unit);
+        format!("to {std} in {}", duration(promises[k].time.seconds))
+    };
+    let what = if most == wanted.len() {
+        "all that is wanted".to_owned()
+    } else {
+        format!("most of what is wanted, {most} of {}", wanted.len())
+    };
+    let quantity = &wanted[place].quantity;
+    let verb = if able.len() == 1 {
+        "determines"
+    } else {
+        "determine"
+    };
+    let head = format!("{} {verb} {what}", letters(&able));
+    if able.len() == 1 {
+        return format!("{head}: {quantity} {}.", to(best));
+    }
+    let head = format!(
+        "{head}. {} knows {quantity} best, {}",
+        letter(best),
         to(best)
     );
-    if best.0 == quick.0 {
-        return format!("{text}, and is done first of those that determine it.");
+    if best == quick {
+        return format!("{head}, and is done first.");
     }
-    format!(
-        "{text}; of those that determine it {} is done first, {}.",
-        letter(quick.0),
-        to(quick)
-    )
+    format!("{head}; {} is done first, {}.", letter(quick), to(quick))
 }

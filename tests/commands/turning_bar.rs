@@ -203,4 +203,6 @@ fn runs_that_cannot_be_are_refused() {
     );
     let arguments = ["diagnose", "good.csv", "--prove", "5", "--out", "out"];
     bad_input(&folder, &arguments, &["--prove cannot be had"]);
+    let arguments = ["diagnose", "good.csv", "--without", "taper", "--out", "out"];
+    bad_input(&folder, &arguments, &["no effect `taper`", "unsteady-turn"]);
 }

@@ -8,7 +8,7 @@ use errsep_models::reversal::turning_bar::{Run, Survey, analyse};
 
 use super::{Args, within_reach_in};
 use crate::cli::{Answer, progress};
-use crate::diagnosis::turning::weigh;
+use crate::diagnosis::turning::{BAR_BEND, RECORDED_ANGLE, UNSTEADY_TURN, weigh};
 use crate::io::turning::{read, read_setup};
 use crate::io::{CsvTable, Message, Status};
 use crate::report::turning_bar as sheet;
@@ -68,11 +68,17 @@ fn refuse_options(args: &Args) -> Result<(), Message> {
         (args.effects.is_some(), "--effects"),
         (args.prove.is_some(), "--prove"),
     ];
-    match options.iter().find(|o| o.0) {
-        Some((_, option)) => Err(Message::bad_input(format!(
-            "{option} cannot be had with a bar that turns"
-        ))
-        .remedy("leave it out: the diagnosis fits each explanation whole, and adds what it names")),
+    if let Some((_, option)) = options.iter().find(|o| o.0) {
+        return Err(
+            Message::bad_input(format!("{option} cannot be had with a bar that turns")).remedy(
+                "leave it out: the diagnosis fits each explanation whole, and adds what it names",
+            ),
+        );
+    }
+    let known = [UNSTEADY_TURN, BAR_BEND, RECORDED_ANGLE];
+    match args.without.iter().find(|name| !known.contains(&&name[..])) {
+        Some(name) => Err(Message::bad_input(format!("there is no effect `{name}`"))
+            .remedy(format!("the catalogue has {}", known.join(", ")))),
         None => Ok(()),
     }
 }

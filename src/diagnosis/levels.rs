@@ -7,7 +7,7 @@
 //! one follows from a model's own arithmetic.
 //! How many draws stand behind a figure is told where they are drawn.
 
-use statrs::distribution::{ContinuousCDF, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 /// Quantile of the normal law.
 pub(in crate::diagnosis) fn normal_quantile(probability: f64) -> f64 {
@@ -17,6 +17,11 @@ pub(in crate::diagnosis) fn normal_quantile(probability: f64) -> f64 {
 /// Quantile of chi-squared with two degrees of freedom: −2 ln (1 − p).
 pub(in crate::diagnosis) fn chi_squared_of_two(probability: f64) -> f64 {
     -2.0 * (1.0 - probability).ln()
+}
+
+/// Quantile of chi-squared.
+pub(in crate::diagnosis) fn chi_squared_quantile(probability: f64, freedom: usize) -> f64 {
+    ChiSquared::new(freedom as f64).map_or(f64::INFINITY, |law| law.inverse_cdf(probability))
 }
 
 // Noise.
@@ -87,6 +92,9 @@ pub(in crate::diagnosis) const STANDS: [f64; 2] = [1.0, 2.0];
 /// and has more unknowns than that of greatest evidence, stands in its place by its freedom alone where its
 /// log-evidence is less by this.
 pub(in crate::diagnosis) const OUTDONE: f64 = 10.0;
+/// *Limit.* A signature of which less than this part, squared, is left beside another is held by it: what is
+/// left of them at states that differ by their noise.
+pub(in crate::diagnosis) const HELD: f64 = 1e-3;
 /// *Reckoned.* Log-evidence that differs by less is equal: of exact aliases the one of more usual size
 /// goes first.
 pub(in crate::diagnosis) const EQUAL_EVIDENCE: f64 = 1e-3;

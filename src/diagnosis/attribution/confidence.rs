@@ -8,13 +8,13 @@ use errsep_models::model::{FittedModel, Shape};
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder, raw_signatures};
+use crate::diagnosis::attribution::context::{Cause, Context, Remainder, raw_signatures, span};
 use crate::diagnosis::attribution::shrink::held_out_square;
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::detection::space::{Space, orthonormal};
 use crate::diagnosis::levels::{
-    EARNED, EQUAL_EVIDENCE, HOPELESS, HOPELESS_PART, NEAR, OUTDONE, STANDS, WEIGHTY,
-    chi_squared_of_two,
+    EARNED, EQUAL_EVIDENCE, HELD, HOPELESS, HOPELESS_PART, NEAR, OUTDONE, STANDS, WEIGHTY,
+    chi_squared_of_two, chi_squared_quantile,
 };
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
 
@@ -255,6 +255,7 @@ fn alternatives<M: FittedModel>(
             order.is_some_and(|order| m.causes[k].columns.len() > order)
         };
         members.retain(|m| known(m).1 <= fewest || !freed(m) || m.evidence > most - OUTDONE);
+        drop_holders(context, &mut members, k);
     }
     let least = members
         .iter()
@@ -272,6 +273,29 @@ fn alternatives<M: FittedModel>(
         })
     });
     members
+}
+
+/// Drops what holds the signature of the member of greatest evidence among others of its own that explain no
+/// more than chance: it is that member, and something that is not seen.
+fn drop_holders<M: FittedModel>(context: &Context<'_, M>, members: &mut Vec<Member>, k: usize) {
+    let Some(most) = (0..members.len())
+        .max_by(|a, b| members[*a].evidence.total_cmp(&members[*b].evidence))
+    else {
+        return;
+    };
+    let leader = &members[most];
+    let (own, misfit) = (leader.causes[k].unknowns(), leader.misfit);
+    let own_length = leader.causes[k].projected.norm_squared();
+    let projected = leader.causes[k].projected.clone();
+    members.retain(|m| {
+        let more = m.causes[k].unknowns().saturating_sub(own);
+        if more == 0 || misfit - m.misfit > chi_squared_quantile(0.99, more) {
+            return true;
+        }
+        let basis = span(&m.causes, context.space.readings());
+        let left = &projected - &basis * basis.tr_mul(&projected);
+        left.norm_squared() > HELD * own_length
+    });
 }
 
 /// Brings the greatest evidence of each group to its front and makes it the cause, where these causes

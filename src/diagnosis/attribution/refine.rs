@@ -29,9 +29,17 @@ impl<M: FittedModel> Context<'_, M> {
             let columns = self.catalogue[effect].amplitudes_at(shape).len();
             (t - (columns + shape.free()) as f64 * log_readings, columns)
         };
-        for other in self.catalogue[effect].relatives(state, &shape) {
+        let relatives = self.catalogue[effect].relatives(state, &shape).into_iter();
+        let mut relatives: Vec<(f64, usize, Shape)> = relatives
+            .map(|other| {
+                let (here, columns) = weighed(&other, seen.value(&other).0);
+                (here, columns, other)
+            })
+            .collect();
+        // The best first: what it is searched to spares the search of many others.
+        relatives.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (here, own, other) in relatives {
             let (least, columns) = weighed(&shape, t);
-            let (here, own) = weighed(&other, seen.value(&other).0);
             // One that holds the other needs no search to be better; one of another kind does.
             let reach = if own == columns { UNSEARCHED * t } else { 0.0 };
             if here <= least - reach {

@@ -23,7 +23,7 @@ pub(super) struct LateralBacklash {
 }
 
 /// Number of variants in the same directions.
-const KINDS: usize = 5;
+const KINDS: usize = 7;
 /// Names of the directions.
 const AXES: [&str; 2] = ["horizontal", "vertical"];
 
@@ -49,12 +49,15 @@ impl LateralBacklash {
     }
 }
 
-/// Terms of the difference of both lines, Legendre polynomials, by variant.
-const TERMS: [usize; 4] = [2, 5, 9, 15];
+/// Terms of the difference of both lines by variant: Legendre polynomials, or from [`FINE`] on a line and
+/// half waves over the travel.
+const TERMS: [usize; 6] = [2, 5, 9, 15, 30, 60];
 /// First and last variant of lines with a form of their own.
-const FORMS: std::ops::RangeInclusive<usize> = 1..=3;
+const FORMS: std::ops::RangeInclusive<usize> = 1..=5;
+/// First variant of half waves.
+const FINE: usize = 4;
 /// Variant of a slide that leans over some way after it has turned round.
-const LEANING: usize = 4;
+const LEANING: usize = 6;
 
 /// The variants in words.
 pub(super) const OWN_FORMS: &str = "each direction with a form of its own";
@@ -121,10 +124,14 @@ impl Effect<FirstOrder> for LateralBacklash {
             steps: vec![0.3],
         };
         let mut others: Vec<Shape> = match shape.variant % KINDS {
-            0 => FORMS.map(plain).chain([0.05, 0.2].map(leaning)).collect(),
+            0 => [0.05, 0.2].map(leaning).to_vec(),
             LEANING => vec![plain(0)],
             _ => vec![plain(0), leaning(0.1)],
         };
+        // Every term is told by two positions at least.
+        let forms = FORMS.filter(|kind| 2 * TERMS[*kind] <= model.positions().len().max(30));
+        let forms = forms.filter(|kind| *kind != shape.variant % KINDS);
+        others.extend(forms.map(plain));
         let turned = self.scopes().filter(|s| KINDS * s != scope);
         others.extend(turned.map(|s| Shape {
             variant: KINDS * s + shape.variant % KINDS,
@@ -150,7 +157,7 @@ impl Effect<FirstOrder> for LateralBacklash {
             return axes.flat_map(of).collect();
         }
         axes.flat_map(|axis| (0..terms(shape)).map(|k| (*axis, k)))
-            .map(|(axis, k)| with(axis, &|part, _| legendre(k, part)))
+            .map(|(axis, k)| with(axis, &|part, _| term(shape.variant % KINDS, k, part)))
             .collect()
     }
 
@@ -159,49 +166,70 @@ impl Effect<FirstOrder> for LateralBacklash {
         shape.values.iter().all(|v| (0.01..1.0).contains(&part(v)))
     }
 
-    /// Of forms their root mean square over the travel in place of each term, the mean of Pₖ² being
-    /// 1/(2k + 1), less what the noise of the terms adds to its square.
+    /// Of forms the line and the root mean square about it over the travel in place of each term, less
+    /// what the noise of the terms adds to its square.
     fn estimates(
         &self,
         shape: &Shape,
         amplitudes: &[f64],
         covariance: &DMatrix<f64>,
     ) -> Vec<Estimate> {
-        let parameters = self.amplitudes_at(shape).into_iter();
-        let values = amplitudes.iter().chain(&shape.values);
-        let told = each(
-            parameters.chain(self.shape_parameters()),
-            values,
-            covariance,
-        );
-        if !FORMS.contains(&(shape.variant % KINDS)) {
-            return told;
+        let parameters = self.amplitudes_at(shape);
+        let kind = shape.variant % KINDS;
+        if !FORMS.contains(&kind) {
+            let values = amplitudes.iter().chain(&shape.values);
+            let all = parameters.into_iter().chain(self.shape_parameters());
+            return each(all, values, covariance);
         }
         let (count, axes) = (terms(shape), self.axes(shape));
         let of = |(own, axis): (usize, &usize)| {
             let first = own * count;
-            let weight = |k: usize| 1.0 / (2.0 * (k - first) as f64 + 1.0);
-            let form = amplitudes
-                .iter()
-                .enumerate()
-                .take(first + count)
-                .skip(first + 2);
-            let variance = |k: usize| covariance.get((k, k)).copied().unwrap_or(f64::NAN);
-            let own = |(k, a): (usize, &f64)| (a * a - variance(k)) * weight(k);
-            let square: f64 = form.clone().map(own).sum();
+            let own: Vec<f64> = amplitudes[first..first + count].to_vec();
+            let within = |weights: Vec<(usize, f64)>| {
+                let at = weights.into_iter().map(|(k, w)| (first + k, w));
+                spread(covariance, &at.collect::<Vec<_>>())
+            };
+            let parts: Vec<[f64; 3]> = (0..count).map(|k| moments(kind, k)).collect();
+            let along = |which: usize| -> Vec<(usize, f64)> {
+                parts.iter().map(|p| p[which]).enumerate().collect()
+            };
+            let line = [0, 1].map(|which| {
+                let parameter = &parameters[first + which];
+                Estimate {
+                    name: parameter.name.to_string(),
+                    value: along(which).iter().map(|(k, w)| w * own[*k]).sum(),
+                    std: within(along(which)),
+                    unit: parameter.unit.to_owned(),
+                }
+            });
+            // Mean square of the whole, less that of its line.
+            let form = (2..count).map(|k| parts[k][2] * own[k] * own[k]);
+            let line_of = |which: usize| -> f64 {
+                let form = along(which).into_iter().skip(2);
+                form.map(|(k, w)| w * own[k]).sum()
+            };
+            let (step, turn) = (line_of(0), line_of(1));
+            let variance = |k: usize| {
+                let own = first + k;
+                covariance.get((own, own)).copied().unwrap_or(f64::NAN)
+            };
+            let weight = |k: usize| parts[k][2] - parts[k][0].powi(2) - parts[k][1].powi(2) / 3.0;
+            let of_noise: f64 = (2..count).map(|k| weight(k) * variance(k)).sum();
+            let square = form.sum::<f64>() - step * step - turn * turn / 3.0 - of_noise;
             let size = square.max(0.0).sqrt().max(f64::MIN_POSITIVE);
-            let along: Vec<(usize, f64)> = form.map(|(k, a)| (k, a * weight(k) / size)).collect();
+            let slope = |k: usize| {
+                parts[k][2] * own[k] - parts[k][0] * step - parts[k][1] * turn / 3.0
+            };
             let rms = Estimate {
                 name: match axes.len() {
                     1 => "rms-of-form".to_owned(),
                     _ => format!("{}-rms-of-form", AXES[*axis]),
                 },
                 value: size,
-                std: spread(covariance, &along),
+                std: within((2..count).map(|k| (k, slope(k) / size)).collect()),
                 unit: "um".to_owned(),
             };
-            let line = told.iter().skip(first).take(2).cloned();
-            line.chain([rms]).collect::<Vec<_>>()
+            line.into_iter().chain([rms])
         };
         axes.iter().enumerate().flat_map(of).collect()
     }
@@ -223,6 +251,28 @@ impl Effect<FirstOrder> for LateralBacklash {
 
 fn terms(shape: &Shape) -> usize {
     TERMS.get(shape.variant % KINDS).copied().unwrap_or(2)
+}
+
+/// A term of the difference at a part of the travel, −1 to 1: 1 and the part itself, then Legendre
+/// polynomials or sin(π j u), j from one on, u from 0 to 1.
+fn term(kind: usize, k: usize, part: f64) -> f64 {
+    if kind < FINE || k < 2 {
+        return legendre(k, part);
+    }
+    (std::f64::consts::FRAC_PI_2 * (k - 1) as f64 * (part + 1.0)).sin()
+}
+
+/// Of a term: its constant and its slope by least squares over the travel, and its mean square; of sin(π j u)
+/// (1 − (−1)ʲ)/(π j), −3 (1 + (−1)ʲ)/(π j) and a half.
+fn moments(kind: usize, k: usize) -> [f64; 3] {
+    let unit = |at: usize| if k == at { 1.0 } else { 0.0 };
+    if kind < FINE || k < 2 {
+        return [unit(0), unit(1), 1.0 / (2.0 * k as f64 + 1.0)];
+    }
+    let j = (k - 1) as f64;
+    let [odd, even] = if k % 2 == 0 { [2.0, 0.0] } else { [0.0, 2.0] };
+    let way = std::f64::consts::PI * j;
+    [odd / way, -3.0 * even / way, 0.5]
 }
 
 /// Legendre polynomial of a degree, by its recurrence (Abramowitz and Stegun 8.5.3).

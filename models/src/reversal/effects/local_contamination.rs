@@ -2,17 +2,19 @@
 //!
 //! A bump of either sign: Gaussian (a chip), flat-topped (a film) or triangular (a scratch, a burr).
 //! It only shows where it was not always there: in one channel (it came or went when the spindle was
-//! turned) or in one repeat of one channel; of designs that see a side more often, in one repeat of all
-//! channels of the side, or on it from a position of the spindle on. Free: height, place, width, section,
-//! channels or trace.
+//! turned), in one repeat of one channel or in all of its traces from one on; of designs that see a side
+//! more often, in one repeat of all channels of the side, or on it from a position of the spindle on. Free:
+//! height, place, width, section, channels, trace.
+
+use std::ops::Range;
 
 use super::FirstOrder;
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 use crate::reversal::designs::angle_name;
 use crate::reversal::diagnosable::{Arrangement, Seat};
 
-/// See the head of the file. Variants: section · groups · (repeats + 1) + group · (repeats + 1)
-/// + 0 for all repeats, or + the place of the repeat.
+/// See the head of the file. Variants: (section · groups + group) · scopes + scope, the scope as
+/// [`Scope`] counts.
 pub(super) struct LocalContamination {
     /// The channels, then what channels of a side have in common.
     groups: Vec<Group>,
@@ -25,6 +27,18 @@ struct Group {
     /// Whether in all repeats it is no form.
     lasting: bool,
 }
+
+/// In which traces of its channels a bump lies: 0, the place of the repeat, or beyond the repeats the place
+/// of the first trace in the order of time.
+#[derive(Clone, Copy)]
+enum Scope {
+    All,
+    Repeat(u32),
+    From(usize),
+}
+
+/// The words that tell a bump that stays once it has come.
+pub(super) const STAYS: &str = "from trace";
 
 impl LocalContamination {
     pub fn new(channels: &Arrangement) -> Self {
@@ -68,9 +82,42 @@ impl LocalContamination {
         Self { groups }
     }
 
-    /// Number of groups and traces in which a bump may lie.
+    /// Number of groups and scopes in which a bump may lie.
     fn places(&self, model: &FirstOrder) -> usize {
-        self.groups.len() * (model.repeats().len() + 1)
+        self.groups.len() * self.scopes(model)
+    }
+
+    /// Number of scopes of the group with the most traces.
+    fn scopes(&self, model: &FirstOrder) -> usize {
+        let traces = self.groups.iter().map(|g| g.traces(model).len());
+        model.repeats().len() + traces.max().unwrap_or(1).max(1)
+    }
+
+    /// Section, group and scope of a variant.
+    fn told(&self, model: &FirstOrder, variant: usize) -> Option<(&Section, &Group, Scope)> {
+        let scopes = self.scopes(model);
+        let repeats = model.repeats();
+        let scope = match variant % scopes {
+            0 => Scope::All,
+            k if k <= repeats.len() => Scope::Repeat(*repeats.get(k - 1)?),
+            k => Scope::From(k - repeats.len()),
+        };
+        let group = self.groups.get(variant / scopes % self.groups.len())?;
+        Some((SECTIONS.get(variant / self.places(model))?, group, scope))
+    }
+}
+
+impl Group {
+    /// The traces of its channels in the order of time.
+    fn traces(&self, model: &FirstOrder) -> Vec<Range<usize>> {
+        let place = |trace: &Range<usize>| &model.places()[trace.start];
+        let own = model.traces().iter();
+        let mut own: Vec<Range<usize>> = own
+            .filter(|t| self.channels.contains(&place(t).channel))
+            .cloned()
+            .collect();
+        own.sort_by(|a, b| place(a).time.total_cmp(&place(b).time));
+        own
     }
 }
 
@@ -112,12 +159,12 @@ impl Effect<FirstOrder> for LocalContamination {
         ]
     }
 
-    /// The Gaussian bumps; the other sections are found from them.
+    /// The Gaussian bumps in all traces or in one repeat; the others are found from them.
     fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
         let repeats = model.repeats();
         let x = model.positions();
         let first = x.first().copied().unwrap_or(0.0);
-        let spacing = spacing(model);
+        let (spacing, every) = (spacing(model), self.scopes(model));
         let mut shapes = Vec::new();
         for (group, own) in self.groups.iter().enumerate() {
             // With one repeat that repeat is the channel; a side of which all is lifted is a form.
@@ -134,7 +181,7 @@ impl Effect<FirstOrder> for LocalContamination {
                     let steps = (model.travel() / (2.0 * width)).ceil();
                     for k in 0..=steps as usize {
                         shapes.push(Shape {
-                            variant: group * (repeats.len() + 1) + scope,
+                            variant: group * every + scope,
                             values: vec![first + model.travel() * k as f64 / steps, width.ln()],
                             steps: vec![0.5 * width, 0.3],
                         });
@@ -147,9 +194,18 @@ impl Effect<FirstOrder> for LocalContamination {
     }
 
     fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
-        let places = self.places(model);
-        (0..SECTIONS.len())
-            .map(|section| section * places + shape.variant % places)
+        let (places, scopes) = (self.places(model), self.scopes(model));
+        let Some((_, group, _)) = self.told(model, shape.variant) else {
+            return Vec::new();
+        };
+        let sections = (0..SECTIONS.len()).map(|section| section * places + shape.variant % places);
+        let repeats = model.repeats().len();
+        let alone = if group.lasting { 0 } else { 1 };
+        let stays = (repeats + 1)..(repeats + group.traces(model).len());
+        let within = shape.variant - shape.variant % scopes;
+        let others = (alone..repeats + 1).chain(stays).map(|k| within + k);
+        sections
+            .chain(others)
             .filter(|variant| *variant != shape.variant)
             .map(|variant| Shape {
                 variant,
@@ -162,22 +218,18 @@ impl Effect<FirstOrder> for LocalContamination {
         let &[position, log_width] = shape.values.as_slice() else {
             return Vec::new();
         };
-        let repeats = model.repeats();
-        let place = shape.variant % self.places(model);
-        let channels = &self.groups[place / (repeats.len() + 1)].channels;
-        let repeat = match place % (repeats.len() + 1) {
-            0 => None,
-            k => repeats.get(k - 1),
+        let Some(((section, _), group, scope)) = self.told(model, shape.variant) else {
+            return Vec::new();
         };
-        let (section, _) = SECTIONS[(shape.variant / self.places(model)).min(SECTIONS.len() - 1)];
         let width = log_width.exp();
         let mut column = Column::default();
-        for trace in model.traces() {
-            let first = &model.places()[trace.start];
-            if !channels.contains(&first.channel) || repeat.is_some_and(|r| *r != first.repeat) {
-                continue;
-            }
-            for k in trace.clone() {
+        for (order, trace) in group.traces(model).into_iter().enumerate() {
+            let met = match scope {
+                Scope::All => true,
+                Scope::Repeat(own) => model.places()[trace.start].repeat == own,
+                Scope::From(first) => order >= first,
+            };
+            for k in trace.filter(|_| met) {
                 let away = (model.places()[k].x - position) / width;
                 if away.abs() < 5.0 {
                     column.rows.push(k);
@@ -201,13 +253,15 @@ impl Effect<FirstOrder> for LocalContamination {
     }
 
     fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
-        let repeats = model.repeats();
-        let place = shape.variant % self.places(model);
-        let group = &self.groups.get(place / (repeats.len() + 1))?.name;
-        let (_, section) = SECTIONS.get(shape.variant / self.places(model))?;
-        Some(match place % (repeats.len() + 1) {
-            0 => format!("{section}, {group}"),
-            k => format!("{section}, {group}, repeat {}", repeats.get(k - 1)?),
+        let ((_, section), group, scope) = self.told(model, shape.variant)?;
+        let name = &group.name;
+        Some(match scope {
+            Scope::All => format!("{section}, {name}"),
+            Scope::Repeat(repeat) => format!("{section}, {name}, repeat {repeat}"),
+            Scope::From(first) => {
+                let all = group.traces(model).len();
+                format!("{section}, {name}, {STAYS} {} of {all} on", first + 1)
+            }
         })
     }
 }

@@ -64,8 +64,8 @@ pub fn all(channels: &Arrangement) -> Vec<Box<dyn Effect<FirstOrder>>> {
 }
 
 /// Whether `simultaneous::effects` has an effect too, in the variant that a diagnosis tells in words: a
-/// lost motion that grows along the screw, lines of the slide with forms of their own and curves of two
-/// powers are diagnosed, but are no unknowns of the fit.
+/// lost motion that grows along the screw, lines of the slide with forms of their own, dirt that stays once it
+/// has come and curves of two powers are diagnosed, but are no unknowns of the fit.
 pub fn joins_the_fit(effect: &str, variant: Option<&str>) -> bool {
     const APART: [&str; 4] = [
         axis_backlash::GROWS,
@@ -75,7 +75,10 @@ pub fn joins_the_fit(effect: &str, variant: Option<&str>) -> bool {
     ];
     let known = simultaneous::effects::CATALOGUE.iter();
     known.into_iter().any(|entry| entry.name == effect)
-        && !variant.is_some_and(|words| APART.iter().any(|apart| words.starts_with(apart)))
+        && !variant.is_some_and(|words| {
+            APART.iter().any(|apart| words.starts_with(apart))
+                || words.contains(local_contamination::STAYS)
+        })
 }
 
 /// The start of an effect whose signature depends on its own size: infinitely small.

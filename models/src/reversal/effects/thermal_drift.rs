@@ -17,6 +17,11 @@ pub(super) struct ThermalDrift(pub Indicators);
 /// Two time constants are told apart from here on.
 const APART: f64 = 1.3;
 
+/// Where two time constants are begun, as parts of the duration.
+const FAST: [f64; 4] = [0.03, 0.08, 0.2, 0.5];
+/// See [`FAST`]; the last is nearly a straight line.
+const SLOW: [f64; 4] = [0.3, 0.9, 3.0, 20.0];
+
 impl Effect<FirstOrder> for ThermalDrift {
     fn name(&self) -> &str {
         "thermal-drift"
@@ -58,7 +63,7 @@ impl Effect<FirstOrder> for ThermalDrift {
             .to_vec()
     }
 
-    fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
         let with = |variant: usize, values: Vec<f64>| Shape {
             variant,
             steps: vec![0.2; values.len()],
@@ -66,11 +71,18 @@ impl Effect<FirstOrder> for ThermalDrift {
         };
         match *shape.values.as_slice() {
             [one] => {
+                let two = shape.variant + self.0.scope_count();
                 let one = if shape.free() == 0 { one - 3.0 } else { one };
-                vec![with(
-                    shape.variant + self.0.scope_count(),
-                    vec![one - 0.7, one + 0.7],
-                )]
+                // A single time constant says little of two that are far apart, least where they work
+                // against each other: such pairs are begun from everywhere.
+                let fast = FAST.iter().flat_map(|f| SLOW.map(|s| [*f, s]));
+                let apart = fast.filter(|[f, s]| s / f > 2.0 * APART);
+                let all = apart.map(|pair| pair.map(|part| (part * model.duration()).ln()));
+                let near = [one - 0.7, one + 0.7];
+                std::iter::once(near)
+                    .chain(all)
+                    .map(|pair| with(two, pair.to_vec()))
+                    .collect()
             }
             [one, two] => vec![with(
                 shape.variant % self.0.scope_count(),

@@ -278,8 +278,8 @@ fn alternatives<M: FittedModel>(
 /// Drops what holds the signature of the member of greatest evidence among others of its own that explain no
 /// more than chance: it is that member, and something that is not seen.
 fn drop_holders<M: FittedModel>(context: &Context<'_, M>, members: &mut Vec<Member>, k: usize) {
-    let Some(most) = (0..members.len())
-        .max_by(|a, b| members[*a].evidence.total_cmp(&members[*b].evidence))
+    let Some(most) =
+        (0..members.len()).max_by(|a, b| members[*a].evidence.total_cmp(&members[*b].evidence))
     else {
         return;
     };

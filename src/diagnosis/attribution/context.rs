@@ -273,11 +273,10 @@ impl<'a, M: FittedModel> Context<'a, M> {
             .position(|f| f.is_effect && f.name == name)
     }
 
-    /// Most columns of a family's entries.
+    /// Columns of a family's first entry: of an effect in its usual form.
     pub fn order_of(&self, family: usize) -> usize {
-        let range = self.dictionary.families[family].entries.clone();
-        let orders = self.dictionary.entries[range].iter().map(Entry::order);
-        orders.max().unwrap_or(0)
+        let first = self.dictionary.families[family].entries.start;
+        self.dictionary.entries.get(first).map_or(0, Entry::order)
     }
 
     /// Tail probability of an effect's greatest score.

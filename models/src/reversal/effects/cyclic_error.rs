@@ -3,32 +3,34 @@
 //! Of the reading: the interpolation error of an incremental indicator, of one or of both, each with
 //! its own amplitude and phase, up to two readings a period; the reading climbs unevenly, so that
 //! periods stay apart up to there. Of the position: the part of a screw's or rack's period that the
-//! slide's form cannot take up, different in the two spindle positions. Free: amplitude and phase of
-//! each indicator, the period, told by its cycles over the span of the readings or the travel.
+//! slide's form cannot take up, different in the two spindle positions; what both have in common is form,
+//! but for its line, a cone. Free: amplitude and phase of each indicator, the period, told by its cycles
+//! over the span of the readings or the travel, the line.
 
 use nalgebra::DMatrix;
 
-use super::FirstOrder;
 use super::indicators::{ALL, Indicators};
+use super::{FirstOrder, part_of_travel};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Link, Parameter, Shape};
 use crate::reversal::designs::angle_name;
 use crate::reversal::diagnosable::Arrangement;
 
 /// See the head of the file. Variants: the indicators, then a period of the position in one position of
-/// the spindle; of two positions the fit spreads it over both.
+/// the spindle; of two positions the fit spreads it over both, and the last is of another phase in each.
 pub(super) struct CyclicError {
     indicators: Indicators,
-    /// Positions of the spindle in which a period of the position is sought.
+    /// Positions of the spindle.
     positions: Vec<f64>,
 }
 
+/// The variant of another phase in each position of the spindle in words.
+pub(super) const OWN_PHASES: &str = "of another phase in each spindle position";
+
 impl CyclicError {
     pub fn new(channels: &Arrangement) -> Self {
-        let all = channels.positions();
-        let told = if all.len() > 2 { all.len() } else { 1 };
         Self {
             indicators: Indicators::new(channels),
-            positions: all[..told].to_vec(),
+            positions: channels.positions().to_vec(),
         }
     }
 
@@ -37,9 +39,21 @@ impl CyclicError {
         variant.checked_sub(self.indicators.scope_count())
     }
 
+    /// Whether a variant is of another phase in each position of the spindle.
+    fn has_own_phases(&self, variant: usize) -> bool {
+        self.drive(variant) == Some(self.positions.len())
+    }
+
+    /// The variants that are sought of a period of the position: of two positions of the spindle one
+    /// shows the other.
     fn drives(&self) -> impl Iterator<Item = usize> + use<> {
         let first = self.indicators.scope_count();
-        first..first + self.positions.len()
+        let sought = if self.positions.len() > 2 {
+            self.positions.len()
+        } else {
+            1
+        };
+        first..first + sought
     }
 }
 
@@ -75,7 +89,11 @@ impl Effect<FirstOrder> for CyclicError {
     }
 
     fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
-        self.indicators.rotations(self.waves(shape), 100.0)
+        let mut all = self.indicators.rotations(self.waves(shape), 100.0);
+        if self.has_own_phases(shape.variant) {
+            all.push(Parameter::symmetric("line", "um", 100.0));
+        }
+        all
     }
 
     fn shape_parameters(&self) -> Vec<Parameter> {
@@ -106,7 +124,13 @@ impl Effect<FirstOrder> for CyclicError {
             ..shape.clone()
         };
         if self.drive(shape.variant).is_some() {
-            return Vec::new();
+            let first = self.indicators.scope_count();
+            let all = match self.positions.len() {
+                2 => first..first + 3,
+                _ => 0..0,
+            };
+            let others = all.filter(|variant| *variant != shape.variant);
+            return others.map(other).collect();
         }
         self.indicators.others(shape.variant).map(other).collect()
     }
@@ -121,11 +145,17 @@ impl Effect<FirstOrder> for CyclicError {
             let per_mm = turn / model.travel();
             let wave = |function: fn(f64) -> f64| {
                 Column::from_places(model.places(), |_, place| {
-                    let seen = model.seat(place).position == position;
+                    let seen = model.seat(place).position == position % self.positions.len();
                     f64::from(seen) * function(per_mm * (place.x - first))
                 })
             };
-            return vec![wave(f64::cos), wave(f64::sin)];
+            let mut columns = vec![wave(f64::cos), wave(f64::sin)];
+            if self.has_own_phases(shape.variant) {
+                columns.push(Column::from_places(model.places(), |_, place| {
+                    part_of_travel(model, place.x)
+                }));
+            }
+            return columns;
         }
         let per_um = turn / model.reading_span();
         let wave = |function: fn(f64) -> f64| {
@@ -173,9 +203,10 @@ impl Effect<FirstOrder> for CyclicError {
     fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
         let cycles = shape.values.first()?;
         if let Some(position) = self.drive(shape.variant) {
-            let at = match self.positions.len() {
-                1 => String::new(),
-                _ => format!(", spindle at {}°", angle_name(self.positions[position])),
+            let at = match self.positions.get(position) {
+                None => format!(", {OWN_PHASES}"),
+                Some(_) if self.positions.len() < 3 => String::new(),
+                Some(angle) => format!(", spindle at {}°", angle_name(*angle)),
             };
             return Some(format!(
                 "period {:.4} mm of the travel{at}",

@@ -111,8 +111,12 @@ impl Effect<FirstOrder> for LateralBacklash {
         vec![Parameter::between("log-way", "ln mm", -5.0, 12.0)]
     }
 
+    /// Askew lines, and lines with a form of their own, which need not be askew at all.
     fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
-        self.scopes().map(|s| Shape::variant(KINDS * s)).collect()
+        let kinds = [0, FINE - 1].into_iter();
+        kinds
+            .flat_map(|kind| self.scopes().map(move |s| Shape::variant(KINDS * s + kind)))
+            .collect()
     }
 
     fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
@@ -217,9 +221,8 @@ impl Effect<FirstOrder> for LateralBacklash {
             let of_noise: f64 = (2..count).map(|k| weight(k) * variance(k)).sum();
             let square = form.sum::<f64>() - step * step - turn * turn / 3.0 - of_noise;
             let size = square.max(0.0).sqrt().max(f64::MIN_POSITIVE);
-            let slope = |k: usize| {
-                parts[k][2] * own[k] - parts[k][0] * step - parts[k][1] * turn / 3.0
-            };
+            let slope =
+                |k: usize| parts[k][2] * own[k] - parts[k][0] * step - parts[k][1] * turn / 3.0;
             let rms = Estimate {
                 name: match axes.len() {
                     1 => "rms-of-form".to_owned(),

@@ -1,6 +1,7 @@
 //! Dirt or a scratch under the stylus at one place.
 //!
-//! A bump of either sign: Gaussian (a chip), flat-topped (a film) or triangular (a scratch, a burr).
+//! A bump of either sign: Gaussian (a chip), flat-topped (a film), with steep sides (a scratch that a stylus
+//! fits into) or triangular (a burr).
 //! It only shows where it was not always there: in one channel (it came or went when the spindle was
 //! turned), in one repeat of one channel or in all of its traces from one on; of designs that see a side
 //! more often, in one repeat of all channels of the side, or on it from a position of the spindle on. Free:
@@ -125,10 +126,11 @@ impl Group {
 type Section = (fn(f64) -> f64, &'static str);
 
 /// Sections of unit height, by the distance from the middle in widths, and their names.
-const SECTIONS: [Section; 3] = [
+const SECTIONS: [Section; 4] = [
     (|away| (-0.5 * away * away).exp(), "Gaussian"),
     (|away| (-0.5 * away.powi(8)).exp(), "flat-topped"),
     (|away| (1.0 - 0.45 * away.abs()).max(0.0), "triangular"),
+    (|away| (-0.5 * away.powi(20)).exp(), "steep-sided"),
 ];
 
 impl Effect<FirstOrder> for LocalContamination {
@@ -140,7 +142,7 @@ impl Effect<FirstOrder> for LocalContamination {
         About {
             physics: "dirt lifts the stylus, or a scratch lets it fall, at one place in one channel or one repeat",
             confirm: "wipe the artefact there and measure that trace again",
-            source: "bump of Gaussian, flat-topped or triangular section",
+            source: "bump of Gaussian, flat-topped, steep-sided or triangular section",
         }
     }
 

@@ -50,7 +50,7 @@ pub fn all(channels: &Arrangement) -> Vec<Box<dyn Effect<FirstOrder>>> {
         Box::new(local_contamination::LocalContamination::new(channels)),
         Box::new(off_crest::OffCrest::new(channels)),
         Box::new(reversal_shift::ReversalShift::new(channels)),
-        Box::new(stick_slip::StickSlip),
+        Box::new(stick_slip::StickSlip::new(channels)),
         Box::new(taper::Taper),
         Box::new(thermal_drift::ThermalDrift(indicators())),
         Box::new(thickness_shift::ThicknessShift),
@@ -77,7 +77,13 @@ pub fn joins_the_fit(effect: &str, variant: Option<&str>) -> bool {
     known.into_iter().any(|entry| entry.name == effect)
         && !variant.is_some_and(|words| {
             APART.iter().any(|apart| words.starts_with(apart))
-                || words.contains(local_contamination::STAYS)
+                || [
+                    local_contamination::STAYS,
+                    cyclic_error::OWN_PHASES,
+                    stick_slip::ANEW,
+                ]
+                .iter()
+                .any(|apart| words.contains(apart))
         })
 }
 

@@ -14,6 +14,9 @@ use crate::reversal::designs::Zero;
 /// See the head of the file. Variants: the channels, then the indicators.
 pub(super) struct ZeroJump(pub Indicators);
 
+/// Readings about a jump that was found at which it is looked for again.
+const NEARBY: usize = 6;
+
 /// Readings between neighbouring starts of the search.
 const STRIDE: usize = 8;
 
@@ -57,6 +60,24 @@ impl Effect<FirstOrder> for ZeroJump {
             }
         }
         shapes
+    }
+
+    /// The same jump some readings sooner or later: the score climbs to its time in steps, which halve the
+    /// way of a search too soon.
+    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+        let Some(&time) = shape.values.first() else {
+            return Vec::new();
+        };
+        let times = times_of(model, shape.variant);
+        let here = times.partition_point(|t| *t <= time);
+        let between = |k: usize| Some(0.5 * (times.get(k.checked_sub(1)?)? + times.get(k)?));
+        let near = (here.saturating_sub(NEARBY)..=here + NEARBY).filter(|k| *k != here);
+        near.filter_map(between)
+            .map(|moved| Shape {
+                values: vec![moved],
+                ..shape.clone()
+            })
+            .collect()
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {

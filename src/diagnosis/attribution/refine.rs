@@ -4,7 +4,7 @@ use errsep_models::model::{Effect, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::attribution::context::{Cause, Context, as_matrix, column, span};
-use crate::diagnosis::detection::dictionary::{is_positive, products, statistic};
+use crate::diagnosis::detection::dictionary::{inverse, is_positive, products, statistic};
 use crate::diagnosis::levels::UNSEARCHED;
 use crate::diagnosis::search::coordinate_search;
 
@@ -111,7 +111,8 @@ impl<'s, M: FittedModel> Seen<'s, M> {
         (statistic(&gram, &score, positive), gram, score)
     }
 
-    /// The best shape from a start, settled, and its statistic.
+    /// The best shape from a start, settled, and its statistic; one that settles to another variant is
+    /// searched there.
     fn searched(&self, start: &Shape) -> (Shape, f64) {
         let mut shape = start.clone();
         if shape.free() > 0 {
@@ -130,12 +131,14 @@ impl<'s, M: FittedModel> Seen<'s, M> {
         }
         let (mut t, mut gram, mut score) = self.value(&shape);
         for _ in 0..8 {
-            let Some(amplitude) = gram.clone().cholesky().map(|c| c.solve(&score)) else {
-                break;
-            };
+            // What the model absorbs of several columns together stays as small as may be.
+            let amplitude = inverse(&gram) * &score;
             let Some(next) = self.effect.settled(&shape, amplitude.as_slice()) else {
                 break;
             };
+            if next.variant != shape.variant {
+                return self.searched(&next);
+            }
             if next.values == shape.values {
                 break;
             }

@@ -12,6 +12,12 @@ use crate::diagnosis::attribution::mixing::Mixing;
 /// Relative change of the amplitudes at which refining stops.
 const AT_REST: f64 = 1e-4;
 
+/// Rounds in which a shape of more than [`MANY`] parameters is searched: with so many a search always finds
+/// something, and the state moves it little.
+const SEARCHED: usize = 2;
+/// See [`SEARCHED`].
+const MANY: usize = 12;
+
 /// Most rounds of fitting the state without the causes.
 const ROUNDS: usize = 16;
 
@@ -43,8 +49,12 @@ impl<M: FittedModel> Context<'_, M> {
                 let mut others = causes.clone();
                 let own = others.remove(k);
                 let state = self.seen_by(k, &state, &causes, &changes);
-                let refined = self.refine(&state, readings, own.effect, &own.shape, &others);
-                causes[k] = refined.0;
+                causes[k] = if round < SEARCHED || own.shape.free() <= MANY {
+                    self.refine(&state, readings, own.effect, &own.shape, &others)
+                        .0
+                } else {
+                    self.at_rest(&state, readings, &own, &others)
+                };
             }
             let misfit = self.misfit(readings, &causes);
             let gained = best.0 - misfit;
@@ -63,6 +73,21 @@ impl<M: FittedModel> Context<'_, M> {
             changes = mixing.mixed(&changes, next);
         }
         best.1
+    }
+
+    /// A cause at another state, its shape kept but for what its size makes of it.
+    fn at_rest(
+        &self,
+        state: &M,
+        readings: &DVector<f64>,
+        cause: &Cause,
+        others: &[Cause],
+    ) -> Cause {
+        let mut shape = cause.shape.clone();
+        shape.steps.fill(0.0);
+        let mut kept = self.refine_alone(state, readings, cause.effect, &shape, others);
+        kept.shape.steps.clone_from(&cause.shape.steps);
+        kept
     }
 
     /// The state at which the signature of one of several causes is taken: with what the others

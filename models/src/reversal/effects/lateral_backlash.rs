@@ -23,7 +23,7 @@ pub(super) struct LateralBacklash {
 }
 
 /// Number of variants in the same directions.
-const KINDS: usize = 7;
+const KINDS: usize = 6;
 /// Names of the directions.
 const AXES: [&str; 2] = ["horizontal", "vertical"];
 
@@ -51,13 +51,13 @@ impl LateralBacklash {
 
 /// Terms of the difference of both lines by variant: Legendre polynomials, or from [`FINE`] on a line and
 /// half waves over the travel.
-const TERMS: [usize; 6] = [2, 5, 9, 15, 30, 60];
+const TERMS: [usize; 5] = [2, 5, 9, 15, 30];
 /// First and last variant of lines with a form of their own.
-const FORMS: std::ops::RangeInclusive<usize> = 1..=5;
+const FORMS: std::ops::RangeInclusive<usize> = 1..=4;
 /// First variant of half waves.
 const FINE: usize = 4;
 /// Variant of a slide that leans over some way after it has turned round.
-const LEANING: usize = 6;
+const LEANING: usize = 5;
 
 /// The variants in words.
 pub(super) const OWN_FORMS: &str = "each direction with a form of its own";
@@ -134,7 +134,10 @@ impl Effect<FirstOrder> for LateralBacklash {
         };
         // Every term is told by two positions at least.
         let forms = FORMS.filter(|kind| 2 * TERMS[*kind] <= model.positions().len().max(30));
-        let forms = forms.filter(|kind| *kind != shape.variant % KINDS);
+        // From the askew lines all; from a form its neighbours.
+        let own = shape.variant % KINDS;
+        let near = |kind: &usize| *kind != own && (own == 0 || kind.abs_diff(own) == 1);
+        let forms = forms.filter(near);
         others.extend(forms.map(plain));
         let turned = self.scopes().filter(|s| KINDS * s != scope);
         others.extend(turned.map(|s| Shape {

@@ -80,7 +80,7 @@ pub fn joins_the_fit(effect: &str, variant: Option<&str>) -> bool {
                 || [
                     local_contamination::STAYS,
                     cyclic_error::OWN_PHASES,
-                    stick_slip::ANEW,
+                    stick_slip::LEAN,
                 ]
                 .iter()
                 .any(|apart| words.contains(apart))

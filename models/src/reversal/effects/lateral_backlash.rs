@@ -276,7 +276,11 @@ fn moments(kind: usize, k: usize) -> [f64; 3] {
         return [unit(0), unit(1), 1.0 / (2.0 * k as f64 + 1.0)];
     }
     let j = (k - 1) as f64;
-    let [odd, even] = if k % 2 == 0 { [2.0, 0.0] } else { [0.0, 2.0] };
+    let [odd, even] = if k.is_multiple_of(2) {
+        [2.0, 0.0]
+    } else {
+        [0.0, 2.0]
+    };
     let way = std::f64::consts::PI * j;
     [odd / way, -3.0 * even / way, 0.5]
 }

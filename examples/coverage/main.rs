@@ -32,7 +32,8 @@ type Room = (&'static str, u64, fn(u64) -> Vec<Row>);
 /// One line a model.
 const ROOMS: &[Room] = &[
     ("reversal", 2000, reversal::rows),
-    ("designs", 400, designs::rows),
+    ("designs", 4000, designs::bound),
+    ("designs-noise", 400, designs::laws),
     ("with", 200, with::rows),
     ("joined", 400, joined::rows),
     ("staged", 2000, staged::rows),

@@ -8,6 +8,7 @@ use errsep_models::reversal::designs::{
     Design, DesignFit, DesignObservations, DesignOptions, DesignReading, Determined, Zero, fit,
 };
 use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::simultaneous::Noise;
 use serde::Serialize;
 
 use super::{DRAWS, MOST_READINGS};
@@ -110,7 +111,7 @@ pub(super) fn promise(name: String, design: &Design, plan: &Common) -> Result<Pr
     let options = DesignOptions {
         zero: plan.zero,
         thickness_mm: plan.thickness,
-        noise_um: Some(plan.noise),
+        noise: Noise::Declared(plan.noise),
         ..DesignOptions::default()
     };
     let fit = fit(&observations, &options)
@@ -136,7 +137,6 @@ pub(super) fn promise(name: String, design: &Design, plan: &Common) -> Result<Pr
 fn readings_of(design: &Design, plan: &Common) -> Result<DesignObservations, String> {
     let [alpha_h, alpha_v, gamma_1, gamma_2, cone] = plan.slopes.map(|urad| urad * 1e-6);
     let (made, _) = simulate(&DesignPlan {
-        design: design.clone(),
         slopes_rad: [alpha_h, alpha_v, gamma_1, gamma_2, cone, 0.0, 0.0],
         kept_um: (plan.zero == Zero::Kept).then_some([0.0; 3]),
         thickness_mm: plan.thickness,
@@ -148,6 +148,7 @@ fn readings_of(design: &Design, plan: &Common) -> Result<DesignObservations, Str
             .max(LEAST_NOISE * plan.forms[0].max(plan.forms[1])),
         forms_um: plan.forms,
         seed: plan.seed,
+        ..DesignPlan::of(design.clone())
     })
     .map_err(|why| why.to_string())?;
     let positions = design.positions();

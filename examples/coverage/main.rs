@@ -20,6 +20,7 @@ mod reversal;
 mod staged;
 mod step_diagonal;
 mod tally;
+mod turning_bar;
 mod with;
 
 use std::process::ExitCode;
@@ -34,6 +35,7 @@ const ROOMS: &[Room] = &[
     ("reversal", 2000, reversal::rows),
     ("designs", 4000, designs::bound),
     ("designs-noise", 400, designs::laws),
+    ("turning-bar", 200, turning_bar::rows),
     ("with", 200, with::rows),
     ("joined", 400, joined::rows),
     ("staged", 2000, staged::rows),

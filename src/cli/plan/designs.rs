@@ -205,6 +205,16 @@ fn wanted(fit: &DesignFit, name: &str, plan: &Common) -> Wanted {
     let step = plan.travel / (plan.positions - 1) as f64;
     let x: Vec<f64> = (0..plan.positions).map(|k| k as f64 * step).collect();
     let is_form = name.starts_with('M') || name.starts_with('S');
+    // What the knots miss of the supposed forms counts as noise in a fit; here the noise alone is wanted.
+    let missed = fit.agreement.missed;
+    let by_noise = |std: f64, of_form: bool| {
+        let own = if of_form {
+            (std * std - missed * missed).max(0.0).sqrt()
+        } else {
+            std
+        };
+        own / 1.0_f64.hypot(missed / plan.noise)
+    };
     let rms = |std: &[f64]| (std.iter().map(|s| s * s).sum::<f64>() / std.len() as f64).sqrt();
     let std = if is_form {
         let forms = fit.forms(&x).into_iter();
@@ -213,11 +223,11 @@ fn wanted(fit: &DesignFit, name: &str, plan: &Common) -> Wanted {
             let told = fit.forms(&x[..1]);
             told.iter().filter(|f| f.side.is_some()).count() == fit.design.sides().len()
         };
-        of.map(|f| rms(&f.std))
+        of.map(|f| rms(&f.std.iter().map(|s| by_noise(*s, true)).collect::<Vec<_>>()))
             .reduce(f64::max)
             .filter(|_| complete)
     } else {
-        fit.slope(name).map(|v| v.std)
+        fit.slope(name).map(|v| by_noise(v.std, false))
     };
     Wanted {
         quantity: name.to_owned(),

@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 
 use super::reversal::Args;
 use crate::cli::Answer;
+use crate::io::message::nearest;
 use crate::io::{CsvTable, Message};
 
 /// Microradians in a radian, as the options are given.
@@ -102,15 +103,19 @@ pub(super) fn run(args: &Args, text: &str) -> Result<Answer, Message> {
     let table = CsvTable::new("readings.csv")
         .numbers("indicator", column(&|r| channels[r.channel].indicator))
         .numbers("spindle", column(&|r| channels[r.channel].spindle))
-        .numbers("repeat", column(&|r| f64::from(r.repeat)))
-        .words(
+        .numbers("repeat", column(&|r| f64::from(r.repeat)));
+    let ways = readings
+        .iter()
+        .map(|r| u8::from(r.direction == Direction::Backward));
+    let table = match args.both_directions {
+        true => table.words(
             "direction",
             ["forward", "backward"],
-            readings
-                .iter()
-                .map(|r| u8::from(r.direction == Direction::Backward))
-                .collect::<Vec<_>>(),
-        )
+            ways.collect::<Vec<_>>(),
+        ),
+        false => table,
+    };
+    let table = table
         .numbers("time", column(&|r| r.time.unwrap_or(f64::NAN)))
         .numbers("x", column(&|r| r.x))
         .numbers("reading", column(&|r| r.value));
@@ -164,7 +169,6 @@ fn effects(args: &Args, plan: &DesignPlan) -> Result<Vec<(String, DesignEffect)>
     // Of its own: the noise is the same with effects and without.
     let mut random = ChaCha8Rng::seed_from_u64(!args.common.seed);
     let one = |text: &String| {
-        let known = || format!("the effects are {}", DESIGN_EFFECTS.join(", "));
         let (name, size) = text.split_once('=').ok_or_else(|| {
             refused(
                 format!("--effect {text} has no size"),
@@ -184,7 +188,11 @@ fn effects(args: &Args, plan: &DesignPlan) -> Result<Vec<(String, DesignEffect)>
             })?;
         let name = name.trim();
         if !DESIGN_EFFECTS.contains(&name) {
-            return Err(refused(format!("there is no effect {name}"), known()));
+            let remedy = match nearest(name, DESIGN_EFFECTS) {
+                Some(near) => format!("did you mean {near}?"),
+                None => format!("the effects are {}", DESIGN_EFFECTS.join(", ")),
+            };
+            return Err(refused(format!("there is no effect `{name}`"), remedy));
         }
         if name == "off-crest" && plan.thickness_mm == 0.0 {
             return Err(refused(

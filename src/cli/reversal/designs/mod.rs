@@ -125,7 +125,7 @@ fn write_corrected(
         args.data.display().to_string().replace(['\n', '\r'], " "),
         args.with.join(" and ")
     );
-    let content = corrected_design(&args.data, &setup.columns, data.dialect, changes, &comment)?;
+    let content = corrected_design(&args.data, setup, data.dialect, changes, &comment)?;
     file.write(&content)
 }
 

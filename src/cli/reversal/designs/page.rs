@@ -30,7 +30,7 @@ pub fn page(file: &Path, setup: &ReversalSetup, o: &Outcome) -> Result<Page, Mes
         .section(Section::new("Set-up").verbatim(format!(
             "{}\n# data: {}\n",
             setup.as_toml(),
-            o.data.dialect
+            o.data.in_words()
         ))))
 }
 

@@ -91,7 +91,7 @@ fn write_all(t: &mut String, file: &Path, o: &Outcome, coverage: &str) -> std::f
         file.display(),
         o.data.observations.readings.len(),
         design.channels().len(),
-        o.data.dialect,
+        o.data.in_words(),
         list(&design.indicators()),
         list(&design.positions()),
         list(design.sides())

@@ -20,6 +20,7 @@ mod reversal;
 mod staged;
 mod step_diagonal;
 mod tally;
+mod turning_bar;
 mod with;
 
 use std::process::ExitCode;
@@ -32,7 +33,9 @@ type Room = (&'static str, u64, fn(u64) -> Vec<Row>);
 /// One line a model.
 const ROOMS: &[Room] = &[
     ("reversal", 2000, reversal::rows),
-    ("designs", 400, designs::rows),
+    ("designs", 4000, designs::bound),
+    ("designs-noise", 400, designs::laws),
+    ("turning-bar", 200, turning_bar::rows),
     ("with", 200, with::rows),
     ("joined", 400, joined::rows),
     ("staged", 2000, staged::rows),

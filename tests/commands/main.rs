@@ -6,6 +6,7 @@ mod circle;
 #[path = "../command/mod.rs"]
 mod command;
 mod designs;
+mod designs_noise_and_tables;
 mod diagnose;
 mod export;
 #[path = "../../models/tests/faulty_machine/mod.rs"]

@@ -2,6 +2,7 @@
 //! form of both sides of the artefact, from traces at two spindle positions.
 
 mod cells;
+mod channel_noise;
 mod combinations;
 mod convention;
 pub mod designs;

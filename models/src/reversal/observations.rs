@@ -120,6 +120,12 @@ impl Observations {
             .collect()
     }
 
+    /// Direction and repeat of a reading, by its place.
+    pub(crate) fn taken(&self, reading: usize) -> (Direction, u32) {
+        let reading = &self.readings[reading];
+        (reading.direction, reading.repeat)
+    }
+
     /// The readings of one channel, in the order of the file.
     pub fn of(&self, channel: Channel) -> impl Iterator<Item = &Reading> {
         self.readings.iter().filter(move |r| r.channel == channel)

@@ -64,7 +64,7 @@ fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<An
     let case = Case {
         readings: format!(
             "{}; {} channels of {} indicators in {} positions of the spindle",
-            data.dialect,
+            data.in_words(),
             design.channels().len(),
             design.indicators().len(),
             design.positions().len()
@@ -121,7 +121,7 @@ pub fn design_with(
     let places = Arc::clone(&model.record().places);
     let whole = model.gathered.is_none() && model.left_out == 0;
     let case = Case {
-        readings: data.dialect.to_string(),
+        readings: data.in_words(),
         notes: notes(&model),
         model,
         along: ALONG,

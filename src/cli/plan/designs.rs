@@ -8,6 +8,7 @@ use errsep_models::reversal::designs::{
     Design, DesignFit, DesignObservations, DesignOptions, DesignReading, Determined, Zero, fit,
 };
 use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::simultaneous::Noise;
 use serde::Serialize;
 
 use super::{DRAWS, MOST_READINGS};
@@ -110,7 +111,7 @@ pub(super) fn promise(name: String, design: &Design, plan: &Common) -> Result<Pr
     let options = DesignOptions {
         zero: plan.zero,
         thickness_mm: plan.thickness,
-        noise_um: Some(plan.noise),
+        noise: Noise::Declared(plan.noise),
         ..DesignOptions::default()
     };
     let fit = fit(&observations, &options)
@@ -136,7 +137,6 @@ pub(super) fn promise(name: String, design: &Design, plan: &Common) -> Result<Pr
 fn readings_of(design: &Design, plan: &Common) -> Result<DesignObservations, String> {
     let [alpha_h, alpha_v, gamma_1, gamma_2, cone] = plan.slopes.map(|urad| urad * 1e-6);
     let (made, _) = simulate(&DesignPlan {
-        design: design.clone(),
         slopes_rad: [alpha_h, alpha_v, gamma_1, gamma_2, cone, 0.0, 0.0],
         kept_um: (plan.zero == Zero::Kept).then_some([0.0; 3]),
         thickness_mm: plan.thickness,
@@ -148,6 +148,7 @@ fn readings_of(design: &Design, plan: &Common) -> Result<DesignObservations, Str
             .max(LEAST_NOISE * plan.forms[0].max(plan.forms[1])),
         forms_um: plan.forms,
         seed: plan.seed,
+        ..DesignPlan::of(design.clone())
     })
     .map_err(|why| why.to_string())?;
     let positions = design.positions();
@@ -204,6 +205,16 @@ fn wanted(fit: &DesignFit, name: &str, plan: &Common) -> Wanted {
     let step = plan.travel / (plan.positions - 1) as f64;
     let x: Vec<f64> = (0..plan.positions).map(|k| k as f64 * step).collect();
     let is_form = name.starts_with('M') || name.starts_with('S');
+    // What the knots miss of the supposed forms counts as noise in a fit; here the noise alone is wanted.
+    let missed = fit.agreement.missed;
+    let by_noise = |std: f64, of_form: bool| {
+        let own = if of_form {
+            (std * std - missed * missed).max(0.0).sqrt()
+        } else {
+            std
+        };
+        own / 1.0_f64.hypot(missed / plan.noise)
+    };
     let rms = |std: &[f64]| (std.iter().map(|s| s * s).sum::<f64>() / std.len() as f64).sqrt();
     let std = if is_form {
         let forms = fit.forms(&x).into_iter();
@@ -212,11 +223,11 @@ fn wanted(fit: &DesignFit, name: &str, plan: &Common) -> Wanted {
             let told = fit.forms(&x[..1]);
             told.iter().filter(|f| f.side.is_some()).count() == fit.design.sides().len()
         };
-        of.map(|f| rms(&f.std))
+        of.map(|f| rms(&f.std.iter().map(|s| by_noise(*s, true)).collect::<Vec<_>>()))
             .reduce(f64::max)
             .filter(|_| complete)
     } else {
-        fit.slope(name).map(|v| v.std)
+        fit.slope(name).map(|v| by_noise(v.std, false))
     };
     Wanted {
         quantity: name.to_owned(),

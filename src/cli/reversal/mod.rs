@@ -4,6 +4,7 @@ mod designs;
 mod diagnosed;
 mod effects;
 mod json;
+mod noise;
 mod outcome;
 mod page;
 mod refusal;

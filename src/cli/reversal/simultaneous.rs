@@ -11,6 +11,7 @@ use errsep_models::reversal::{Channel, Contrast, Observations};
 use errsep_models::uncertainty::DegreesOfFreedom;
 
 use super::effects;
+use super::noise;
 use super::outcome::{Angle, Closure, Convergence, Form, Outcome, Residual};
 use super::refusal::OTHER_UNITS;
 use crate::io::Message;
@@ -239,49 +240,21 @@ fn freedom(all: impl Iterator<Item = f64>) -> DegreesOfFreedom {
     }
 }
 
-/// Share of the noise that might be correlated, and over which part of the range, where nothing tells.
-const SUPPOSED: (f64, f64) = (0.5, 0.05);
-
 /// Where the noise comes from, and what is assumed of it.
 fn noise_words(fit: &Simultaneous, data: &Observations) -> String {
     let alike = fit.noise.windows(2).all(|n| n[0].sigma == n[1].sigma);
-    let of = if alike {
-        "the same in all channels"
-    } else {
-        "the channels differ"
-    };
-    let source = match fit.noise_origin {
-        NoiseOrigin::Repeats(law) => {
-            let part = |variance: f64| number::plain(variance.sqrt(), 2);
-            return format!(
-                "from the repeats, {of}: white {} µm, correlated along a trace {} µm over {} mm, \
-                 shift of a trace {} µm",
-                part(law.white),
-                part(law.correlated),
-                number::plain(law.length, 2),
-                part(law.shift)
-            );
-        }
-        NoiseOrigin::Declared => "declared in the set-up".to_owned(),
-        NoiseOrigin::Residuals => format!(
-            "from the residuals, {of}, {:.0} degrees of freedom",
-            fit.degrees_of_freedom
-        ),
-    };
-    let x = positions(data);
-    let (share, part) = SUPPOSED;
-    let length = part * (x.last().unwrap_or(&0.0) - x.first().unwrap_or(&0.0));
-    match fit.if_correlated(data, share, length) {
-        Ok(factors) if !factors.is_empty() => format!(
-            "{source}; taken as independent from reading to reading, which only repeats would \
-             show: were half of its variance correlated over {} mm along a trace, u of {} would be \
-             {} times as large",
-            number::plain(length, 2),
-            fit.tilts().first().map_or("", |t| t.name.as_str()),
-            number::plain(factors[0], 2)
-        ),
-        _ => source,
-    }
+    noise::words(fit.noise_origin, alike, fit.degrees_of_freedom, || {
+        let x = positions(data);
+        let (share, part) = noise::SUPPOSED;
+        let length = part * (x.last().unwrap_or(&0.0) - x.first().unwrap_or(&0.0));
+        let factors = fit.if_correlated(data, share, length).ok()?;
+        let first = fit.tilts().into_iter().next();
+        Some((
+            length,
+            first.map_or(String::new(), |t| t.name),
+            *factors.first()?,
+        ))
+    })
 }
 
 /// What the noise alone gives a closure of so many points, each the mean of its share of a channel's
@@ -317,11 +290,7 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
 fn warnings(fit: &Simultaneous, closure: Option<&Closure>, setup: &ReversalSetup) -> Vec<String> {
     let mut warnings = Vec::new();
     if fit.agreement.disagree == Some(true) && fit.agreement.missed > 0.0 {
-        warnings.push(format!(
-            "model and readings disagree: beside the noise the model misses {} µm (root mean square); \
-             the uncertainties count it as if it were noise, which is no substitute for finding it",
-            number::plain(fit.agreement.missed, 2)
-        ));
+        warnings.push(noise::disagreement(fit.agreement.missed));
     }
     if fit.knots.verdict == KnotVerdict::TooFew {
         let counted = if fit.agreement.disagree == Some(true) {

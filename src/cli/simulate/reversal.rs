@@ -30,7 +30,8 @@ const URAD: f64 = 1e-6;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
     errsep simulate reversal --alpha 40 --thickness 42 --noise 0.02 --seed 7 --out data
-    errsep simulate reversal --design 0/0,180/0,90/0,270/0,0/180,180/180,90/180,270/180 --alpha-v 25 --out eight")]
+    errsep simulate reversal --design 0/0,180/0,90/0,270/0,0/180,180/180,90/180,270/180 --alpha-v 25 --out eight
+    errsep simulate reversal --design 0/0,180/0,90/0,270/0,0/180,180/180,90/180,270/180 --repeats 3 --both-directions --effect thermal-drift=0.5 --out drifting")]
 pub struct Args {
     /// Tilt between slide and spindle axis, urad.
     #[arg(
@@ -66,9 +67,12 @@ pub struct Args {
     /// Take each repeat forward and backward.
     #[arg(long)]
     pub(super) both_directions: bool,
+    /// With --design: turn the spindle in every repeat. Otherwise a position has all its repeats first.
+    #[arg(long, requires = "design")]
+    pub(super) turn_each_repeat: bool,
     /// Seconds from one reading to the next.
     #[arg(long, value_name = "S", default_value_t = 0.5)]
-    interval: f64,
+    pub(super) interval: f64,
     /// Standard deviation of a reading, um: one figure, or four for 1A,1B,2A,2B.
     #[arg(
         long,

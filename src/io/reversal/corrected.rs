@@ -5,6 +5,8 @@ use std::path::Path;
 
 use super::columns::ColumnMap;
 use super::data::{Readings, channel_of, find_columns};
+use super::designs::wide_columns;
+use super::setup::ReversalSetup;
 use crate::io::dialect::{BYTE_ORDER_MARK, Decimal, Dialect, LineEnd};
 use crate::io::units::LengthUnit;
 use crate::io::{Column, Message, Row, TableReader};
@@ -41,18 +43,26 @@ pub fn corrected(
     })
 }
 
-/// The same of a design: one reading a row.
+/// The same of a design.
 ///
 /// # Errors
 /// As [`corrected`].
 pub fn corrected_design(
     path: &Path,
-    map: &ColumnMap,
+    setup: &ReversalSetup,
     dialect: Dialect,
     changes: &[f64],
     comment: &str,
 ) -> Result<Vec<u8>, Message> {
     let table = TableReader::open(path)?;
+    let wide = wide_columns(&table, setup);
+    if !wide.is_empty() {
+        return rewritten(table, path, dialect, changes, comment, |row| {
+            let read = wide.iter().filter(|(_, c, _)| !row.text(c).is_empty());
+            Ok(read.map(|(_, column, in_um)| (column, *in_um)).collect())
+        });
+    }
+    let map = &setup.columns;
     let reading = table.column(map.column("reading").unwrap_or("reading"))?;
     let unit = map.unit("reading").or(reading.length_unit());
     let in_um = unit.unwrap_or(LengthUnit::Um).in_um();

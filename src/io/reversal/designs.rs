@@ -26,6 +26,24 @@ pub struct DesignData {
     pub first: Vec<Place>,
     /// Channels of the set-up that have no reading.
     pub not_read: Vec<String>,
+    /// How the readings are laid out.
+    pub layout: Layout,
+    /// Empty fields of a wide table: positions at which a channel was not read.
+    pub gaps: usize,
+}
+
+impl DesignData {
+    /// How the file was read, in words.
+    pub fn in_words(&self) -> String {
+        match (self.layout, self.gaps) {
+            (Layout::Tidy, _) => self.dialect.to_string(),
+            (Layout::Wide, 0) => format!("{}; one column a channel", self.dialect),
+            (Layout::Wide, gaps) => format!(
+                "{}; one column a channel; {gaps} empty fields taken as positions not read",
+                self.dialect
+            ),
+        }
+    }
 }
 
 /// Readings of the four channels, or of another design.
@@ -75,13 +93,70 @@ enum Naming {
     Name(Column),
 }
 
-fn read_design(mut table: TableReader, setup: &ReversalSetup) -> Result<DesignData, Message> {
-    if setup.columns.is_empty() {
-        table.only(&ROLES)?;
-    }
+/// Where a row has its readings, each with the µm in its unit.
+enum Fields {
+    One(Naming, Column, f64),
+    /// A column for each channel, with its name.
+    Wide(Vec<(String, Column, f64)>),
+}
+
+/// The names that a column of a channel can have: those of the set-up, and 1A, 1B, 2A, 2B.
+fn channel_names(setup: &ReversalSetup) -> Vec<String> {
+    let own = setup.channels.iter().map(|c| c.name.clone());
+    let four = Channel::ALL.map(|c| c.name().to_owned());
+    let mut names: Vec<String> = own.chain(four).collect();
+    names.retain(|name| !ROLES.contains(&&name[..]));
+    names.dedup();
+    names
+}
+
+/// The columns of a wide table: one a channel.
+pub(super) fn wide_columns(
+    table: &TableReader,
+    setup: &ReversalSetup,
+) -> Vec<(String, Column, f64)> {
+    let of = |name: String| {
+        let renamed = setup.columns.names(&name);
+        let written = match renamed {
+            true => setup.columns.column(&name).unwrap_or(&name),
+            false => &name,
+        };
+        let column = table.optional(written)?;
+        let unit = setup.columns.unit(&name).or(column.length_unit());
+        let in_um = unit.unwrap_or(LengthUnit::Um).in_um();
+        Some((name, column.as_written(), in_um))
+    };
+    let mut wide: Vec<_> = channel_names(setup).into_iter().filter_map(of).collect();
+    wide.sort_by_key(|(_, column, _)| column.index());
+    wide.dedup_by_key(|(_, column, _)| column.index());
+    wide
+}
+
+/// Where the readings of a table stand.
+///
+/// # Errors
+/// Columns that are missing, or that belong to different layouts.
+fn fields(table: &TableReader, setup: &ReversalSetup) -> Result<Fields, Message> {
     let column = |role: &str| setup.columns.column(role).unwrap_or(role).to_owned();
     let needed = |role: &str| table.column(&column(role));
     let optional = |role: &str| table.optional(&column(role));
+    let wide = wide_columns(table, setup);
+    let tidy = ["channel", "indicator", "spindle", "reading"];
+    match (
+        wide.first(),
+        tidy.iter().find(|role| optional(role).is_some()),
+    ) {
+        (Some((name, column, _)), Some(role)) => {
+            let what = format!(
+                "column {name} beside `{role}`: one row a reading, or one column a channel?"
+            );
+            return Err(table
+                .at_column(column, what)
+                .remedy("keep one column a channel, or channel,x,reading, not both"));
+        }
+        (Some(_), None) => return Ok(Fields::Wide(wide)),
+        (None, _) => {}
+    }
     let naming = match (
         optional("indicator"),
         optional("spindle"),
@@ -97,34 +172,83 @@ fn read_design(mut table: TableReader, setup: &ReversalSetup) -> Result<DesignDa
         }
         _ => Naming::Angles(needed("indicator")?, needed("spindle")?),
     };
-    let (x, reading) = (needed("x")?, needed("reading")?);
+    let reading = needed("reading")?;
+    let unit = setup.columns.unit("reading").or(reading.length_unit());
+    let in_um = unit.unwrap_or(LengthUnit::Um).in_um();
+    Ok(Fields::One(naming, reading.as_written(), in_um))
+}
+
+fn read_design(mut table: TableReader, setup: &ReversalSetup) -> Result<DesignData, Message> {
+    if setup.columns.is_empty() {
+        let names = channel_names(setup);
+        let names = names.iter().map(|name| &name[..]);
+        table.only(&ROLES.into_iter().chain(names).collect::<Vec<_>>())?;
+    }
+    let column = |role: &str| setup.columns.column(role).unwrap_or(role).to_owned();
+    let needed = |role: &str| table.column(&column(role));
+    let optional = |role: &str| table.optional(&column(role));
+    let fields = fields(&table, setup)?;
+    let x = needed("x")?;
     let (repeat, way) = (optional("repeat"), optional("direction"));
     let time = optional("time").map(Column::in_s);
     let unit = |role: &str, column: &Column| setup.columns.unit(role).or(column.length_unit());
     let x_mm = unit("x", &x).unwrap_or(LengthUnit::Mm).in_mm();
-    let value_um = unit("reading", &reading).unwrap_or(LengthUnit::Um).in_um();
-    let (x, reading) = (x.as_written(), reading.as_written());
+    let x = x.as_written();
     let mut found = Found {
         known: setup.channels.clone(),
         ..Found::default()
     };
-    let (mut readings, mut lines) = (Vec::new(), Vec::new());
+    let (mut readings, mut lines, mut gaps, mut rows) = (Vec::new(), Vec::new(), 0, 0_usize);
     while let Some(row) = table.next_row()? {
-        let channel = found.channel(row, &naming)?;
-        readings.push(DesignReading {
-            channel,
+        rows += 1;
+        let common = DesignReading {
+            channel: 0,
             repeat: repeat.as_ref().map_or(Ok(1), |c| row.count(c))?,
             direction: way
                 .as_ref()
                 .map_or(Ok(Direction::Forward), |c| direction(row, c))?,
             time: time.as_ref().map(|c| row.number(c)).transpose()?,
             x: row.number(&x)? * x_mm,
-            value: row.number(&reading)? * value_um,
-        });
-        lines.push(row.line());
+            value: 0.0,
+        };
+        let mut add = |channel: usize, value: f64| {
+            readings.push(DesignReading {
+                channel,
+                value,
+                ..common
+            });
+            lines.push(row.line());
+        };
+        match &fields {
+            Fields::One(naming, column, in_um) => {
+                add(found.channel(row, naming)?, row.number(column)? * in_um);
+            }
+            Fields::Wide(columns) => {
+                for (name, column, in_um) in columns {
+                    if row.text(column).is_empty() {
+                        gaps += 1;
+                    } else {
+                        add(
+                            found.by_column(row, name, column)?,
+                            row.number(column)? * in_um,
+                        );
+                    }
+                }
+            }
+        }
     }
-    if readings.is_empty() {
+    if rows == 0 {
         return Err(table.no_rows());
+    }
+    if let Fields::Wide(columns) = &fields
+        && let Some((name, column, _)) = columns.iter().find(|c| !found.by_name.contains_key(&c.0))
+    {
+        return Err(table
+            .at_column(
+                column,
+                format!("channel {name} has a column but no reading"),
+            )
+            .remedy("fill the column, or remove it: the rest is then solved as far as it goes"));
     }
     refuse_duplicates(&table, &found, &readings, &lines)?;
     let names: Vec<&String> = found.channels.iter().map(|c| &c.name).collect();
@@ -141,6 +265,11 @@ fn read_design(mut table: TableReader, setup: &ReversalSetup) -> Result<DesignDa
         dialect: table.dialect(),
         first: found.first,
         not_read,
+        layout: match fields {
+            Fields::One(..) => Layout::Tidy,
+            Fields::Wide(_) => Layout::Wide,
+        },
+        gaps,
     })
 }
 
@@ -163,7 +292,7 @@ impl Found {
                 if let Some(at) = self.by_name.get(name) {
                     return Ok(*at);
                 }
-                let channel = self.named(row, column)?;
+                let channel = self.named(row, column, name)?;
                 let at = self.add(row, column, channel)?;
                 self.by_name.insert(name.to_owned(), at);
                 Ok(at)
@@ -190,9 +319,19 @@ impl Found {
         }
     }
 
+    /// The channel of a column of a wide table.
+    fn by_column(&mut self, row: Row<'_>, name: &str, column: &Column) -> Result<usize, Message> {
+        if let Some(at) = self.by_name.get(name) {
+            return Ok(*at);
+        }
+        let channel = self.named(row, column, name)?;
+        let at = self.add(row, column, channel)?;
+        self.by_name.insert(name.to_owned(), at);
+        Ok(at)
+    }
+
     /// The channel of a name: of the set-up, or one of the four.
-    fn named(&self, row: Row<'_>, column: &Column) -> Result<DesignChannel, Message> {
-        let name = row.text(column);
+    fn named(&self, row: Row<'_>, column: &Column, name: &str) -> Result<DesignChannel, Message> {
         if let Some(channel) = self.known.iter().find(|c| c.name == name) {
             return Ok(channel.clone());
         }
@@ -292,9 +431,9 @@ fn as_four(data: &DesignData, channels: &[Channel]) -> ReversalData {
             readings: data.observations.readings.iter().map(reading).collect(),
         },
         dialect: data.dialect,
-        layout: Layout::Tidy,
+        layout: data.layout,
         ignored: Vec::new(),
-        gaps: 0,
+        gaps: data.gaps,
         first,
     }
 }

@@ -6,6 +6,7 @@ use super::channel::Design;
 use super::determined::Determined;
 use super::problem::DesignProblem;
 use super::words;
+use crate::reversal::channel_noise::scatter::Scatter;
 use crate::reversal::staged::Value;
 
 /// A combination of channels that is zero whatever the forms are.
@@ -33,13 +34,13 @@ pub struct PositionSlope {
     pub value: Value,
 }
 
-/// The closures of the forms, from the residuals (µm, by channel).
+/// The closures of the forms, from the residuals and the noise of a reading (µm, by channel).
 pub(super) fn profiles(
     design: &Design,
     determined: &Determined,
     problem: &DesignProblem,
     residuals: &[Vec<f64>],
-    noise_um: f64,
+    sigmas: &[f64],
 ) -> Vec<DesignClosure> {
     determined
         .forms
@@ -59,12 +60,12 @@ pub(super) fn profiles(
             };
             let scaled: Vec<(usize, f64)> =
                 channels.iter().map(|c| (*c, scale * weights[*c])).collect();
-            let (x, profile, variance) = profile(problem, residuals, &scaled);
+            let (x, profile, variance) = profile(problem, residuals, sigmas, &scaled);
             let count = profile.len().max(1) as f64;
             DesignClosure {
                 name,
                 rms: (profile.iter().map(|v| v * v).sum::<f64>() / count).sqrt(),
-                expected_rms: noise_um * (variance / count).sqrt(),
+                expected_rms: (variance / count).sqrt(),
                 x,
                 profile,
             }
@@ -73,10 +74,11 @@ pub(super) fn profiles(
 }
 
 /// Point by point where the traces share their positions, otherwise by means over the cells of the
-/// forms; and the sum over the points of their variance for unit noise.
+/// forms; and the sum over the points of their variance by the noise alone, µm².
 fn profile(
     problem: &DesignProblem,
     residuals: &[Vec<f64>],
+    sigmas: &[f64],
     weights: &[(usize, f64)],
 ) -> (Vec<f64>, Vec<f64>, f64) {
     let traces = problem.traces;
@@ -107,7 +109,7 @@ fn profile(
             complete &= to > *at;
             sum += weight * residuals[*c][*at..to].iter().sum::<f64>() / count;
             place += trace.x[*at..to].iter().sum::<f64>() / count / weights.len() as f64;
-            own += weight * weight / count;
+            own += (weight * sigmas[*c]).powi(2) / count;
             *at = to;
         }
         if complete {
@@ -119,12 +121,11 @@ fn profile(
     (x, profile, variance)
 }
 
-/// The slopes of the positions, each released by itself. `unit` is the weighted sum of squares with its
-/// degrees of freedom, where the noise is not declared.
+/// The slopes of the positions, each released by itself.
 pub(super) fn slopes(
     problem: &DesignProblem,
     result: &StructuredFit,
-    unit: Option<(f64, f64)>,
+    scatter: &Scatter,
 ) -> Vec<PositionSlope> {
     problem
         .layout
@@ -132,20 +133,12 @@ pub(super) fn slopes(
         .filter_map(|index| {
             let (value, covariance) = result.released(problem, index)?;
             let own = covariance.variance(&[], &[(index, 1.0)]);
-            let variance = match unit {
-                None => 1.0,
-                // The slope takes its part of the sum of squares, and one degree of freedom.
-                Some((squares, freedom)) if freedom > 1.0 => {
-                    ((squares - value * value / own) / (freedom - 1.0)).max(0.0)
-                }
-                Some((squares, freedom)) => squares / freedom,
-            };
+            // The slope takes its part of the sum of squares, and one degree of freedom.
+            let scatter = scatter.released(value * value / own);
+            let (std, _) = scatter.spread(&covariance, &[], &[(index, 1.0)]);
             Some(PositionSlope {
                 name: problem.layout.names[index].clone(),
-                value: Value {
-                    value,
-                    std: (variance * own).sqrt(),
-                },
+                value: Value { value, std },
             })
         })
         .collect()

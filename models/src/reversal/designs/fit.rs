@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 use std::time::Instant;
 
-use errsep_solvers::linear::bordered::Bordered;
+use errsep_solvers::linear::bordered::{Bordered, BorderedCovariance};
+use errsep_solvers::loss::Loss;
 use errsep_solvers::options::Options as Minimisation;
 use errsep_solvers::structured::{Parameters, StructuredProblem, evaluate, fit_structured};
 use nalgebra::DVector;
@@ -14,15 +15,20 @@ use super::error::DesignFitError;
 use super::layout::{FormOf, Layout};
 use super::problem::DesignProblem;
 use super::readings::{DesignObservations, Trace, range};
-use super::solution::DesignFit;
+use super::solution::{DesignFit, Reached};
 use super::staged;
 use crate::basis::bspline::CubicBSpline;
+use crate::reversal::channel_noise::along::AtRest;
+use crate::reversal::channel_noise::settle::{Asked, Settled, settle};
+use crate::reversal::channel_noise::survey::Survey;
+use crate::reversal::channel_noise::weights_of;
+use crate::reversal::channel_noise::white::Told;
 use crate::reversal::forward::Attitude;
 use crate::reversal::simultaneous::fitted_knots::FittedKnots;
 use crate::reversal::simultaneous::knots::{
     FEWEST_POSITIONS, KnotTrial, PATIENCE, POSITIONS_A_CELL, ladder, trial,
 };
-use crate::reversal::simultaneous::{Axis, Knots};
+use crate::reversal::simultaneous::{Axis, Knots, Noise};
 
 /// Fewest readings beyond the unknowns from which the noise is told.
 pub const FEWEST_FREE: usize = 3;
@@ -34,8 +40,8 @@ pub struct DesignOptions {
     pub zero: Zero,
     /// Diameter of the artefact, mm; zero where it is not known: no shift between probe points.
     pub thickness_mm: f64,
-    /// Standard deviation of one reading, µm, the same in all channels; `None`: from the residuals.
-    pub noise_um: Option<f64>,
+    /// Noise of a reading.
+    pub noise: Noise,
     /// Break points of the forms.
     pub knots: Knots,
     /// Settings of the minimisation.
@@ -47,7 +53,7 @@ impl Default for DesignOptions {
         Self {
             zero: Zero::default(),
             thickness_mm: 0.0,
-            noise_um: None,
+            noise: Noise::default(),
             knots: Knots::default(),
             minimisation: Minimisation::structured(),
         }
@@ -66,25 +72,65 @@ pub fn fit(
     check(observations, options)?;
     let traces = Trace::sort(observations);
     let determined = Determined::of(&observations.design, options.zero);
-    let ground = Ground::new(&observations.design, &determined, &traces, options)?;
+    let survey = Survey::new(&traces, |i| observations.taken(i));
+    let mut sigmas = survey.first_noise(options.noise);
+    let weights = weights_of(&sigmas);
+    let ground = Ground::new(&observations.design, &determined, &traces, weights, options)?;
     let (breaks, table) = ground.breaks()?;
     let layout = ground.layout.with_coefficients(breaks.len() + 2);
-    enough(&traces, layout.free_count(), options.noise_um.is_some())?;
-    let (problem, start) = ground.problem(layout, &breaks)?;
-    let result = fit_structured(&problem, start, &options.minimisation)?;
-    let residuals = problem.residuals(&result.parameters)?;
-    let knots = FittedKnots::new(breaks, table, &residuals);
-    let mut solution = DesignFit::new(
-        observations,
-        determined.clone(),
-        &problem,
-        &result,
-        residuals,
+    enough(&traces, layout.free_count(), is_declared(options))?;
+    let (mut problem, start) = ground.problem(layout, &breaks)?;
+    let asked = Asked {
+        noise: options.noise,
+        loss: Loss::Quadratic,
+        minimisation: &options.minimisation,
+    };
+    let settled = settle(&mut problem, start, asked, &survey, &mut sigmas)?;
+    let Some(covariance) = settled.fit.covariance() else {
+        let ending = settled.fit.ending.to_string();
+        return Err(DesignFitError::NotConverged { ending });
+    };
+    let told = told(&problem, &settled, &covariance, &survey, &sigmas, options)?;
+    let knots = FittedKnots::new(breaks, table, &settled.residuals);
+    let reached = Reached {
+        problem: &problem,
+        settled,
+        covariance,
+        told,
+        sigmas,
         knots,
-        options,
-    )?;
+    };
+    let mut solution = DesignFit::new(observations, determined.clone(), reached);
     solution.convergence.seconds = began.elapsed().as_secs_f64();
     Ok(solution)
+}
+
+/// What the fit tells of its noise: white, unless repeats tell more.
+fn told(
+    problem: &DesignProblem,
+    settled: &Settled,
+    covariance: &BorderedCovariance,
+    survey: &Survey,
+    sigmas: &[f64],
+    options: &DesignOptions,
+) -> Result<Told, DesignFitError> {
+    let white = Told::white(problem, settled, sigmas, options.noise, Loss::Quadratic);
+    if is_declared(options) || survey.repeats.is_empty() {
+        return Ok(white);
+    }
+    let prepared = problem.at(&settled.fit.parameters)?;
+    let layout = &problem.layout;
+    let at_rest = AtRest {
+        row: |channel, row| problem.derivatives(&prepared, channel, row),
+        covariance,
+        weights: &problem.weights,
+        counts: (
+            layout.band_count(),
+            layout.border_count(),
+            layout.free_count(),
+        ),
+    };
+    Ok(Told::along(&at_rest, survey, &settled.residuals, sigmas)?.unwrap_or(white))
 }
 
 /// The largest difference between an analytic derivative of a residual at the fit and a central
@@ -99,7 +145,9 @@ pub fn central_differences(
 ) -> Result<f64, DesignFitError> {
     let traces = Trace::sort(observations);
     let determined = Determined::of(&observations.design, options.zero);
-    let ground = Ground::new(&observations.design, &determined, &traces, options)?;
+    let survey = Survey::new(&traces, |i| observations.taken(i));
+    let weights = weights_of(&survey.first_noise(options.noise));
+    let ground = Ground::new(&observations.design, &determined, &traces, weights, options)?;
     let (breaks, _) = ground.breaks()?;
     let layout = ground.layout.with_coefficients(breaks.len() + 2);
     let (problem, start) = ground.problem(layout, &breaks)?;
@@ -107,6 +155,11 @@ pub fn central_differences(
     let analytic = problem.jacobian(&at)?;
     let n = at.band.len();
     let slopes = n..n + problem.layout.constants_from();
+    let by_row: Vec<f64> = traces
+        .iter()
+        .zip(&problem.weights)
+        .flat_map(|(t, weight)| vec![*weight; t.len()])
+        .collect();
     let mut worst: f64 = 0.0;
     for (j, column) in analytic.column_iter().enumerate() {
         let step = if slopes.contains(&j) { 1e-7 } else { 1e-2 };
@@ -122,7 +175,7 @@ pub fn central_differences(
         let largest = column.amax();
         for (i, own) in column.iter().enumerate() {
             // The rows are model less reading.
-            let difference = -problem.weight * (up[i] - down[i]) / (2.0 * step);
+            let difference = -by_row[i] * (up[i] - down[i]) / (2.0 * step);
             worst = worst.max((own - difference).abs() / largest);
         }
     }
@@ -135,7 +188,7 @@ fn check(observations: &DesignObservations, options: &DesignOptions) -> Result<(
     if !(options.thickness_mm >= 0.0 && options.thickness_mm.is_finite()) {
         return not_usable("the thickness".into(), options.thickness_mm, "0 mm or more");
     }
-    if let Some(sigma) = options.noise_um
+    if let Noise::Declared(sigma) = options.noise
         && !(sigma > 0.0 && sigma.is_finite())
     {
         return not_usable("the noise".into(), sigma, "above 0 um");
@@ -162,6 +215,10 @@ fn check(observations: &DesignObservations, options: &DesignOptions) -> Result<(
     Ok(())
 }
 
+fn is_declared(options: &DesignOptions) -> bool {
+    matches!(options.noise, Noise::Declared(_))
+}
+
 /// Whether there are as many readings and positions as the unknowns need.
 fn enough(traces: &[Trace], unknowns: usize, declared: bool) -> Result<(), DesignFitError> {
     let readings: usize = traces.iter().map(Trace::len).sum();
@@ -186,6 +243,8 @@ struct Ground<'a> {
     /// Tilt (rad) and height (µm) of each channel's line.
     lines: Vec<(f64, f64)>,
     axis: Axis,
+    /// First weights, 1/σ by channel.
+    weights: Vec<f64>,
 }
 
 impl<'a> Ground<'a> {
@@ -193,6 +252,7 @@ impl<'a> Ground<'a> {
         design: &'a Design,
         determined: &'a Determined,
         traces: &'a [Trace],
+        weights: Vec<f64>,
         options: &'a DesignOptions,
     ) -> Result<Self, DesignFitError> {
         let lines = staged::lines(design, traces)?;
@@ -208,11 +268,8 @@ impl<'a> Ground<'a> {
             options,
             lines,
             axis: Axis { center, scale },
+            weights,
         })
-    }
-
-    fn weight(&self) -> f64 {
-        self.options.noise_um.map_or(1.0, |sigma| 1.0 / sigma)
     }
 
     /// The break points that the options ask for, and the ladder where they are chosen.
@@ -237,7 +294,7 @@ impl<'a> Ground<'a> {
     /// unknowns and needs as many positions, and all unknowns need as many readings.
     fn most_cells(&self) -> usize {
         let readings: usize = self.traces.iter().map(Trace::len).sum();
-        let free = if self.options.noise_um.is_some() {
+        let free = if is_declared(self.options) {
             0
         } else {
             FEWEST_FREE
@@ -330,7 +387,7 @@ impl<'a> Ground<'a> {
             bases,
             self.axis,
             half_mm,
-            self.weight(),
+            self.weights.clone(),
         );
         Ok((problem, start))
     }

@@ -15,6 +15,7 @@ mod analysis;
 mod channel;
 mod closure;
 mod determined;
+mod disturbance;
 mod error;
 mod fit;
 mod layout;

@@ -2,6 +2,7 @@
 
 use super::channel::Design;
 use crate::reversal::Direction;
+use crate::reversal::channel_noise::SortedReadings;
 
 /// One indicator reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +30,14 @@ pub struct DesignObservations {
     pub readings: Vec<DesignReading>,
 }
 
+impl DesignObservations {
+    /// Direction and repeat of a reading, by its place.
+    pub(crate) fn taken(&self, reading: usize) -> (Direction, u32) {
+        let reading = &self.readings[reading];
+        (reading.direction, reading.repeat)
+    }
+}
+
 /// The readings of one channel in growing order of position.
 #[derive(Debug, Clone)]
 pub struct Trace {
@@ -38,6 +47,20 @@ pub struct Trace {
     pub value: Vec<f64>,
     /// Where each reading stands among the observations.
     pub source: Vec<usize>,
+}
+
+impl SortedReadings for Trace {
+    fn x(&self) -> &[f64] {
+        &self.x
+    }
+
+    fn value(&self) -> &[f64] {
+        &self.value
+    }
+
+    fn source(&self, row: usize) -> usize {
+        self.source[row]
+    }
 }
 
 impl Trace {

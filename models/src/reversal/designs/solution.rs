@@ -3,21 +3,25 @@
 use errsep_solvers::linear::bordered::BorderedCovariance;
 use errsep_solvers::outcome::{Ending, Iteration};
 use errsep_solvers::problem::NoValue;
-use errsep_solvers::structured::{Parameters, StructuredFit};
+use errsep_solvers::structured::Parameters;
 
 use super::analysis::Analysis;
 use super::channel::Design;
 use super::closure::{self, DesignClosure, PositionSlope};
 use super::determined::{Determined, SLOPES};
-use super::error::DesignFitError;
-use super::fit::DesignOptions;
 use super::layout::{FormOf, Layout};
 use super::problem::DesignProblem;
-use super::readings::DesignObservations;
+use super::readings::{DesignObservations, Trace};
 use crate::basis::bspline::{Cubic, CubicBSpline, horner};
+use crate::reversal::channel_noise::along::Gathered;
+use crate::reversal::channel_noise::scatter::Scatter;
+use crate::reversal::channel_noise::settle::Settled;
+use crate::reversal::channel_noise::survey::Survey;
+use crate::reversal::channel_noise::white::Told;
+use crate::reversal::channel_noise::{rms, traces};
 use crate::reversal::forward::Attitude;
-use crate::reversal::simultaneous::Axis;
 use crate::reversal::simultaneous::fitted_knots::FittedKnots;
+use crate::reversal::simultaneous::{Agreement, Axis, NoiseOrigin};
 use crate::reversal::staged::Value;
 use crate::units::{UM_PER_MM, mm_from_um};
 
@@ -31,6 +35,8 @@ pub struct Found {
     pub alone: bool,
     /// rad for slopes, µm for constants.
     pub value: Value,
+    /// Degrees of freedom of its standard uncertainty; infinite where the noise is declared.
+    pub degrees_of_freedom: f64,
 }
 
 /// A fitted form, or forms that the design does not tell apart.
@@ -46,15 +52,19 @@ pub struct FoundForm {
     pub values: Vec<f64>,
     /// Standard uncertainties, µm.
     pub std: Vec<f64>,
+    /// Degrees of freedom of these: the fewest of any point.
+    pub degrees_of_freedom: f64,
 }
 
-/// Residuals of one channel.
+/// Residuals and noise of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelResiduals {
     /// Number of readings.
     pub readings: usize,
     /// Root mean square, µm.
     pub rms: f64,
+    /// Standard deviation of one reading, µm, without what the model misses.
+    pub sigma: f64,
 }
 
 /// How the fit went.
@@ -83,14 +93,17 @@ pub struct DesignFit {
     covariance: BorderedCovariance,
     /// Half the thickness of the artefact, mm.
     half_mm: f64,
-    /// Variance of a weighted reading.
-    variance: f64,
+    scatter: Scatter,
+    /// 1/σ by channel, 1/µm.
+    weights: Vec<f64>,
     /// ½ Σ r² of the weighted residuals.
     pub cost: f64,
-    /// Standard deviation of one reading, µm: declared, or from the residuals.
+    /// Standard deviation of one reading, µm, all channels together.
     pub noise_um: f64,
-    /// Whether it was declared.
-    pub noise_declared: bool,
+    /// Where the noise comes from.
+    pub noise_origin: NoiseOrigin,
+    /// Whether model and readings agree.
+    pub agreement: Agreement,
     /// Readings less unknowns.
     pub degrees_of_freedom: f64,
     /// Reading less model, µm, in the order of the observations.
@@ -107,44 +120,50 @@ pub struct DesignFit {
     pub convergence: DesignConvergence,
 }
 
+/// A minimum with its noise.
+pub(super) struct Reached<'a> {
+    pub problem: &'a DesignProblem<'a>,
+    pub settled: Settled,
+    pub covariance: BorderedCovariance,
+    pub told: Told,
+    /// Standard deviation of a reading of each channel in the weights, µm.
+    pub sigmas: Vec<f64>,
+    pub knots: FittedKnots,
+}
+
 impl DesignFit {
     pub(super) fn new(
         observations: &DesignObservations,
         determined: Determined,
-        problem: &DesignProblem,
-        result: &StructuredFit,
-        by_channel: Vec<Vec<f64>>,
-        knots: FittedKnots,
-        options: &DesignOptions,
-    ) -> Result<Self, DesignFitError> {
-        let Some(covariance) = result.covariance() else {
-            let ending = result.ending.to_string();
-            return Err(DesignFitError::NotConverged { ending });
-        };
+        reached: Reached,
+    ) -> Self {
+        let Reached { problem, told, .. } = reached;
+        let (result, left) = (&reached.settled.fit, &reached.settled.residuals);
         let readings = observations.readings.len();
-        let degrees_of_freedom = readings as f64 - problem.layout.free_count() as f64;
-        let squares: f64 = by_channel.iter().flatten().map(|r| r * r).sum();
-        let (variance, noise_um) = match options.noise_um {
-            Some(sigma) => (1.0, sigma),
-            None => {
-                let variance = squares / degrees_of_freedom;
-                (variance, variance.sqrt())
-            }
-        };
         let mut residuals = vec![0.0; readings];
-        for (trace, own) in problem.traces.iter().zip(&by_channel) {
+        for (trace, own) in problem.traces.iter().zip(left) {
             for (i, r) in trace.source.iter().zip(own) {
                 residuals[*i] = *r;
             }
         }
+        let by_channel: Vec<ChannelResiduals> = left
+            .iter()
+            .zip(&reached.sigmas)
+            .map(|(own, sigma)| ChannelResiduals {
+                readings: own.len(),
+                rms: rms(own),
+                sigma: sigma * told.unit,
+            })
+            .collect();
+        let sigmas: Vec<f64> = by_channel.iter().map(|c| c.sigma).collect();
+        let squares = by_channel
+            .iter()
+            .map(|c| c.readings as f64 * c.sigma * c.sigma);
+        let noise_um = (squares.sum::<f64>() / readings as f64).sqrt();
         let design = observations.design.clone();
-        let closures = closure::profiles(&design, &determined, problem, &by_channel, noise_um);
-        let unit = match options.noise_um {
-            Some(_) => None,
-            None => Some((squares, degrees_of_freedom)),
-        };
-        let position_slopes = closure::slopes(problem, result, unit);
-        Ok(Self {
+        Self {
+            closures: closure::profiles(&design, &determined, problem, left, &sigmas),
+            position_slopes: closure::slopes(problem, result, &told.scatter),
             design,
             determined,
             layout: problem.layout.clone(),
@@ -152,46 +171,62 @@ impl DesignFit {
             cubics: problem.cubics(&result.parameters),
             axis: problem.axis,
             parameters: result.parameters.clone(),
-            covariance,
+            covariance: reached.covariance,
             half_mm: problem.half_mm,
-            variance,
+            scatter: told.scatter,
+            weights: problem.weights.clone(),
             cost: result.cost,
             noise_um,
-            noise_declared: options.noise_um.is_some(),
-            degrees_of_freedom,
+            noise_origin: told.origin,
+            agreement: told.agreement,
+            degrees_of_freedom: readings as f64 - problem.layout.free_count() as f64,
             residuals,
-            by_channel: by_channel
-                .iter()
-                .map(|own| ChannelResiduals {
-                    readings: own.len(),
-                    rms: (own.iter().map(|r| r * r).sum::<f64>() / own.len() as f64).sqrt(),
-                })
-                .collect(),
-            closures,
-            position_slopes,
-            knots,
+            by_channel,
+            knots: reached.knots,
             convergence: DesignConvergence {
                 ending: result.ending.clone(),
-                history: result.history.clone(),
+                history: reached.settled.history.clone(),
                 seconds: 0.0,
             },
-        })
-    }
-
-    /// Degrees of freedom of every standard uncertainty: infinite where the noise was declared.
-    pub fn freedom(&self) -> f64 {
-        if self.noise_declared {
-            f64::INFINITY
-        } else {
-            self.degrees_of_freedom
         }
     }
 
-    fn border_value(&self, j: usize) -> Value {
-        Value {
-            value: self.parameters.border[j],
-            std: (self.variance * self.covariance.variance(&[], &[(j, 1.0)])).sqrt(),
-        }
+    /// By what factor the standard uncertainty of each of [`Self::slopes`] would change if that share of
+    /// the noise's variance were correlated along the traces over a length, mm, instead of white.
+    ///
+    /// # Errors
+    /// [`NoValue`] where a probe touches in two places.
+    pub fn if_correlated(
+        &self,
+        observations: &DesignObservations,
+        share: f64,
+        length: f64,
+    ) -> Result<Vec<f64>, NoValue> {
+        let own = Trace::sort(observations);
+        let survey = Survey::new(&own, |i| observations.taken(i));
+        let groups = traces::grouped(&survey.x, &survey.traces);
+        let problem = DesignProblem::new(
+            &own,
+            self.layout.clone(),
+            self.bases.clone(),
+            self.axis,
+            self.half_mm,
+            self.weights.clone(),
+        );
+        let prepared = problem.at(&self.parameters)?;
+        let row = |channel, row| problem.derivatives(&prepared, channel, row);
+        let gathered = Gathered::new(row, &survey, &groups, &self.weights)?;
+        let factor = |p: &usize| {
+            let own = gathered.against_white(&self.covariance, &[(*p, 1.0)], share, length);
+            own.sqrt()
+        };
+        Ok(self.slope_order().iter().map(factor).collect())
+    }
+
+    fn border_value(&self, j: usize) -> (Value, f64) {
+        let (std, freedom) = self.scatter.spread(&self.covariance, &[], &[(j, 1.0)]);
+        let value = self.parameters.border[j];
+        (Value { value, std }, freedom)
     }
 
     fn found(&self, analysis: &Analysis, from: usize) -> Vec<Found> {
@@ -199,22 +234,34 @@ impl DesignFit {
         let pivots = analysis.pivots().iter().enumerate();
         pivots
             .zip(names)
-            .map(|((p, j), name)| Found {
-                alone: analysis.alone(&analysis.unknowns()[*j]).is_some(),
-                name,
-                value: self.border_value(from + p),
+            .map(|((p, j), name)| {
+                let (value, degrees_of_freedom) = self.border_value(from + p);
+                Found {
+                    alone: analysis.alone(&analysis.unknowns()[*j]).is_some(),
+                    name,
+                    value,
+                    degrees_of_freedom,
+                }
             })
             .collect()
     }
 
-    /// The slopes, rad, or what is determined of them, those of the slide first.
-    pub fn slopes(&self) -> Vec<Found> {
-        let mut slopes = self.found(&self.determined.slopes, 0);
-        slopes.sort_by_key(|found| {
-            let first = found.name.split(' ').next();
+    /// The places of the fitted slopes, those of the slide first.
+    fn slope_order(&self) -> Vec<usize> {
+        let names = Determined::names(&self.determined.slopes);
+        let mut order: Vec<usize> = (0..names.len()).collect();
+        order.sort_by_key(|p| {
+            let first = names[*p].split(' ').next();
             SLOPES.iter().position(|name| Some(*name) == first)
         });
-        slopes
+        order
+    }
+
+    /// The slopes, rad, or what is determined of them, those of the slide first.
+    pub fn slopes(&self) -> Vec<Found> {
+        let found = self.found(&self.determined.slopes, 0);
+        let order = self.slope_order().into_iter();
+        order.map(|p| found[p].clone()).collect()
     }
 
     /// The constants, µm, or what is determined of them.
@@ -224,13 +271,13 @@ impl DesignFit {
 
     /// A slope by its name; `None` where the design does not determine it by itself.
     pub fn slope(&self, name: &str) -> Option<Value> {
-        Some(self.border_value(self.determined.slopes.alone(name)?))
+        Some(self.border_value(self.determined.slopes.alone(name)?).0)
     }
 
     /// A constant by its name; `None` where the design does not determine it by itself.
     pub fn constant(&self, name: &str) -> Option<Value> {
         let p = self.determined.constants.alone(name)?;
-        Some(self.border_value(self.layout.constants_from() + p))
+        Some(self.border_value(self.layout.constants_from() + p).0)
     }
 
     /// The forms at positions (mm), or what is determined of them: those of the slide first.
@@ -246,6 +293,7 @@ impl DesignFit {
                     .position(|j| analysis.unknowns()[*j] == unknown)
                     .unwrap_or(0);
                 let alone = analysis.alone(&unknown).is_some();
+                let spread: Vec<(f64, f64)> = x.iter().map(|x| self.form_std(form, *x)).collect();
                 FoundForm {
                     name: names[p].clone(),
                     side: match self.layout.forms[form] {
@@ -254,7 +302,8 @@ impl DesignFit {
                     },
                     alone,
                     values: x.iter().map(|x| self.form_value(form, *x)).collect(),
-                    std: x.iter().map(|x| self.form_std(form, *x)).collect(),
+                    std: spread.iter().map(|s| s.0).collect(),
+                    degrees_of_freedom: spread.iter().fold(f64::INFINITY, |l, s| l.min(s.1)),
                 }
             })
             .collect()
@@ -296,7 +345,9 @@ impl DesignFit {
         horner(&self.cubics[form][k], (at - left) / width)
     }
 
-    fn form_std(&self, form: usize, at: f64) -> f64 {
+    /// Standard uncertainty of a form at a position, µm, and its degrees of freedom. What the model misses
+    /// may lie in the form itself, finer than the knots.
+    fn form_std(&self, form: usize, at: f64) -> (f64, f64) {
         let (first, functions) = self.bases[form].values(at);
         let band: Vec<(usize, f64)> = functions
             .into_iter()
@@ -305,6 +356,7 @@ impl DesignFit {
             .collect();
         let [height, slope] = self.layout.line(form);
         let border = [(height, -1.0), (slope, -self.axis.xi(at))];
-        (self.variance * self.covariance.variance(&band, &border)).sqrt()
+        let (std, freedom) = self.scatter.spread(&self.covariance, &band, &border);
+        (std.hypot(self.agreement.missed), freedom)
     }
 }

@@ -142,7 +142,7 @@ pub(super) fn fit_design(
     let options = DesignOptions {
         zero: arrangement.zero(),
         thickness_mm: assumptions.thickness.unwrap_or(0.0),
-        noise_um: assumptions.noise,
+        noise: assumptions.noise.map_or(Noise::Estimated, Noise::Declared),
         ..DesignOptions::default()
     };
     designs::fit(observations, &options).map_err(|why| NotDiagnosable::NoFit(why.to_string()))

@@ -4,8 +4,8 @@ use errsep_solvers::structured::StructuredFit;
 
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
-use super::scatter::Scatter;
 use super::solution::Closure;
+use crate::reversal::channel_noise::scatter::Scatter;
 use crate::reversal::staged::Value;
 
 /// The closure: the contrast the convention holds at zero, if it were released; and the closure

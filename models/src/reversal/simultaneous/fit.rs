@@ -8,7 +8,6 @@ use errsep_solvers::loss::Loss;
 use errsep_solvers::options::Options as Minimisation;
 use errsep_solvers::structured::{Parameters, fit_structured};
 
-use super::along::AlongTraces;
 use super::closure;
 use super::descent::{approach, minimise};
 use super::effects::{CATALOGUE, Setting, times};
@@ -16,15 +15,19 @@ use super::error::ReversalError;
 use super::fitted_knots::FittedKnots;
 use super::ground::{Begun, Ground};
 use super::knots::{self, FEWEST_POSITIONS};
-use super::noise::{self, Left, Settled, Survey, freedom_left, sum_of_squares, weights_of};
 use super::options::{Noise, Options, Thickness};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
-use super::scatter::Scatter;
+use super::row_source::RowSource;
 use super::search::search;
-use super::solution::{Agreement, ChannelNoise, Convergence, NoiseOrigin, Simultaneous};
+use super::solution::{ChannelNoise, Convergence, Simultaneous};
 use super::told;
 use crate::reversal::Observations;
+use crate::reversal::channel_noise::along::AtRest;
+use crate::reversal::channel_noise::settle::{Asked, Settled, settle};
+use crate::reversal::channel_noise::survey::Survey;
+use crate::reversal::channel_noise::white::Told;
+use crate::reversal::channel_noise::{freedom_left, rms, weights_of};
 use crate::units::mm_from_um;
 
 /// Fits tilts, offsets and forms to all readings at once, with the effects that are asked for.
@@ -35,7 +38,7 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
     let began = Instant::now();
     check(observations, options)?;
     let channels = ChannelReadings::sort(observations);
-    let survey = Survey::new(&channels, observations);
+    let survey = Survey::new(&channels, |i| observations.taken(i));
     let sigmas = survey.first_noise(options.noise);
     let ground = Ground::new(observations, options, &channels, weights_of(&sigmas))?;
     let mut solution = if options.effects.is_empty() {
@@ -89,13 +92,18 @@ fn solve(
         None => head_start(&problem, &start, &options.minimisation).unwrap_or(start),
     };
     let start = approach(&problem, start, &options.minimisation)?;
-    let settled = noise::settle(&mut problem, start, options, survey, &mut sigmas)?;
+    let asked = Asked {
+        noise: options.noise,
+        loss: options.loss,
+        minimisation: &options.minimisation,
+    };
+    let settled = settle(&mut problem, start, asked, survey, &mut sigmas)?;
     let knots = FittedKnots::new(breaks, table, &settled.residuals);
     let mut solution = assemble(ground, &problem, &settled, &sigmas, knots)?;
     is_determined(&solution, &solution.covariance, channels, &problem.weights)?;
     let declared = matches!(options.noise, Noise::Declared(_));
     if !declared && options.loss == Loss::Quadratic && !survey.repeats.is_empty() {
-        learn_from_repeats(&mut solution, &problem, survey, &settled.residuals, &sigmas)?;
+        learn_from_repeats(&mut solution, &problem, survey, &settled, &sigmas)?;
     }
     let (fit, residuals) = (&settled.fit, &settled.residuals);
     solution.closure = closure::of(&problem, fit, channels, residuals, &solution.scatter);
@@ -120,29 +128,7 @@ fn assemble(
         return Err(not_converged(problem, result.ending.to_string()));
     };
     let freedom = freedom_left(problem);
-    let left = Left::of_residuals(problem, by_channel, settled.known);
-    let robust = options.loss != Loss::Quadratic;
-    let declared = matches!(options.noise, Noise::Declared(_));
-    // Rows in units of the declared noise have a variance of one, and what the model misses; otherwise
-    // their own scatter tells it, with what the model misses in it.
-    let variance = match (declared, robust) {
-        (_, true) => noise::robust_unit(problem, by_channel).powi(2),
-        (true, _) => 1.0 + left.variance,
-        _ => weighted_squares(by_channel, &problem.weights) / freedom,
-    };
-    let scatter = Scatter::White {
-        variance,
-        freedom: if declared && left.variance <= 0.0 {
-            f64::INFINITY
-        } else {
-            freedom
-        },
-    };
-    let unit = if robust {
-        1.0
-    } else {
-        (variance - left.variance).max(0.0).sqrt()
-    };
+    let told = Told::white(problem, settled, sigmas, options.noise, options.loss);
     let mut residuals = vec![0.0; ground.observations.readings.len()];
     for (channel, own) in channels.iter().zip(by_channel) {
         for (i, r) in channel.source.iter().zip(own) {
@@ -160,18 +146,11 @@ fn assemble(
         gauge: problem.gauge().clone(),
         parameters: result.parameters.clone(),
         covariance,
-        scatter,
+        scatter: told.scatter,
         weights: problem.weights.clone(),
-        noise: channel_noise(channels, sigmas, by_channel, unit, freedom),
-        noise_origin: if declared {
-            NoiseOrigin::Declared
-        } else {
-            NoiseOrigin::Residuals
-        },
-        agreement: Agreement {
-            disagree: left.clear,
-            missed: left.variance.sqrt() * rms(sigmas),
-        },
+        noise: channel_noise(channels, sigmas, by_channel, told.unit, freedom),
+        noise_origin: told.origin,
+        agreement: told.agreement,
         residuals,
         degrees_of_freedom: freedom,
         closure: None,
@@ -208,23 +187,29 @@ fn learn_from_repeats(
     solution: &mut Simultaneous,
     problem: &Reversal,
     survey: &Survey,
-    residuals: &[Vec<f64>],
+    settled: &Settled,
     sigmas: &[f64],
 ) -> Result<(), ReversalError> {
-    let Some(along) = AlongTraces::new(solution, problem, survey, residuals)? else {
+    let source = RowSource::new(solution, problem)?;
+    let fit = AtRest {
+        row: |channel, row| source.derivatives(channel, row),
+        covariance: &solution.covariance,
+        weights: &problem.weights,
+        counts: (
+            problem.unknowns.band_count(),
+            problem.unknowns.border_count(),
+            problem.unknowns.free_count(),
+        ),
+    };
+    let residuals = &settled.residuals;
+    let Some(told) = Told::along(&fit, survey, residuals, sigmas)? else {
         return Ok(());
     };
-    let (law, missed) = (along.law(), along.missed_variance());
-    let unit = law.variance().sqrt();
     let freedom = solution.degrees_of_freedom;
-    solution.noise = channel_noise(survey.channels, sigmas, residuals, unit, freedom);
-    let mean_square = rms(sigmas).powi(2);
-    solution.noise_origin = NoiseOrigin::Repeats(law.times(mean_square));
-    solution.agreement = Agreement {
-        disagree: Some(missed > 0.0),
-        missed: (missed * mean_square).sqrt(),
-    };
-    solution.scatter = Scatter::Along(Arc::new(along));
+    solution.noise = channel_noise(problem.channels, sigmas, residuals, told.unit, freedom);
+    solution.noise_origin = told.origin;
+    solution.agreement = told.agreement;
+    solution.scatter = told.scatter;
     Ok(())
 }
 
@@ -282,13 +267,6 @@ fn is_determined(
         }
     }
     Ok(())
-}
-
-fn weighted_squares(residuals: &[Vec<f64>], weights: &[f64]) -> f64 {
-    let channels = residuals.iter().zip(weights);
-    channels
-        .map(|(own, weight)| weight * weight * sum_of_squares(own))
-        .sum()
 }
 
 /// The noise of the channels: the weights' standard deviations times the unit in which they are.
@@ -406,8 +384,4 @@ fn head_start(
     }
     let fit = fit_structured(&problem.over(&thin), start.clone(), options).ok()?;
     fit.converged().then_some(fit.parameters)
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (sum_of_squares(values) / values.len().max(1) as f64).sqrt()
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::effects::{Circumstances, JoinedEffect, Kind, Left, Move, Play, Unknown};
 use super::readings::ChannelReadings;
-use super::traces::{self, Trace};
+use crate::reversal::channel_noise::traces::{self, Trace};
 use crate::reversal::{Channel, Observations};
 
 /// An effect in the fit.
@@ -289,7 +289,7 @@ impl<'a> Joined<'a> {
     /// The traces of channels, where a play goes through them.
     pub fn traces(&self, channels: &[ChannelReadings]) -> Vec<Vec<Trace>> {
         if self.plays() {
-            traces::of(channels, self.observations)
+            traces::of(channels, |i| self.observations.taken(i))
         } else {
             Vec::new()
         }

@@ -5,7 +5,6 @@
 //! channel, residuals, knots and convergence. Effects that the model leaves out can be unknowns of
 //! the same fit ([`effects`]). See `docs/theory/reversal-simultaneous.md`.
 
-mod along;
 mod closure;
 mod columns;
 mod dense;
@@ -18,9 +17,7 @@ pub(super) mod gauge;
 mod ground;
 mod joined;
 pub(super) mod knots;
-mod levels;
 mod monte_carlo;
-mod noise;
 mod options;
 mod placed;
 mod placed_rows;
@@ -32,14 +29,13 @@ mod readings;
 mod robust;
 mod row_source;
 pub(super) mod rows;
-mod scatter;
 mod search;
 mod seed;
 mod solution;
 pub(super) mod starts;
 mod told;
-mod traces;
 mod unknowns;
+mod weighed;
 
 #[doc(hidden)]
 pub use dense::DenseReversal;

@@ -8,11 +8,11 @@ use rand_chacha::ChaCha8Rng;
 use super::descent::minimise;
 use super::effects::times;
 use super::error::ReversalError;
-use super::noise::Survey;
 use super::readings::ChannelReadings;
 use super::solution::{NoiseOrigin, Simultaneous};
 use crate::noise::Law;
 use crate::reversal::Observations;
+use crate::reversal::channel_noise::survey::Survey;
 
 /// What the trials say of one quantity.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,7 +72,7 @@ pub fn monte_carlo(
     let times = times(observations);
     let joined = solution.joined(observations, &times);
     let sorted = channels.clone();
-    let survey = Survey::new(&sorted, observations);
+    let survey = Survey::new(&sorted, |i| observations.taken(i));
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut tilts: Vec<Vec<f64>> = Vec::new();
     let mut forms: Vec<Vec<f64>> = Vec::new();

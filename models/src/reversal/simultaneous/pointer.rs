@@ -7,7 +7,7 @@ use super::joined::{Joined, Turn};
 use super::placed::{Placed, PlacedChannel};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
-use super::traces::Trace;
+use crate::reversal::channel_noise::traces::Trace;
 
 /// The pointer's last pushes along a trace whose readings, in the order in which they were taken, show
 /// what they show without play: the stylus.

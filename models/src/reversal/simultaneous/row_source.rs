@@ -7,6 +7,7 @@ use super::placed::Placed;
 use super::predict::Prediction;
 use super::problem::Reversal;
 use super::solution::Simultaneous;
+use crate::reversal::channel_noise::along::Derivatives;
 
 /// Where rows come from: of a position alone, or of a reading where effects tell readings apart.
 pub struct RowSource<'s> {
@@ -42,5 +43,14 @@ impl<'s> RowSource<'s> {
             Some(placed) => Ok(placed.prediction(self.problem, channel, row)),
             None => self.solution.predict(readings.channel, readings.x[row]),
         }
+    }
+
+    /// The derivatives alone, by unknowns of band and border.
+    ///
+    /// # Errors
+    /// As [`Self::row`].
+    pub fn derivatives(&self, channel: usize, row: usize) -> Result<Derivatives, NoValue> {
+        let prediction = self.row(channel, row)?;
+        Ok((prediction.band, prediction.border))
     }
 }

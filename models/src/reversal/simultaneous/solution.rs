@@ -8,21 +8,21 @@ use errsep_solvers::problem::NoValue;
 use errsep_solvers::structured::Parameters;
 use nalgebra::DMatrix;
 
-use super::along::Gathered;
 use super::effects::{JoinedEffect, times};
 use super::fitted_knots::FittedKnots;
 use super::gauge::Axis;
 use super::joined::Joined;
-use super::noise::Survey;
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
 use super::row_source::RowSource;
-use super::scatter::Scatter;
 use super::told::FittedEffect;
-use super::traces;
 use super::unknowns::Unknowns;
 use crate::basis::bspline::{Cubic, CubicBSpline};
 use crate::noise::Law;
+use crate::reversal::channel_noise::along::Gathered;
+use crate::reversal::channel_noise::scatter::Scatter;
+use crate::reversal::channel_noise::survey::Survey;
+use crate::reversal::channel_noise::traces;
 use crate::reversal::combinations::determined;
 use crate::reversal::staged::Value;
 use crate::reversal::{Channel, Combination, Convention, Observations, Reading};
@@ -290,13 +290,18 @@ impl Simultaneous {
         length: f64,
     ) -> Result<Vec<f64>, NoValue> {
         let channels = ChannelReadings::sort(observations);
-        let survey = Survey::new(&channels, observations);
-        let groups = traces::grouped(&channels, &survey.traces);
+        let survey = Survey::new(&channels, |i| observations.taken(i));
+        let groups = traces::grouped(&survey.x, &survey.traces);
         let times = times(observations);
         let joined = self.joined(observations, &times);
         let problem = self.problem(&channels, joined.as_ref());
         let rows = RowSource::new(self, &problem)?;
-        let gathered = Gathered::new(&rows, &survey, &groups, &self.weights)?;
+        let gathered = Gathered::new(
+            |c, row| rows.derivatives(c, row),
+            &survey,
+            &groups,
+            &self.weights,
+        )?;
         let factors = self.tilt_terms().into_iter().map(|(_, terms)| {
             gathered
                 .against_white(&self.covariance, &terms, share, length)

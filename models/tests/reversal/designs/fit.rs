@@ -1,11 +1,12 @@
 //! The simultaneous fit of designs: derivatives, known truth, and the four-channel fit beside it.
 
+use errsep_models::noise::Law;
 use errsep_models::reversal::designs::simulate::{DesignPlan, simulate};
 use errsep_models::reversal::designs::{
     Design, DesignChannel, DesignFitError, DesignObservations, DesignOptions, DesignReading, Zero,
     central_differences, fit, staged,
 };
-use errsep_models::reversal::simultaneous::{self, Knots, Noise, Thickness};
+use errsep_models::reversal::simultaneous::{self, Knots, Noise, NoiseOrigin, Thickness};
 use errsep_models::reversal::{Channel, Convention, Observations, Reading, simulate as four};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -16,16 +17,12 @@ const NEAR_TOP: &str = "0/0,0/90,0/180,0/270,90/0,90/90,90/180,90/270";
 
 fn plan(design: &str) -> DesignPlan {
     DesignPlan {
-        design: Design::parse(design).unwrap(),
         slopes_rad: [2e-4, -1.5e-4, 3e-4, 1e-4, 2.5e-4, 0.0, 0.0],
-        kept_um: None,
         thickness_mm: 40.0,
-        length_mm: 300.0,
-        positions: 61,
-        repeats: 1,
         noise_um: 0.05,
         forms_um: [2.0, 1.0],
         seed: 11,
+        ..DesignPlan::of(Design::parse(design).unwrap())
     }
 }
 
@@ -92,10 +89,7 @@ fn four_channels_are_the_four_channel_fit() {
             &as_design(&observations),
             &DesignOptions {
                 thickness_mm: 42.0,
-                noise_um: match noise {
-                    Noise::Declared(sigma) => Some(sigma),
-                    _ => None,
-                },
+                noise,
                 knots,
                 ..DesignOptions::default()
             },
@@ -113,12 +107,10 @@ fn four_channels_are_the_four_channel_fit() {
                 (own.value - theirs.value).abs() < 1e-6 * theirs.std,
                 "{name}"
             );
-            if !matches!(noise, Noise::Declared(_)) {
-                assert!(
-                    (own.std / theirs.std - 1.0).abs() < 1e-9,
-                    "{name} {own:?} {theirs:?}"
-                );
-            }
+            assert!(
+                (own.std / theirs.std - 1.0).abs() < 1e-9,
+                "{name} {own:?} {theirs:?}"
+            );
         }
         let x: Vec<f64> = (0..=30).map(|k| 10.0 * f64::from(k)).collect();
         for (own, theirs) in new.forms(&x).iter().zip(old.forms(&x)) {
@@ -132,6 +124,111 @@ fn four_channels_are_the_four_channel_fit() {
         assert!((own.rms - theirs.rms).abs() < 1e-9 * theirs.rms);
         let (own, theirs) = (new.position_slopes[0].value, theirs.slope.unwrap());
         assert!((own.value - theirs.value).abs() < 1e-6 * theirs.std);
+    }
+}
+
+/// What repeats tell of the noise, and a channel that is noisier than the others, are the same for four
+/// channels solved as a design: weights, laws and standard uncertainties.
+#[test]
+fn four_channels_have_the_noise_of_the_four_channel_fit() {
+    let law = Law {
+        white: 9e-4,
+        correlated: 16e-4,
+        length: 12.0,
+        shift: 4e-4,
+    };
+    for (repeats, noisy) in [(4, 1.0), (4, 8.0), (1, 8.0)] {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let mut plan = four::Plan {
+            alpha_rad: 3e-4,
+            gamma_rad: -2e-4,
+            thickness_mm: 42.0,
+            repeats,
+            ..four::Plan::even(0.0, 300.0, 121, 0.0)
+        };
+        plan.m = four::TrueForm::random_waves(&mut rng, 1.0, 300.0, 4);
+        let (mut observations, _) = four::simulate(&plan, &[]).unwrap();
+        let traces = observations
+            .readings
+            .chunk_by_mut(|a, b| (a.channel, a.repeat) == (b.channel, b.repeat));
+        for trace in traces {
+            let x: Vec<f64> = trace.iter().map(|r| r.x).collect();
+            let mut noise = vec![0.0; x.len()];
+            law.draw(&x, &mut rng, &mut noise);
+            for (reading, own) in trace.iter_mut().zip(noise) {
+                let own = if reading.channel == Channel::C1B {
+                    noisy * own
+                } else {
+                    own
+                };
+                reading.value += own;
+            }
+        }
+        let old = simultaneous::fit(
+            &observations,
+            &simultaneous::Options {
+                convention: Convention::Rigid,
+                thickness: Thickness::Known(42.0),
+                knots: Knots::Cells(10),
+                ..simultaneous::Options::default()
+            },
+        )
+        .unwrap();
+        let new = fit(
+            &as_design(&observations),
+            &DesignOptions {
+                thickness_mm: 42.0,
+                ..options(10)
+            },
+        )
+        .unwrap();
+        let told = matches!(new.noise_origin, NoiseOrigin::Repeats(_));
+        assert_eq!(told, repeats > 1, "{:?}", new.noise_origin);
+        for (own, theirs) in new.by_channel.iter().zip(&old.noise) {
+            // Exact limit: sigmas settle at the same weights, to the rounding of two minima.
+            assert!(
+                (own.sigma / theirs.sigma - 1.0).abs() < 1e-6,
+                "{own:?} {theirs:?}"
+            );
+        }
+        assert_eq!(
+            new.by_channel[1].sigma > 4.0 * new.by_channel[0].sigma,
+            noisy > 1.0
+        );
+        for (name, place) in [("alpha_h", 0), ("gamma_1", 1), ("cone", 2)] {
+            let slopes = new.slopes();
+            let own = slopes.iter().find(|s| s.name == name).unwrap();
+            let tilt = &old.tilts()[place];
+            // Exact limit: a millionth of the standard uncertainty, and of its ratio.
+            let apart = (own.value.value - tilt.angle.value).abs();
+            assert!(apart < 1e-6 * tilt.angle.std, "{name} {own:?} {tilt:?}");
+            let times = own.value.std / tilt.angle.std;
+            assert!(
+                (times - 1.0).abs() < 1e-6,
+                "{name} {repeats} {noisy}: {times}"
+            );
+            let freedoms = own.degrees_of_freedom / tilt.degrees_of_freedom;
+            assert!((freedoms - 1.0).abs() < 1e-6, "{name}: {freedoms}");
+        }
+        let x = [0.0, 111.0, 300.0];
+        for (own, theirs) in new.forms(&x).iter().zip(old.forms(&x)) {
+            for (a, b) in own.std.iter().zip(&theirs.std) {
+                assert!((a / b - 1.0).abs() < 1e-6, "{}: {a} {b}", own.name);
+            }
+        }
+        let (own, theirs) = (
+            new.position_slopes[0].value,
+            old.closure.as_ref().unwrap().slope.unwrap(),
+        );
+        assert!(
+            (own.std / theirs.std - 1.0).abs() < 1e-6,
+            "{own:?} {theirs:?}"
+        );
+        let x = &new
+            .if_correlated(&as_design(&observations), 0.5, 15.0)
+            .unwrap();
+        let y = old.if_correlated(&observations, 0.5, 15.0).unwrap();
+        assert!((x[0] / y[0] - 1.0).abs() < 1e-6, "{x:?} {y:?}");
     }
 }
 
@@ -328,8 +425,8 @@ fn uncertainties_are_the_bound_and_hold_the_truth() {
         };
         let (observations, truth) = simulate(&made).unwrap();
         let declared = DesignOptions {
-            noise_um: Some(0.05),
-            ..options(6)
+            noise: Noise::Declared(0.05),
+            ..options(14)
         };
         let found = fit(&observations, &declared).unwrap();
         let x = made.x();
@@ -404,16 +501,12 @@ fn endings_are_told() {
 #[test]
 fn a_prediction_and_its_residual_make_the_reading() {
     let (made, _) = simulate(&DesignPlan {
-        design: Design::parse("0/0,90/0,120/0,0/180,90/180,120/180").unwrap(),
         slopes_rad: [2e-3, -1e-3, 3e-3, 1e-3, 5e-4, 0.0, 0.0],
-        kept_um: None,
-        thickness_mm: 40.0,
         length_mm: 200.0,
         positions: 31,
-        repeats: 1,
         noise_um: 0.1,
-        forms_um: [2.0, 1.0],
         seed: 5,
+        ..plan("0/0,90/0,120/0,0/180,90/180,120/180")
     })
     .unwrap();
     let options = DesignOptions {

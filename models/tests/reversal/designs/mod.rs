@@ -1,4 +1,5 @@
 //! The reversal in any number of positions and planes.
 
+mod effects;
 mod fit;
 mod table;

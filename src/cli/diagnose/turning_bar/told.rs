@@ -241,12 +241,16 @@ impl<'a, 'b> Told<'a, 'b> {
         if law.correlated > 0.0 {
             // The correlation has gone to a twentieth after three lengths.
             let readings = (3.0 * law.length / mean_step).ceil();
+            let slower = correlated_over(&self.chosen.fit.residuals);
             all.push(format!(
                 "Noise of one reading: {} µm, of which {} µm is correlated over about {readings} readings. Uncertainties take that into account{}; were the readings independent, u of {} would be {} µrad.",
                 plain(self.weighed.noise, 2),
                 plain(law.correlated.sqrt(), 2),
                 if self.analysis.factor > 1.0 {
-                    format!(", and variances are raised {} times for slow parts beside it", plain(self.analysis.factor, 2))
+                    format!(
+                        ". What is slower, within two turns or more, is not counted as noise (all that is left stays together over about {slower} readings): variances are raised {} times for it",
+                        plain(self.analysis.factor, 2)
+                    )
                 } else {
                     String::new()
                 },
@@ -380,6 +384,19 @@ fn combination(indicator: f64) -> String {
         Some((_, name)) => (*name).to_owned(),
         None => format!("alpha towards {degrees}° + cone"),
     }
+}
+
+/// Over how many readings residuals are correlated: until their correlation has gone to a twentieth.
+fn correlated_over(residuals: &[f64]) -> usize {
+    let mean = residuals.iter().sum::<f64>() / residuals.len() as f64;
+    let product = |lag: usize| -> f64 {
+        let pairs = residuals.iter().zip(&residuals[lag..]);
+        pairs.map(|(a, b)| (a - mean) * (b - mean)).sum()
+    };
+    let whole = product(0);
+    (1..residuals.len() / 2)
+        .find(|lag| product(*lag) <= 0.05 * whole)
+        .unwrap_or(residuals.len() / 2)
 }
 
 /// The step in which readings come, µm, where most of them are whole multiples of it.

@@ -1,10 +1,11 @@
 //! `errsep.reversal/2`.
 
 use errsep_models::reversal::designs::{Found, SLOPES};
+use errsep_models::reversal::simultaneous::NoiseOrigin;
 use errsep_models::uncertainty::Quantity;
 use serde_json::{Map, Value, json};
 
-use super::Outcome;
+use super::{Outcome, degrees};
 use crate::cli::quantity::{quantity_json, unexpandable};
 use crate::io::Message;
 
@@ -17,16 +18,16 @@ pub fn json(o: &Outcome) -> Result<Value, Message> {
         })
         .collect();
     let (slopes, constants) = (fit.slopes(), fit.constants());
-    let tilts = singles(o, &slopes, &SLOPES, "rad")?;
+    let tilts = singles(&slopes, &SLOPES, "rad")?;
     let kept = constants.iter().any(|c| c.name.starts_with("zero of"));
     let eccentricity = match kept {
-        true => Value::Object(singles(o, &constants, &["e_1", "e_2", "o"], "um")?),
+        true => Value::Object(singles(&constants, &["e_1", "e_2", "o"], "um")?),
         false => Value::Null,
     };
     let together = slopes.iter().filter(|f| !f.alone);
     let tilt_combinations = together
         .map(|f| {
-            let mut own = quantity(o, f, "rad")?;
+            let mut own = quantity(f, "rad")?;
             own["name"] = json!(f.name);
             Ok(own)
         })
@@ -57,6 +58,10 @@ pub fn json(o: &Outcome) -> Result<Value, Message> {
         .zip(&fit.by_channel)
         .map(|(c, own)| (c.name.clone(), json!(own.rms)))
         .collect();
+    let channels = fit.design.channels().iter().zip(&fit.by_channel);
+    let noise: Map<String, Value> = channels
+        .map(|(c, own)| (c.name.clone(), json!(own.sigma)))
+        .collect();
     Ok(json!({
         "schema": "errsep.reversal/2",
         "method": "simultaneous",
@@ -72,9 +77,28 @@ pub fn json(o: &Outcome) -> Result<Value, Message> {
         "residual": {
             "rms": o.residual_rms(),
             "noise": fit.noise_um,
-            "noise_source": if fit.noise_declared { "declared" } else { "residuals" },
+            "noise_source": match fit.noise_origin {
+                NoiseOrigin::Declared => "declared",
+                NoiseOrigin::Residuals => "residuals",
+                NoiseOrigin::Repeats(_) => "repeats",
+            },
+            "noise_words": o.noise_words(),
+            "noise_law": match fit.noise_origin {
+                NoiseOrigin::Repeats(law) => json!({
+                    "white": law.white.sqrt(),
+                    "correlated": law.correlated.sqrt(),
+                    "length": law.length,
+                    "shift": law.shift.sqrt(),
+                }),
+                _ => Value::Null,
+            },
             "degrees_of_freedom": fit.degrees_of_freedom,
             "channels": by_channel,
+            "channel_noise": noise,
+        },
+        "agreement": {
+            "disagree": fit.agreement.disagree,
+            "missed": {"value": fit.agreement.missed, "unit": "um"},
         },
         "convergence": {
             "converged": true,
@@ -87,26 +111,21 @@ pub fn json(o: &Outcome) -> Result<Value, Message> {
 }
 
 /// Those of the names that are determined by themselves; `null` for others.
-fn singles(
-    o: &Outcome,
-    found: &[Found],
-    names: &[&str],
-    unit: &str,
-) -> Result<Map<String, Value>, Message> {
+fn singles(found: &[Found], names: &[&str], unit: &str) -> Result<Map<String, Value>, Message> {
     names
         .iter()
         .map(|name| {
             let own = found.iter().find(|f| f.alone && f.name == *name);
-            let value = own.map_or(Ok(Value::Null), |f| quantity(o, f, unit))?;
+            let value = own.map_or(Ok(Value::Null), |f| quantity(f, unit))?;
             Ok(((*name).to_owned(), value))
         })
         .collect()
 }
 
-fn quantity(o: &Outcome, found: &Found, unit: &str) -> Result<Value, Message> {
+fn quantity(found: &Found, unit: &str) -> Result<Value, Message> {
     let quantity = Quantity::new(found.name.clone(), found.value.value, found.value.std, unit)
         .map_err(unexpandable)?
-        .with_degrees_of_freedom(o.freedom());
+        .with_degrees_of_freedom(degrees(found.degrees_of_freedom));
     quantity_json(&quantity)
 }
 

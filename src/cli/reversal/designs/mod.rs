@@ -8,11 +8,12 @@ use errsep_models::reversal::Direction;
 use errsep_models::reversal::designs::{
     DesignFit, DesignFitError, DesignOptions, Determined, FoundForm, angle_name, fit,
 };
-use errsep_models::reversal::simultaneous::{KnotVerdict, Knots};
+use errsep_models::reversal::simultaneous::{KnotVerdict, Knots, Noise, NoiseOrigin};
 use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
 
 use super::Args;
 use super::diagnosed::Diagnosed;
+use super::noise;
 use super::refusal::OTHER_UNITS;
 use crate::cli::Answer;
 use crate::cli::diagnose::joined::Given;
@@ -57,7 +58,7 @@ pub fn answer(
     let options = DesignOptions {
         zero: setup.zero,
         thickness_mm: setup.thickness.unwrap_or(0.0),
-        noise_um: setup.noise,
+        noise: setup.noise.map_or(Noise::Estimated, Noise::Declared),
         knots: setup.knots.map_or(Knots::Chosen, Knots::Cells),
         ..DesignOptions::default()
     };
@@ -124,24 +125,38 @@ fn write_corrected(
         args.data.display().to_string().replace(['\n', '\r'], " "),
         args.with.join(" and ")
     );
-    let content = corrected_design(&args.data, &setup.columns, data.dialect, changes, &comment)?;
+    let content = corrected_design(&args.data, setup, data.dialect, changes, &comment)?;
     file.write(&content)
 }
 
 impl Outcome<'_> {
+    /// Degrees of freedom of the slopes: the fewest of any.
     fn freedom(&self) -> DegreesOfFreedom {
-        let freedom = self.fit.freedom();
-        if freedom.is_finite() {
-            DegreesOfFreedom::Finite(freedom.max(1.0))
-        } else {
-            DegreesOfFreedom::Infinite
-        }
+        fewest(self.fit.slopes().iter().map(|s| s.degrees_of_freedom))
     }
 
-    /// Coverage factor of every standard uncertainty.
+    /// Coverage factor of the slopes.
     fn factor(&self) -> f64 {
         // Degrees of freedom are positive, so that they have a coverage factor.
         coverage_factor(COVERAGE, self.freedom()).unwrap_or(f64::NAN)
+    }
+
+    /// Coverage factor of a form.
+    fn form_factor(&self, form: &FoundForm) -> f64 {
+        coverage_factor(COVERAGE, degrees(form.degrees_of_freedom)).unwrap_or(f64::NAN)
+    }
+
+    /// Where the noise comes from, and what is assumed of it.
+    fn noise_words(&self) -> String {
+        let fit = &self.fit;
+        let alike = fit.by_channel.windows(2).all(|n| n[0].sigma == n[1].sigma);
+        noise::words(fit.noise_origin, alike, fit.degrees_of_freedom, || {
+            let (share, part) = noise::SUPPOSED;
+            let length = part * (self.x.last()? - self.x.first()?);
+            let factors = fit.if_correlated(&self.data.observations, share, length);
+            let first = fit.slopes().into_iter().next()?;
+            Some((length, first.name, *factors.ok()?.first()?))
+        })
     }
 
     fn residual_rms(&self) -> f64 {
@@ -250,6 +265,20 @@ fn positions(data: &DesignData) -> Vec<f64> {
         .collect()
 }
 
+/// Degrees of freedom as those of a quantity.
+fn degrees(freedom: f64) -> DegreesOfFreedom {
+    if freedom.is_finite() {
+        DegreesOfFreedom::Finite(freedom.max(1.0))
+    } else {
+        DegreesOfFreedom::Infinite
+    }
+}
+
+/// The least of some degrees of freedom.
+fn fewest(all: impl Iterator<Item = f64>) -> DegreesOfFreedom {
+    degrees(all.fold(f64::INFINITY, f64::min))
+}
+
 fn warnings(fit: &DesignFit, data: &DesignData) -> Vec<String> {
     let mut warnings = Vec::new();
     if !data.not_read.is_empty() {
@@ -293,22 +322,10 @@ fn warnings(fit: &DesignFit, data: &DesignData) -> Vec<String> {
             ));
         }
     }
-    let exceeds = |squares: f64, freedom: f64| squares > freedom + CLEAR * (2.0 * freedom).sqrt();
-    if fit.noise_declared {
-        let squares: f64 = fit
-            .residuals
-            .iter()
-            .map(|r| (r / fit.noise_um).powi(2))
-            .sum();
-        let freedom = fit.degrees_of_freedom;
-        if freedom > 0.0 && exceeds(squares, freedom) {
-            warnings.push(format!(
-                "the readings scatter {} times as much as the declared noise: model and readings disagree, \
-                 and the uncertainties are too small",
-                number::plain((squares / freedom).sqrt(), 3)
-            ));
-        }
+    if fit.agreement.disagree == Some(true) && fit.agreement.missed > 0.0 {
+        warnings.push(noise::disagreement(fit.agreement.missed));
     }
+    let exceeds = |squares: f64, freedom: f64| squares > freedom + CLEAR * (2.0 * freedom).sqrt();
     for closure in &fit.closures {
         let count = closure.profile.len() as f64;
         if closure.expected_rms > 0.0
@@ -331,11 +348,15 @@ fn warnings(fit: &DesignFit, data: &DesignData) -> Vec<String> {
         }
     }
     if fit.knots.verdict == KnotVerdict::TooFew {
-        warnings.push(
+        let counted = match fit.noise_origin {
+            NoiseOrigin::Repeats(_) => "; the uncertainties follow the law of the repeats",
+            _ if fit.agreement.disagree == Some(true) => "",
+            _ => "; the uncertainties are too small then",
+        };
+        warnings.push(format!(
             "neighbouring residuals go together: the noise is correlated, or the forms have finer detail \
-             than the knots follow; the uncertainties are too small then"
-                .to_owned(),
-        );
+             than the knots follow{counted}"
+        ));
     }
     warnings
 }

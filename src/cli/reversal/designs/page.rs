@@ -30,7 +30,7 @@ pub fn page(file: &Path, setup: &ReversalSetup, o: &Outcome) -> Result<Page, Mes
         .section(Section::new("Set-up").verbatim(format!(
             "{}\n# data: {}\n",
             setup.as_toml(),
-            o.data.dialect
+            o.data.in_words()
         ))))
 }
 
@@ -126,10 +126,9 @@ fn position() -> Axis {
 }
 
 fn forms(o: &Outcome) -> Section {
-    let factor = o.factor();
     let line = |form: &FoundForm| {
         Series::line(form.name.clone(), o.x.clone(), form.values.clone())
-            .half_band(form.std.iter().map(|s| factor * s).collect())
+            .half_band(form.std.iter().map(|s| o.form_factor(form) * s).collect())
     };
     let is_slide = |form: &&FoundForm| form.name == "M_h" || form.name == "M_v";
     let chart = || Chart::new(position(), Axis::new("deviation from straight", "µm"));
@@ -237,6 +236,7 @@ fn fit(o: &Outcome) -> Section {
             [
                 channel.name.clone().into(),
                 own.readings.into(),
+                Cell::number(own.sigma),
                 Cell::number(own.rms),
             ]
         });
@@ -248,13 +248,13 @@ fn fit(o: &Outcome) -> Section {
             fit.degrees_of_freedom
         ))
         .key_figures([
-            KeyFigure::new("Noise of one reading", fit.noise_um, "µm").meaning(
-                if fit.noise_declared {
-                    "declared"
-                } else {
-                    "from the residuals, taken as white"
-                },
-            ),
+            KeyFigure::new("Noise of one reading", fit.noise_um, "µm").meaning(o.noise_words())
         ])
-        .table(Table::new("Channels", ["channel", "readings", "residual rms (µm)"]).rows(rows))
+        .table(
+            Table::new(
+                "Channels",
+                ["channel", "readings", "noise (µm)", "residual rms (µm)"],
+            )
+            .rows(rows),
+        )
 }

@@ -91,7 +91,7 @@ fn write_all(t: &mut String, file: &Path, o: &Outcome, coverage: &str) -> std::f
         file.display(),
         o.data.observations.readings.len(),
         design.channels().len(),
-        o.data.dialect,
+        o.data.in_words(),
         list(&design.indicators()),
         list(&design.positions()),
         list(design.sides())
@@ -161,21 +161,18 @@ fn write_all(t: &mut String, file: &Path, o: &Outcome, coverage: &str) -> std::f
             urad(slope.value)
         )?;
     }
-    let source = if fit.noise_declared {
-        "declared"
-    } else {
-        "from the residuals, taken as white and the same in all channels"
-    };
     writeln!(
         t,
-        "\nNoise of one reading: {} µm ({source})",
-        number::plain(fit.noise_um, 3)
+        "\nNoise of one reading: {} µm ({})",
+        number::plain(fit.noise_um, 3),
+        o.noise_words()
     )?;
     for (channel, own) in design.channels().iter().zip(&fit.by_channel) {
         writeln!(
             t,
-            "  {:10} residuals {} µm rms",
+            "  {:10} {} µm, residuals {} µm rms",
             channel.name,
+            number::plain(own.sigma, 3),
             number::plain(own.rms, 3)
         )?;
     }

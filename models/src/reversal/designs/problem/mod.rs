@@ -5,6 +5,7 @@
 //! [`forward`](crate::reversal::forward), and the slide brings M_h cos φ + M_v sin φ. A task is one cell
 //! and one channel, as in the four-channel fit.
 
+mod rows;
 mod tasks;
 
 use errsep_solvers::linear::banded::Tall;
@@ -33,8 +34,8 @@ pub struct DesignProblem<'a> {
     pub(super) axis: Axis,
     /// Half the thickness of the artefact, mm.
     pub(super) half_mm: f64,
-    /// 1/σ of a reading, 1/µm.
-    pub(super) weight: f64,
+    /// 1/σ of a reading of each channel, 1/µm.
+    pub(super) weights: Vec<f64>,
     /// The coefficients of ξ in each basis.
     xi: Vec<Vec<f64>>,
     constraints: Constraints,
@@ -51,7 +52,7 @@ impl<'a> DesignProblem<'a> {
         bases: Vec<CubicBSpline>,
         axis: Axis,
         half_mm: f64,
-        weight: f64,
+        weights: Vec<f64>,
     ) -> Self {
         let xi = bases
             .iter()
@@ -75,7 +76,7 @@ impl<'a> DesignProblem<'a> {
             bases,
             axis,
             half_mm,
-            weight,
+            weights,
             xi,
             slide_starts,
         }
@@ -178,7 +179,7 @@ impl<'a> DesignProblem<'a> {
             side: cell(own, side, prepared.cubics[own][side]),
             slide,
             offset: prepared.constants[channel],
-            weight: self.weight,
+            weight: self.weights[channel],
             thickness: false,
         }
     }
@@ -293,10 +294,10 @@ impl<'a> DesignProblem<'a> {
     /// [`NoValue`] where the model is not defined.
     pub(super) fn residuals(&self, at: &Parameters) -> Result<Vec<Vec<f64>>, NoValue> {
         let prepared = self.prepare(at)?;
-        let unit = -1.0 / self.weight;
         let mut points = Box::<Points>::default();
         (0..self.traces.len())
             .map(|c| {
+                let unit = -1.0 / self.weights[c];
                 let trace = &self.traces[c];
                 let mut residuals = Vec::with_capacity(trace.len());
                 for cell in 0..self.cell_count() {

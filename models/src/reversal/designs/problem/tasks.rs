@@ -23,6 +23,10 @@ impl StructuredProblem for DesignProblem<'_> {
         self.layout.border_count()
     }
 
+    fn part_count(&self) -> usize {
+        self.traces.len()
+    }
+
     fn constraints(&self) -> &Constraints {
         &self.constraints
     }
@@ -104,7 +108,7 @@ impl StructuredProblem for DesignProblem<'_> {
                 sink.push();
             }
             let band = self.band_columns(c, side, slide);
-            sink.close(band, self.shares(c, side, slide), 0);
+            sink.close(band, self.shares(c, side, slide), c);
             Ok(())
         })
     }

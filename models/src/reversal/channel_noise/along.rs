@@ -10,10 +10,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::noise::{Survey, sum_of_squares};
-use super::problem::Reversal;
-use super::row_source::RowSource;
-use super::solution::Simultaneous;
+use super::sum_of_squares;
+use super::survey::Survey;
 use super::traces::Group;
 use crate::noise::{Contrasts, Law, Posterior, decays, markov_form};
 
@@ -26,6 +24,22 @@ const SEED: u64 = 0x7472_6163;
 /// The means of the repeats leave more than noise where their sum of squares exceeds what the noise
 /// explains by so many standard deviations.
 const CLEAR: f64 = 4.0;
+
+/// The derivatives of what one reading would be: by unknowns of the band (one may appear twice) and by
+/// all of the border.
+pub type Derivatives = (Vec<(usize, f64)>, Vec<f64>);
+
+/// A fit at its minimum.
+pub struct AtRest<'a, R> {
+    /// The derivatives of a reading, by its channel and its place among the channel's.
+    pub row: R,
+    /// Covariance of the unknowns for rows of unit variance.
+    pub covariance: &'a BorderedCovariance,
+    /// 1/σ by channel, 1/µm.
+    pub weights: &'a [f64],
+    /// Unknowns of band and border, and those that the fit chooses.
+    pub counts: (usize, usize, usize),
+}
 
 /// The derivatives of the sum of a cell's readings, over their standard deviation.
 #[derive(Debug, Clone)]
@@ -54,7 +68,7 @@ pub struct Gathered {
 impl Gathered {
     /// Gathers the readings of groups around a solution.
     pub fn new(
-        source: &RowSource,
+        row: impl Fn(usize, usize) -> Result<Derivatives, NoValue>,
         survey: &Survey,
         groups: &[Group],
         weights: &[f64],
@@ -73,23 +87,22 @@ impl Gathered {
                     let taken = range.len().min(MOST_ROWS);
                     let count = range.len() as f64;
                     let factor = weights[group.channel] * count / taken as f64;
-                    let mut row = Row {
+                    let mut sum = Row {
                         band: Vec::new(),
                         border: Vec::new(),
                         count,
                     };
                     for k in 0..taken {
                         let at = range.start + (2 * k + 1) * range.len() / (2 * taken);
-                        let own = source.row(group.channel, rows_of.row(at))?;
-                        row.band
-                            .extend(own.band.iter().map(|(j, v)| (*j, factor * v)));
-                        row.border.resize(own.border.len(), 0.0);
-                        for (sum, v) in row.border.iter_mut().zip(&own.border) {
+                        let (band, border) = row(group.channel, rows_of.row(at))?;
+                        sum.band.extend(band.iter().map(|(j, v)| (*j, factor * v)));
+                        sum.border.resize(border.len(), 0.0);
+                        for (sum, v) in sum.border.iter_mut().zip(&border) {
                             *sum += factor * v;
                         }
                     }
                     cells.positions.push(group.positions[*cell]);
-                    cells.rows.push(row);
+                    cells.rows.push(sum);
                     cells.places.push(places + cell);
                 }
                 traces.push(cells);
@@ -174,15 +187,14 @@ pub struct AlongTraces {
 impl AlongTraces {
     /// Which laws the repeats of the residuals allow and how far the model misses their means; `None`
     /// without repeats that tell.
-    pub fn new(
-        solution: &Simultaneous,
-        problem: &Reversal,
+    pub fn new<R: Fn(usize, usize) -> Result<Derivatives, NoValue>>(
+        fit: &AtRest<R>,
         survey: &Survey,
         residuals: &[Vec<f64>],
     ) -> Result<Option<Self>, NoValue> {
         let weighted: Vec<Vec<f64>> = residuals
             .iter()
-            .zip(&problem.weights)
+            .zip(fit.weights)
             .map(|(own, weight)| own.iter().map(|r| weight * r).collect())
             .collect();
         let mut contrasts = Contrasts::default();
@@ -194,8 +206,7 @@ impl AlongTraces {
         let Some(posterior) = Posterior::of(&contrasts) else {
             return Ok(None);
         };
-        let source = RowSource::new(solution, problem)?;
-        let gathered = Gathered::new(&source, survey, &survey.repeats, &problem.weights)?;
+        let gathered = Gathered::new(&fit.row, survey, &survey.repeats, fit.weights)?;
         let mut lengths: Vec<(f64, Vec<Vec<f64>>)> = Vec::new();
         let length_of = posterior
             .possible()
@@ -225,7 +236,7 @@ impl AlongTraces {
             missed: (0.0, 1.0),
             readings_a_cell: readings / f64::max(cells, 1.0),
         };
-        along.missed = along.missed(solution, problem, survey, &weighted);
+        along.missed = along.missed(fit, survey, &weighted);
         Ok(Some(along))
     }
 
@@ -290,13 +301,7 @@ impl AlongTraces {
     ///
     /// With V the covariance of the noise and H the hat matrix their sum of squares is expected to be
     /// tr V − tr HV; the last is found by drawn signs, ηᵀHVη.
-    fn missed(
-        &self,
-        solution: &Simultaneous,
-        problem: &Reversal,
-        survey: &Survey,
-        weighted: &[Vec<f64>],
-    ) -> (f64, f64) {
+    fn missed<R>(&self, fit: &AtRest<R>, survey: &Survey, weighted: &[Vec<f64>]) -> (f64, f64) {
         let law = self.posterior.mean();
         let double = Law {
             length: 0.5 * law.length,
@@ -339,12 +344,12 @@ impl AlongTraces {
                     &decays(&group.positions, double.length),
                 );
         }
-        let unknowns = problem.unknowns.free_count() as f64;
+        let unknowns = fit.counts.2 as f64;
         let freedom = cells - unknowns;
         if !(freedom > 0.0 && expected > 0.0) {
             return (0.0, 1.0);
         }
-        expected -= self.taken_up(solution, &law);
+        expected -= self.taken_up(fit.covariance, fit.counts, &law);
         let ones = vec![1.0; self.posterior.possible().len()];
         let (_, known) = self.posterior.variance(&ones);
         let doubt = (variance + 2.0 / known * expected * expected).sqrt();
@@ -358,7 +363,12 @@ impl AlongTraces {
     }
 
     /// tr HV: the part of the noise's variance that the fit takes up.
-    fn taken_up(&self, solution: &Simultaneous, law: &Law) -> f64 {
+    fn taken_up(
+        &self,
+        covariance: &BorderedCovariance,
+        (in_band, in_border, _): (usize, usize, usize),
+        law: &Law,
+    ) -> f64 {
         let mut random = ChaCha8Rng::seed_from_u64(SEED);
         let traces = &self.gathered.traces;
         let along: Vec<Vec<f64>> = traces
@@ -375,8 +385,8 @@ impl AlongTraces {
         let sum: f64 = probes
             .par_iter()
             .map(|signs| {
-                let mut band = vec![0.0; solution.unknowns.band_count()];
-                let mut border = vec![0.0; solution.unknowns.border_count()];
+                let mut band = vec![0.0; in_band];
+                let mut border = vec![0.0; in_border];
                 for (trace, signs) in traces.iter().zip(signs) {
                     for (row, sign) in trace.rows.iter().zip(signs) {
                         for (j, v) in &row.band {
@@ -389,9 +399,7 @@ impl AlongTraces {
                 }
                 let band: Vec<(usize, f64)> = band.into_iter().enumerate().collect();
                 let border: Vec<(usize, f64)> = border.into_iter().enumerate().collect();
-                let taken = self
-                    .gathered
-                    .counting(&solution.covariance.times(&band, &border));
+                let taken = self.gathered.counting(&covariance.times(&band, &border));
                 let traces = taken.iter().zip(signs).zip(&along);
                 traces
                     .map(|((taken, signs), d)| law.form(d, taken, signs))

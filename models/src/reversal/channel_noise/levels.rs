@@ -8,7 +8,6 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::readings::ChannelReadings;
 use super::traces::{Group, Trace};
 
 /// Most differences of a trace that are looked at, evenly spread.
@@ -44,15 +43,15 @@ pub struct Level {
 pub struct Levels(pub Vec<Level>);
 
 impl Levels {
-    /// From values (readings or residuals) of each channel's sorted readings, trace by trace.
-    pub fn along(channels: &[ChannelReadings], traces: &[Vec<Trace>], values: &[&[f64]]) -> Self {
-        let levels = channels.iter().zip(traces).zip(values);
+    /// From positions and values (readings or residuals) of each channel's sorted readings, trace by trace.
+    pub fn along(x: &[&[f64]], traces: &[Vec<Trace>], values: &[&[f64]]) -> Self {
+        let levels = x.iter().zip(traces).zip(values);
         Self(
             levels
-                .map(|((channel, traces), values)| {
+                .map(|((x, traces), values)| {
                     let mut found = Vec::new();
                     for trace in traces {
-                        let x = |k: usize| channel.x[trace.row(k)];
+                        let x = |k: usize| x[trace.row(k)];
                         let y = |k: usize| values[trace.row(k)];
                         differences(trace.len(), x, y, &mut found);
                     }
@@ -208,6 +207,7 @@ fn level(mut found: Vec<f64>) -> Level {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reversal::simultaneous::ChannelReadings;
     use crate::reversal::{Channel, Observations, Reading};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
@@ -230,9 +230,12 @@ mod tests {
             }
         }
         let channels = ChannelReadings::sort(&data);
-        let traces = super::super::traces::of(&channels, &data);
+        let x: Vec<&[f64]> = channels.iter().map(|c| c.x.as_slice()).collect();
+        let traces = super::super::traces::of(&channels, |i| {
+            (data.readings[i].direction, data.readings[i].repeat)
+        });
         let values: Vec<&[f64]> = channels.iter().map(|c| c.value.as_slice()).collect();
-        Levels::along(&channels, &traces, &values)
+        Levels::along(&x, &traces, &values)
     }
 
     /// Channels of equal noise are told apart as rarely as the level says, and their variance with the

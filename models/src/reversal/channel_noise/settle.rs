@@ -9,14 +9,10 @@ use errsep_solvers::options::Options as Minimisation;
 use errsep_solvers::outcome::Iteration;
 use errsep_solvers::structured::{Parameters, StructuredFit, hat_traces};
 
-use super::descent::minimise;
-use super::error::ReversalError;
 use super::levels::{Level, Levels};
-use super::options::{Noise, Options};
-use super::problem::Reversal;
-use super::readings::ChannelReadings;
-use super::traces::{self, Group, Trace};
-use crate::reversal::Observations;
+use super::survey::Survey;
+use super::{Weighed, freedom_left, sum_of_squares, weights_of};
+use crate::reversal::simultaneous::Noise;
 
 /// Rounds in which the channels' noise is estimated anew.
 const MOST_ROUNDS: usize = 10;
@@ -35,72 +31,6 @@ const NEAR: f64 = 0.1;
 /// deviations of the logarithm of their ratio.
 const CLEAR: f64 = 3.5;
 
-/// The readings by trace, and the repeats.
-pub struct Survey<'a> {
-    pub channels: &'a [ChannelReadings],
-    pub traces: Vec<Vec<Trace>>,
-    /// The repeats of each channel and direction; empty where nothing was repeated.
-    pub repeats: Vec<Group>,
-}
-
-impl<'a> Survey<'a> {
-    /// Looks through the readings.
-    pub fn new(channels: &'a [ChannelReadings], observations: &Observations) -> Self {
-        let traces = traces::of(channels, observations);
-        let repeated = traces.iter().any(|t| t.len() > 1);
-        let mut repeats = if repeated {
-            traces::grouped(channels, &traces)
-        } else {
-            Vec::new()
-        };
-        if repeats.iter().all(|g| g.traces.len() < 2) {
-            repeats.clear();
-        }
-        Self {
-            channels,
-            traces,
-            repeats,
-        }
-    }
-
-    /// The mean of a channel's values in each cell of a trace of a group; NaN in empty cells.
-    pub fn cell_means(&self, group: &Group, trace: usize, values: &[Vec<f64>]) -> Vec<f64> {
-        let rows = &self.traces[group.channel][group.traces[trace]];
-        let own = &values[group.channel];
-        let mut means = vec![f64::NAN; group.positions.len()];
-        for (cell, range) in &group.on_cells[trace].cells {
-            let sum: f64 = range.clone().map(|k| own[rows.row(k)]).sum();
-            means[*cell] = sum / range.len() as f64;
-        }
-        means
-    }
-
-    /// The repeats of a group on the cells in which all have readings.
-    pub fn complete_means(&self, group: &Group, values: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let complete = group.complete();
-        (0..group.traces.len())
-            .map(|t| {
-                let means = self.cell_means(group, t, values);
-                complete.iter().map(|cell| means[*cell]).collect()
-            })
-            .collect()
-    }
-
-    /// First guess of each channel's noise, µm, from the readings themselves.
-    pub fn first_noise(&self, noise: Noise) -> Vec<f64> {
-        match noise {
-            Noise::Declared(sigma) => vec![sigma; self.channels.len()],
-            Noise::Equal => vec![1.0; self.channels.len()],
-            Noise::Estimated => {
-                let values: Vec<&[f64]> =
-                    self.channels.iter().map(|c| c.value.as_slice()).collect();
-                let levels = Levels::along(self.channels, &self.traces, &values);
-                levels.sigmas(&vec![1.0; self.channels.len()])
-            }
-        }
-    }
-}
-
 /// A fit with settled noise.
 pub struct Settled {
     /// The fit under the last weights.
@@ -116,17 +46,25 @@ pub struct Settled {
     pub first_run: usize,
 }
 
+/// How to minimise, and what is known of the noise.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked<'a> {
+    pub noise: Noise,
+    pub loss: Loss,
+    pub minimisation: &'a Minimisation,
+}
+
 /// Minimises, and finds the weights of the channels if they are asked for.
 ///
 /// # Errors
-/// [`ReversalError`] where the model is not defined.
-pub fn settle(
-    problem: &mut Reversal,
+/// Those of the problem, where the model is not defined.
+pub fn settle<P: Weighed>(
+    problem: &mut P,
     start: Parameters,
-    options: &Options,
+    options: Asked,
     survey: &Survey,
     sigmas: &mut Vec<f64>,
-) -> Result<Settled, ReversalError> {
+) -> Result<Settled, P::Error> {
     let robust = options.loss != Loss::Quadratic;
     let (mut fit, mut history) = first_fit(problem, start, options)?;
     let first_run = history.len();
@@ -145,8 +83,8 @@ pub fn settle(
         if matches!(options.noise, Noise::Declared(_)) || !fit.converged() {
             break;
         }
-        let levels = levels(survey, &residuals);
-        let mut next = told_apart(problem, &fit, &levels, options, survey)?;
+        let levels = survey.levels(&residuals);
+        let mut next = told_apart(problem, &fit, &levels, options.noise, survey)?;
         known = known_level(problem, &levels, sigmas);
         if robust {
             let scale = robust_scale(&residuals, &next, freedom_left(problem));
@@ -160,8 +98,8 @@ pub fn settle(
             break;
         }
         *sigmas = next;
-        problem.weights = weights_of(sigmas);
-        fit = minimise(problem, fit.parameters, &options.minimisation)?;
+        problem.weigh(weights_of(sigmas));
+        fit = problem.minimise(fit.parameters, options.minimisation)?;
         history.extend(&fit.history);
         residuals = problem.residuals(&fit.parameters)?;
     }
@@ -176,13 +114,13 @@ pub fn settle(
 
 /// The fit under the first weights; under a robust loss least squares first, so that outliers are
 /// those of the readings, not of the start.
-fn first_fit(
-    problem: &mut Reversal,
+fn first_fit<P: Weighed>(
+    problem: &mut P,
     start: Parameters,
-    options: &Options,
-) -> Result<(StructuredFit, Vec<Iteration>), ReversalError> {
+    options: Asked,
+) -> Result<(StructuredFit, Vec<Iteration>), P::Error> {
     if options.loss == Loss::Quadratic {
-        let fit = minimise(problem, start, &options.minimisation)?;
+        let fit = problem.minimise(start, options.minimisation)?;
         let history = fit.history.clone();
         return Ok((fit, history));
     }
@@ -190,32 +128,18 @@ fn first_fit(
         cost_tolerance: NEAR,
         ..options.minimisation.clone()
     };
-    let mut fit = minimise(problem, start, &near)?;
+    let mut fit = problem.minimise(start, &near)?;
     let mut history = fit.history.clone();
-    problem.loss = options.loss;
-    for (far, stop) in [(true, &near), (false, &options.minimisation)] {
+    problem.lose(options.loss, false);
+    for (far, stop) in [(true, &near), (false, options.minimisation)] {
         if !fit.converged() {
             break;
         }
-        problem.far = far;
-        fit = minimise(problem, fit.parameters, stop)?;
+        problem.lose(options.loss, far);
+        fit = problem.minimise(fit.parameters, stop)?;
         history.extend(&fit.history);
     }
     Ok((fit, history))
-}
-
-/// What neighbours tell of each channel's noise: in contrasts of the repeats of every channel, else in
-/// the residuals.
-fn levels(survey: &Survey, residuals: &[Vec<f64>]) -> Levels {
-    let repeated = Levels::of_repeats(survey.channels.len(), &survey.repeats, |group| {
-        survey.complete_means(group, residuals)
-    });
-    if repeated.0.iter().all(|l| l.freedom > 0.0) {
-        repeated
-    } else {
-        let values: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
-        Levels::along(survey.channels, &survey.traces, &values)
-    }
 }
 
 /// The share of its readings with which a channel tells of its own noise. H the hat matrix, the
@@ -226,15 +150,15 @@ fn share_left(readings: usize, used: f64) -> f64 {
 }
 
 /// The channels' standard deviations as far as they are told apart.
-fn told_apart(
-    problem: &Reversal,
+fn told_apart<P: Weighed>(
+    problem: &P,
     fit: &StructuredFit,
     levels: &Levels,
-    options: &Options,
+    noise: Noise,
     survey: &Survey,
-) -> Result<Vec<f64>, ReversalError> {
-    let channels = problem.channels.len();
-    if options.noise == Noise::Equal || !levels.differ() {
+) -> Result<Vec<f64>, P::Error> {
+    let channels = survey.channels();
+    if noise == Noise::Equal || !levels.differ() {
         return Ok(levels.sigmas(&vec![0.0; channels]));
     }
     let kept = match fit.covariance() {
@@ -243,8 +167,8 @@ fn told_apart(
         None => vec![0.0; channels],
         Some(covariance) => hat_traces(problem, &fit.parameters, &covariance)?
             .into_iter()
-            .zip(problem.channels)
-            .map(|(used, c)| share_left(c.len(), used))
+            .zip(problem.lengths())
+            .map(|(used, readings)| share_left(readings, used))
             .collect(),
     };
     Ok(levels.sigmas(&kept))
@@ -252,9 +176,9 @@ fn told_apart(
 
 /// What is known of the noise apart from the model, in units of the weights; `None` where the model
 /// has so many unknowns that neighbours are part of it.
-fn known_level(problem: &Reversal, levels: &Levels, sigmas: &[f64]) -> Option<Level> {
-    let readings: usize = problem.channels.iter().map(ChannelReadings::len).sum();
-    if share_left(readings, problem.unknowns.free_count() as f64) <= 0.0 {
+fn known_level(problem: &impl Weighed, levels: &Levels, sigmas: &[f64]) -> Option<Level> {
+    let readings: usize = problem.lengths().iter().sum();
+    if share_left(readings, problem.free_count() as f64) <= 0.0 {
         return None;
     }
     let weighted = levels.0.iter().zip(sigmas).map(|(l, s)| Level {
@@ -284,14 +208,13 @@ pub struct Left {
 
 impl Left {
     /// From the residuals of single traces against what is known of the noise.
-    pub fn of_residuals(problem: &Reversal, residuals: &[Vec<f64>], known: Option<Level>) -> Self {
+    pub fn of_residuals(
+        problem: &impl Weighed,
+        residuals: &[Vec<f64>],
+        known: Option<Level>,
+    ) -> Self {
         let freedom = freedom_left(problem);
-        let squares: f64 = residuals
-            .iter()
-            .zip(&problem.weights)
-            .map(|(own, weight)| weight * weight * sum_of_squares(own))
-            .sum();
-        let left = squares / freedom;
+        let left = weighted_squares(residuals, problem.weights()) / freedom;
         let clear = known
             .filter(|_| freedom > 0.0)
             .map(|known| exceeds(left, freedom, known));
@@ -340,11 +263,6 @@ fn shared_misfit(
     high
 }
 
-/// 1/σ by channel.
-pub fn weights_of(sigmas: &[f64]) -> Vec<f64> {
-    sigmas.iter().map(|s| 1.0 / s).collect()
-}
-
 fn all_equal(sigmas: &[f64]) -> bool {
     sigmas.windows(2).all(|pair| pair[0] == pair[1])
 }
@@ -359,12 +277,6 @@ fn change(next: &[f64], sigmas: &[f64], scale_counts: bool) -> f64 {
     };
     let changes = ratios.iter().map(|r| (r / unit - 1.0).abs());
     changes.fold(0.0, f64::max)
-}
-
-/// Readings less unknowns.
-pub fn freedom_left(problem: &Reversal) -> f64 {
-    let readings: usize = problem.channels.iter().map(ChannelReadings::len).sum();
-    readings as f64 - problem.unknowns.free_count() as f64
 }
 
 /// Under a robust loss the median of all residuals takes the place of their squares; in units of the
@@ -384,16 +296,17 @@ fn robust_scale(residuals: &[Vec<f64>], sigmas: &[f64], freedom: f64) -> f64 {
 /// By how much a robust loss stretches the standard uncertainty: the rows, each times its factor w,
 /// have given (Σ w² J Jᵀ)⁻¹; the covariance is E[ψ²]/E[ψ′]² (JᵀJ)⁻¹ (Huber 1981, section 7.6),
 /// ψ = ρ′ r.
-pub fn robust_unit(problem: &Reversal, residuals: &[Vec<f64>]) -> f64 {
+pub fn robust_unit(problem: &impl Weighed, residuals: &[Vec<f64>]) -> f64 {
+    let loss = problem.loss();
     let (mut squares, mut slopes, mut weights) = (0.0, 0.0, 0.0);
-    for (own, weight) in residuals.iter().zip(&problem.weights) {
+    for (own, weight) in residuals.iter().zip(problem.weights()) {
         for r in own {
             let weighted = r * weight;
             let s = weighted * weighted;
-            let rho = problem.loss.at(s);
+            let rho = loss.at(s);
             squares += rho.first * rho.first * s;
             slopes += rho.first + 2.0 * s * rho.second;
-            weights += problem.loss.row_factors(weighted).0.powi(2);
+            weights += loss.row_factors(weighted).0.powi(2);
         }
     }
     if slopes > 0.0 {
@@ -403,6 +316,10 @@ pub fn robust_unit(problem: &Reversal, residuals: &[Vec<f64>]) -> f64 {
     }
 }
 
-pub fn sum_of_squares(values: &[f64]) -> f64 {
-    values.iter().map(|v| v * v).sum()
+/// Σ (residual/σ)².
+pub fn weighted_squares(residuals: &[Vec<f64>], weights: &[f64]) -> f64 {
+    let channels = residuals.iter().zip(weights);
+    channels
+        .map(|(own, weight)| weight * weight * sum_of_squares(own))
+        .sum()
 }

@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use super::readings::ChannelReadings;
-use crate::reversal::{Direction, Observations};
+use super::SortedReadings;
+use crate::reversal::Direction;
 
 /// Cells along a trace; more would tell no more of what is correlated along it.
 const MOST_CELLS: usize = 400;
@@ -34,26 +34,30 @@ impl Trace {
     }
 }
 
-/// The traces of every channel.
-pub fn of(channels: &[ChannelReadings], observations: &Observations) -> Vec<Vec<Trace>> {
+/// The traces of every channel; `taken` tells how one of the observations was taken.
+pub fn of<C: SortedReadings>(
+    channels: &[C],
+    taken: impl Fn(usize) -> (Direction, u32),
+) -> Vec<Vec<Trace>> {
     channels
         .iter()
         .map(|channel| {
-            let key = |i: u32| {
-                let reading = &observations.readings[i as usize];
-                (reading.direction == Direction::Backward, reading.repeat)
+            let count = channel.x().len();
+            let key = |row: usize| {
+                let (direction, repeat) = taken(channel.source(row));
+                (direction == Direction::Backward, repeat)
             };
-            let first = channel.source.first().map(|i| key(*i));
-            if channel.source.iter().all(|i| Some(key(*i)) == first) {
+            let first = (count > 0).then(|| key(0));
+            if (0..count).all(|row| Some(key(row)) == first) {
                 return vec![Trace {
                     backward: first.is_some_and(|f| f.0),
                     rows: None,
-                    count: channel.len(),
+                    count,
                 }];
             }
             let mut traces: BTreeMap<(bool, u32), Vec<u32>> = BTreeMap::new();
-            for (row, i) in (0_u32..).zip(&channel.source) {
-                traces.entry(key(*i)).or_default().push(row);
+            for (row, at) in (0..count).zip(0_u32..) {
+                traces.entry(key(row)).or_default().push(at);
             }
             traces
                 .into_iter()
@@ -103,26 +107,26 @@ impl Group {
 
 /// Groups of repeats, on cells: a position each where repeats share their positions, so that nothing is
 /// averaged; otherwise stretches of about two readings or more, so that differing positions meet.
-pub fn grouped(channels: &[ChannelReadings], traces: &[Vec<Trace>]) -> Vec<Group> {
+pub fn grouped(x: &[&[f64]], traces: &[Vec<Trace>]) -> Vec<Group> {
     let mut groups = Vec::new();
-    for (c, (channel, traces)) in channels.iter().zip(traces).enumerate() {
+    for (c, (x, traces)) in x.iter().zip(traces).enumerate() {
         for backward in [false, true] {
             let own: Vec<usize> = (0..traces.len())
                 .filter(|t| traces[*t].backward == backward && traces[*t].len() > 0)
                 .collect();
             if !own.is_empty() {
-                groups.push(group(c, channel, traces, own));
+                groups.push(group(c, x, traces, own));
             }
         }
     }
     groups
 }
 
-fn group(c: usize, channel: &ChannelReadings, traces: &[Trace], own: Vec<usize>) -> Group {
+fn group(c: usize, x: &[f64], traces: &[Trace], own: Vec<usize>) -> Group {
     let longest = own.iter().map(|t| traces[*t].len()).max().unwrap_or(0);
-    let x_of = |t: usize| (0..traces[t].len()).map(move |k| channel.x[traces[t].row(k)]);
+    let x_of = |t: usize| (0..traces[t].len()).map(move |k| x[traces[t].row(k)]);
     let edges = shared_positions(longest, own.iter().flat_map(|t| x_of(*t)))
-        .unwrap_or_else(|| even_edges(channel, longest));
+        .unwrap_or_else(|| even_edges(x, longest));
     let last = edges.len().saturating_sub(1);
     let cell_of = |x: f64| {
         edges
@@ -172,9 +176,9 @@ fn shared_positions(longest: usize, x: impl Iterator<Item = f64>) -> Option<Vec<
 }
 
 /// Left ends of even cells of two readings or more of the longest trace.
-fn even_edges(channel: &ChannelReadings, longest: usize) -> Vec<f64> {
+fn even_edges(x: &[f64], longest: usize) -> Vec<f64> {
     let count = (longest / 2).clamp(1, MOST_CELLS);
-    let (Some(first), Some(last)) = (channel.x.first(), channel.x.last()) else {
+    let (Some(first), Some(last)) = (x.first(), x.last()) else {
         return Vec::new();
     };
     let width = (last - first) / count as f64;
@@ -184,7 +188,19 @@ fn even_edges(channel: &ChannelReadings, longest: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reversal::{Channel, Reading};
+    use crate::reversal::simultaneous::ChannelReadings;
+    use crate::reversal::{Channel, Observations, Reading};
+
+    fn traces_of(channels: &[ChannelReadings], data: &Observations) -> Vec<Vec<Trace>> {
+        of(channels, |i| {
+            (data.readings[i].direction, data.readings[i].repeat)
+        })
+    }
+
+    fn groups_of(channels: &[ChannelReadings], traces: &[Vec<Trace>]) -> Vec<Group> {
+        let x: Vec<&[f64]> = channels.iter().map(|c| c.x.as_slice()).collect();
+        grouped(&x, traces)
+    }
 
     fn observations(x: impl Fn(u32, usize) -> f64, repeats: u32, n: usize) -> Observations {
         let readings = (1..=repeats)
@@ -205,12 +221,12 @@ mod tests {
     fn shared_positions_are_cells_of_their_own() {
         let data = observations(|_, k| 2.0 * k as f64, 3, 10);
         let channels = ChannelReadings::sort(&data);
-        let traces = of(&channels, &data);
+        let traces = traces_of(&channels, &data);
         assert_eq!(
             traces[0].iter().map(Trace::len).collect::<Vec<_>>(),
             [10; 3]
         );
-        let groups = grouped(&channels, &traces);
+        let groups = groups_of(&channels, &traces);
         assert_eq!(groups.len(), 1);
         assert_eq!(groups[0].positions.len(), 10);
         assert_eq!(groups[0].complete().len(), 10);
@@ -226,7 +242,7 @@ mod tests {
     fn positions_that_differ_meet_in_wider_cells() {
         let data = observations(|r, k| 2.0 * k as f64 + 0.3 * f64::from(r), 3, 40);
         let channels = ChannelReadings::sort(&data);
-        let groups = grouped(&channels, &of(&channels, &data));
+        let groups = groups_of(&channels, &traces_of(&channels, &data));
         assert_eq!(groups[0].positions.len(), 20);
         assert!(groups[0].complete().len() >= 18, "{groups:?}");
         let of_trace = |t: &CellTrace| t.cells.iter().map(|c| c.1.len()).sum::<usize>();
@@ -237,8 +253,8 @@ mod tests {
     fn one_trace_is_the_channel() {
         let data = observations(|_, k| k as f64, 1, 900);
         let channels = ChannelReadings::sort(&data);
-        let traces = of(&channels, &data);
+        let traces = traces_of(&channels, &data);
         assert_eq!((traces[0].len(), traces[0][0].row(17)), (1, 17));
-        assert_eq!(grouped(&channels, &traces)[0].positions.len(), MOST_CELLS);
+        assert_eq!(groups_of(&channels, &traces)[0].positions.len(), MOST_CELLS);
     }
 }

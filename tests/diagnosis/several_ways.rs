@@ -65,6 +65,11 @@ fn effects_as_machines_have_them_are_named() {
         ("lateral-backlash", 5),
         ("off-crest", 4),
         ("axis-backlash", 1),
+        ("thermal-drift", 4),
+        ("cyclic-error", 5),
+        ("local-contamination", 5),
+        ("lateral-backlash", 6),
+        ("stick-slip", 4),
     ];
     let told: Vec<String> = cases
         .par_iter()

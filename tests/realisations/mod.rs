@@ -15,15 +15,15 @@ pub use world::{Now, World};
 
 /// The ways in which each effect is made.
 pub const REALISATIONS: &[(&str, usize)] = &[
-    ("thermal-drift", 4),
+    ("thermal-drift", 5),
     ("indicator-nonlinearity", 5),
     ("zero-jump", 4),
-    ("cyclic-error", 5),
-    ("local-contamination", 5),
+    ("cyclic-error", 6),
+    ("local-contamination", 6),
     ("hysteresis", 4),
-    ("lateral-backlash", 6),
+    ("lateral-backlash", 7),
     ("ambient-cycle", 4),
-    ("stick-slip", 4),
+    ("stick-slip", 5),
     ("off-crest", 5),
     ("taper", 1),
     ("gain-mismatch", 2),
@@ -42,18 +42,24 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
     Some(match (effect, way) {
         // Two mounts warm up: each moves by its own amount.
         ("thermal-drift", _) => {
-            let ratio = [1.13, -0.33, 0.0, 0.6][way];
+            let ratio = [1.13, -0.33, 0.0, 0.6, 0.15][way];
             let tau = [
                 uniform(0.1, 1.0),
                 uniform(0.1, 1.0),
                 30.0,
                 uniform(0.1, 0.4),
+                0.06,
             ][way];
             let slower = if way == 3 { 2.5 } else { 1.0 };
             let near = uniform(0.0, 1.0) < 0.5;
             Box::new(move |w, n| {
                 let first = (n.indicator == 0) == near;
                 let warm = |tau: f64| -(-n.time / tau).exp_m1() / -(-1.0 / tau).exp_m1();
+                // A light body and a heavy one that move the mount against each other.
+                let warm = |tau: f64| match way {
+                    4 => 1.2 * warm(tau) - 0.8 * warm(0.9),
+                    _ => warm(tau),
+                };
                 plain(w, n)
                     + size
                         * if first {
@@ -114,6 +120,11 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
                     * match way {
                         0 | 1 if own => (turn * seen + phase).sin(),
                         2 => (turn * seen + if own { phase } else { other }).sin(),
+                        // Of the drive in the cables of one indicator, its phase set anew.
+                        5 if own => {
+                            let begins = if n.spindle > 0.0 { phase } else { other };
+                            (TAU * cycles * 0.5 * n.part + begins).sin()
+                        }
                         // Of the drive, in one spindle position.
                         3 if n.spindle > 0.0 => (TAU * cycles * 0.5 * n.part + phase).sin(),
                         4 if own => {
@@ -137,7 +148,13 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
                     2 => -(1.0 - 0.5 * away).max(0.0),
                     _ => (1.0 - away * 0.5).max(0.0),
                 };
-                let there = n.channel() == channel && (way < 3 || n.repeat == repeat);
+                let met = match way {
+                    0..3 => true,
+                    // It came after the third pass forward, and stays.
+                    5 => n.repeat > 3 || n.repeat == 3 && n.direction < 0.0,
+                    _ => n.repeat == repeat,
+                };
+                let there = n.channel() == channel && met;
                 plain(w, n) + if there { size * section } else { 0.0 }
             })
         }
@@ -167,14 +184,16 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
             })
         }
         ("lateral-backlash", _) => {
-            let yaw = [0.0, 0.5, -1.0, 0.0, 0.3, 0.0][way];
-            let level = [1.0, 1.0, 0.3, -1.0, 0.4, 1.0][way];
+            let yaw = [0.0, 0.5, -1.0, 0.0, 0.3, 0.0, 0.0][way];
+            let level = [1.0, 1.0, 0.3, -1.0, 0.4, 1.0, 0.0][way];
             let (bend, phase) = (uniform(2.0, 5.0), uniform(0.0, TAU));
             let way_to_lean = uniform(0.1, 0.3);
             Box::new(move |w, n| {
                 let own = match way {
                     // Both lines have forms of their own.
                     4 => (bend * n.part + phase).sin(),
+                    // Lines that wind about each other.
+                    6 => (4.0 * std::f64::consts::PI * n.part).cos(),
                     // The slide leans over after it has turned round.
                     5 => -2.0 * (-(1.0 + n.direction * n.part) / way_to_lean).exp(),
                     _ => 0.0,
@@ -201,11 +220,19 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
         }
         // The slide sticks until its drive has wound up by a step, then slips after it.
         ("stick-slip", _) => {
-            let pitch = [uniform(0.03, 0.08), uniform(0.08, 0.2), 0.05, 0.12][way];
+            let pitch = [uniform(0.03, 0.08), uniform(0.08, 0.2), 0.05, 0.12, 0.15][way];
             // Half or whole slips at mid travel would add up to a constant lag in both directions.
-            let begin = [0.25, 0.75, 0.18, 0.33][way] - 0.5 / pitch;
+            let begin = [0.25, 0.75, 0.18, 0.33, 0.0][way] - 0.5 / pitch;
+            let anew: Vec<f64> = (0..16).map(|_| uniform(0.0, 1.0)).collect();
             Box::new(move |w, n| {
                 let run = 0.5 * (1.0 + n.direction * n.part);
+                if way == 4 {
+                    // It sticks at one side, and leans away from it until it slips.
+                    let turned = usize::from(n.direction < 0.0) + 2 * usize::from(n.spindle < 0.0);
+                    let begins = anew[4 * (n.repeat as usize - 1) + turned];
+                    let leans = (run / pitch + begins).rem_euclid(1.0);
+                    return plain(w, n) - size * n.towards() * n.direction * leans;
+                }
                 let wound = (run / pitch + begin).rem_euclid(1.0);
                 let at = n.x - n.direction * 100.0 * size * wound;
                 w.seen(n, at, at)

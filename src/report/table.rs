@@ -3,6 +3,9 @@
 use super::number;
 use std::cmp::Ordering;
 
+/// Digits of a count, which is shown whole.
+const WHOLE: usize = 17;
+
 /// What one cell holds. Numbers stay numbers until the page is written, so that a column can be
 /// sorted and aligned by value.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,8 +110,7 @@ impl From<usize> for Cell {
     fn from(value: usize) -> Self {
         Self::Number {
             value: value as f64,
-            // A count is shown whole.
-            digits: 17,
+            digits: WHOLE,
         }
     }
 }
@@ -178,7 +180,7 @@ impl Table {
     }
 
     /// Decimals with which all plain numbers of a column line up: those that its largest number
-    /// needs. None where the sizes differ by more than the digits shown.
+    /// needs. None where the sizes differ by more than the digits shown, and of counts.
     pub(super) fn common_decimals(&self, column: usize) -> Option<usize> {
         let mut largest = f64::NEG_INFINITY;
         let mut smallest = f64::INFINITY;
@@ -191,6 +193,9 @@ impl Table {
                 let exponent = value.abs().log10().floor();
                 largest = largest.max(exponent);
                 smallest = smallest.min(exponent);
+                if *digits == WHOLE {
+                    return None;
+                }
                 shown = shown.max((*digits).min(6) as i32);
             }
         }
@@ -235,5 +240,8 @@ mod tests {
         assert_eq!(column(&[6.61, 0.21]).common_decimals(0), Some(3));
         assert_eq!(column(&[1e6, 1e-6]).common_decimals(0), None);
         assert_eq!(column(&[f64::NAN]).common_decimals(0), None);
+        let counts = Table::new("", ["n"]).rows([[Cell::from(246usize)], [Cell::from(8usize)]]);
+        assert_eq!(counts.common_decimals(0), None);
+        assert_eq!(counts.rows[0][0].text_with(None), "246");
     }
 }

@@ -62,6 +62,7 @@ impl Cell {
     /// The same with the decimals that its column agreed on.
     pub(super) fn text_with(&self, decimals: Option<usize>) -> String {
         match self {
+            Self::Number { value, digits } if *digits == WHOLE => number::fixed(*value, 0),
             Self::Number { value, .. } if decimals.is_some() => {
                 number::fixed(*value, decimals.unwrap_or_default())
             }

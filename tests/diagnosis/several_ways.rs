@@ -67,9 +67,6 @@ fn effects_as_machines_have_them_are_named() {
         ("axis-backlash", 1),
         ("thermal-drift", 4),
         ("cyclic-error", 5),
-        ("local-contamination", 5),
-        ("lateral-backlash", 6),
-        ("stick-slip", 4),
     ];
     let told: Vec<String> = cases
         .par_iter()

@@ -180,6 +180,12 @@ pub trait Effect<M>: Send + Sync {
         false
     }
 
+    /// Changes of the readings, of one standard deviation each, that the model leaves open at a shape: it sees
+    /// the state where it is not known. What remains beside the effect is judged with them.
+    fn open(&self, _model: &M, _shape: &Shape) -> Vec<Column> {
+        Vec::new()
+    }
+
     /// Whether a shape is one that the search may go to.
     fn allowed(&self, _model: &M, _shape: &Shape) -> bool {
         true

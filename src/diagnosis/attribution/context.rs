@@ -133,13 +133,20 @@ impl<'a, M: FittedModel> Context<'a, M> {
     /// that can make the difference.
     pub fn judged(&self, readings: &DVector<f64>, causes: &[Cause]) -> Remainder {
         let plain = self.remainder(readings, causes);
-        let freedom = self.space.degrees_of_freedom() as f64;
-        let far = plain.residual.norm_squared() > freedom + FAR * (2.0 * freedom).sqrt();
-        if causes.is_empty() || far || self.adequate(causes, &plain) {
+        if causes.is_empty() || self.adequate(causes, &plain) {
             return plain;
         }
         let basis = span(causes, self.space.readings());
-        let doubt = self.doubt(readings, causes, &basis);
+        let freedom = self.space.degrees_of_freedom() as f64;
+        let most = freedom + FAR * (2.0 * freedom).sqrt();
+        let mut open = self.open(readings, causes);
+        let along = basis.tr_mul(&open);
+        open.gemm(-1.0, &basis, &along, 1.0);
+        let far = |residual: &DVector<f64>| plain.residual.dot(residual) > most;
+        if far(&plain.residual) && far(&Doubt::of_open(&open).trusted(&plain.residual)) {
+            return plain;
+        }
+        let doubt = self.doubt(readings, causes, &basis, open);
         if doubt.weights.is_empty() {
             return plain;
         }
@@ -221,10 +228,7 @@ impl<'a, M: FittedModel> Context<'a, M> {
     fn scores(&self, readings: &DVector<f64>, basis: &DMatrix<f64>, doubt: &Doubt) -> Remainder {
         let whole = self.residual(readings);
         let residual = &whole - basis * basis.tr_mul(&whole);
-        let mut trusted = residual.clone();
-        for (direction, weight) in doubt.directions.iter().zip(&doubt.weights) {
-            trusted.axpy(-weight * direction.dot(&residual), direction, 1.0);
-        }
+        let trusted = doubt.trusted(&residual);
         let mut spans: Vec<DVector<f64>> = basis.column_iter().map(|c| c.clone_owned()).collect();
         // A part w of a product is taken away by √w of the direction.
         let halves = doubt.directions.iter().zip(&doubt.weights);

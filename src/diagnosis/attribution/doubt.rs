@@ -32,10 +32,38 @@ const SEED: u64 = 0x0064_6f75_6274;
 /// Directions that are not fully trusted.
 #[derive(Default)]
 pub(in crate::diagnosis) struct Doubt {
-    /// Orthonormal directions.
+    /// Directions.
     pub directions: Vec<DVector<f64>>,
-    /// The part of each that is taken away.
+    /// The part of a product along each that is taken away.
     pub weights: Vec<f64>,
+}
+
+impl Doubt {
+    /// The doubt of independent changes W of one standard deviation each:
+    /// (I + W Wᵀ)⁻¹ = I − Q Qᵀ with Q = W L⁻ᵀ and L Lᵀ = I + WᵀW.
+    pub fn of_open(changes: &DMatrix<f64>) -> Self {
+        let count = changes.ncols();
+        let gram = DMatrix::identity(count, count) + changes.tr_mul(changes);
+        let Some(root) = gram.cholesky().filter(|_| count > 0) else {
+            return Self::default();
+        };
+        let Some(directions) = root.l().solve_lower_triangular(&changes.transpose()) else {
+            return Self::default();
+        };
+        Self {
+            directions: directions.row_iter().map(|q| q.transpose()).collect(),
+            weights: vec![1.0; count],
+        }
+    }
+
+    /// A residual as far as it is trusted.
+    pub fn trusted(&self, residual: &DVector<f64>) -> DVector<f64> {
+        let mut trusted = residual.clone();
+        for (direction, weight) in self.directions.iter().zip(&self.weights) {
+            trusted.axpy(-weight * direction.dot(residual), direction, 1.0);
+        }
+        trusted
+    }
 }
 
 /// Draws of noise over readings that are free of causes.
@@ -127,13 +155,46 @@ impl<M: FittedModel> Context<'_, M> {
         effect.columns(&seen, &causes[which].shape)
     }
 
-    /// The doubt about causes beside what the model and they themselves absorb (`basis`).
-    pub fn doubt(&self, readings: &DVector<f64>, causes: &[Cause], basis: &DMatrix<f64>) -> Doubt {
+    /// What the model leaves open beside causes, because they show its state where it is not known: whitened,
+    /// projected changes of one standard deviation each.
+    pub fn open(&self, readings: &DVector<f64>, causes: &[Cause]) -> DMatrix<f64> {
+        let nothing = DMatrix::zeros(readings.len(), 0);
+        let Some(changes) = self.changes(readings, causes) else {
+            return nothing;
+        };
+        let state = self
+            .model
+            .refit_as_smooth(self.without(readings, causes, &changes));
+        let of = |cause: &Cause| self.catalogue[cause.effect].open(&state, &cause.shape);
+        let columns: Vec<Column> = causes.iter().flat_map(of).collect();
+        if columns.is_empty() {
+            nothing
+        } else {
+            self.space.forward_columns(&columns).0
+        }
+    }
+
+    /// The doubt about causes beside what the model and they themselves absorb (`basis`), with what the model
+    /// leaves open beside them (`open`, clear of the basis).
+    pub fn doubt(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+        basis: &DMatrix<f64>,
+        open: DMatrix<f64>,
+    ) -> Doubt {
         let Some(StateDraws { mut moved, .. }) = self.state_draws(readings, causes) else {
-            return Doubt::default();
+            return Doubt::of_open(&open);
         };
         let along = basis.tr_mul(&moved);
         moved.gemm(-1.0, basis, &along, 1.0);
+        if open.ncols() > 0 {
+            let at = open.ncols();
+            let mut all = open.resize_horizontally(at + DRAWS, 0.0);
+            all.columns_mut(at, DRAWS)
+                .copy_from(&(moved / (DRAWS as f64).sqrt()));
+            return Doubt::of_open(&all);
+        }
         let eigen = SymmetricEigen::new(moved.tr_mul(&moved) / DRAWS as f64);
         let mut order: Vec<usize> = (0..DRAWS)
             .filter(|k| eigen.eigenvalues[*k] > LEAST)

@@ -8,6 +8,7 @@
 //! channel.
 
 mod arrangement;
+mod between;
 mod fitted;
 mod further;
 mod gathering;

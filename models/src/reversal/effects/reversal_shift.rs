@@ -108,6 +108,15 @@ impl Effect<FirstOrder> for ReversalShift {
         self.shifted(shape.variant).enumerate().map(of).collect()
     }
 
+    fn open(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+        let own = self.shifted(shape.variant);
+        model.between_positions(|place| {
+            let position = model.seat(place).position;
+            let shift = own.clone().position(|p| p == position);
+            [0.0, shift.and_then(|k| shape.values.get(k)).map_or(0.0, |shift| -shift)]
+        })
+    }
+
     fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
         Some(Shape {
             values: amplitudes.to_vec(),

@@ -1,0 +1,214 @@
+//! What the forms may be between the positions at which they are known.
+//!
+//! An effect that moves the place where a form is touched shows the form between the positions, and a form
+//! that is rough at their spacing is not known there. How rough it is, the readings say: each position is
+//! predicted by the cubic through its four neighbours, and the error by that through every second of them.
+//! Means of products of different repeats are free of noise. The ratio of the two errors, over spacings that
+//! differ by two, tells how much smaller the error is between neighbours; a form that is rough at every
+//! spacing has it as great there, which is the most it can be.
+
+use nalgebra::DVector;
+
+use super::FirstOrder;
+use crate::model::{Column, Place};
+
+/// Positions over which errors are averaged, to either side.
+const WINDOW: usize = 7;
+/// Errors of neighbouring positions share readings: so many stand for one.
+const SHARED: f64 = 3.0;
+/// Standard deviations of chance beyond which a form is rough.
+const ROUGH: f64 = 3.0;
+/// Squared displacements, in the unit of the reading, below which a form between positions is known.
+const PLACES_ALIKE: f64 = 1e-6;
+
+impl FirstOrder {
+    /// Changes of the readings, of one standard deviation each, by what the forms may be where an effect has them
+    /// touched: `shifts` gives for a reading how far from its position, mm, the forms of the slide and that of
+    /// the artefact are seen. What all readings at a position have in common is form.
+    pub(in crate::reversal) fn between_positions(
+        &self,
+        shifts: impl Fn(&Place) -> [f64; 2],
+    ) -> Vec<Column> {
+        let rough = self.roughness();
+        let slides = self.forms.len() - self.sides();
+        let n = self.positions.len();
+        let mut columns = Vec::new();
+        for (form, variances) in rough.iter().enumerate() {
+            if variances.iter().all(|v| *v == 0.0) {
+                continue;
+            }
+            // By position: the places where the form is seen, with readings and factors.
+            let mut seen: Vec<Vec<Seen>> = (0..n).map(|_| Vec::new()).collect();
+            for (k, place) in self.record.places.iter().enumerate() {
+                let factor = self.factor(place.channel, form);
+                if factor == 0.0 {
+                    continue;
+                }
+                let shift = shifts(place)[usize::from(form >= slides)];
+                let own = &mut seen[self.at(place)];
+                let known = own
+                    .iter_mut()
+                    .find(|s| (s.shift - shift).abs() < PLACES_ALIKE * self.travel());
+                match known {
+                    Some(seen) => seen.add(k, factor),
+                    None => own.push(Seen::new(shift, k, factor)),
+                }
+            }
+            for (at, own) in seen.into_iter().enumerate() {
+                columns.extend(self.open_at(at, own, variances));
+            }
+        }
+        columns
+    }
+
+    /// The columns of one position: of two places the difference alone shows.
+    fn open_at(&self, at: usize, own: Vec<Seen>, variances: &[f64]) -> Vec<Column> {
+        let variance = |seen: &Seen| self.open_variance(self.positions[at] + seen.shift, variances);
+        if own.len() < 2 {
+            return Vec::new();
+        }
+        let all: f64 = own.iter().map(&variance).sum();
+        let columns = own.iter().enumerate().filter_map(|(k, seen)| {
+            let square = match own.len() {
+                2 if k == 0 => all,
+                2 => 0.0,
+                _ => variance(seen),
+            };
+            (square > 0.0).then(|| seen.column(square.sqrt()))
+        });
+        columns.collect()
+    }
+
+    /// Variance of a form at a place, given what it is at the positions.
+    fn open_variance(&self, x: f64, variances: &[f64]) -> f64 {
+        let positions = &self.positions;
+        let after = positions.partition_point(|p| *p < x);
+        let gap = after.clamp(1, positions.len() - 1) - 1;
+        let part = (x - positions[gap]) / (positions[gap + 1] - positions[gap]);
+        // Beyond the ends a form is as open as half-way between positions, and more.
+        let swing = if (0.0..=1.0).contains(&part) {
+            (std::f64::consts::PI * part).sin()
+        } else {
+            1.0
+        };
+        variances[gap] * swing * swing
+    }
+
+    /// Number of forms of the artefact.
+    fn sides(&self) -> usize {
+        let sides = (0..self.present().len()).map(|c| self.arrangement.side_form(c));
+        let first = sides.min().unwrap_or(self.forms.len());
+        self.forms.len() - first
+    }
+
+    /// How a channel sees a form.
+    fn factor(&self, channel: usize, form: usize) -> f64 {
+        let slide = self.arrangement.slides(channel).iter();
+        let own = if self.arrangement.side_form(channel) == form {
+            1.0
+        } else {
+            0.0
+        };
+        slide.filter(|(k, _)| *k == form).map(|(_, f)| f).sum::<f64>() + own
+    }
+
+    /// For each form and each gap between positions the variance of the form half-way, µm²; nothing where
+    /// there are too few repeats to tell it from noise.
+    fn roughness(&self) -> Vec<Vec<f64>> {
+        let n = self.positions.len();
+        let nothing = vec![vec![0.0; n - 1]; self.forms.len()];
+        let of = |repeat: &u32| {
+            let means = self.channel_means(&self.record.observed, Some(*repeat));
+            self.arrangement.forms(&means, n)
+        };
+        let repeats: Vec<Vec<DVector<f64>>> = self.repeats.iter().filter_map(of).collect();
+        if repeats.len() < 2 || n < 2 * WINDOW {
+            return nothing;
+        }
+        let form = |k: usize| {
+            let near: Vec<Vec<f64>> = repeats.iter().map(|r| self.errors(&r[k], 1)).collect();
+            let far: Vec<Vec<f64>> = repeats.iter().map(|r| self.errors(&r[k], 2)).collect();
+            (0..n - 1)
+                .map(|gap| {
+                    let range = gap.saturating_sub(WINDOW)..(gap + WINDOW + 2).min(n);
+                    let (common, chance) = in_common(&near, range.clone());
+                    if common < ROUGH * chance {
+                        return 0.0;
+                    }
+                    let (wider, _) = in_common(&far, range);
+                    let part = if wider > common { common / wider } else { 1.0 };
+                    common * part
+                })
+                .collect()
+        };
+        (0..self.forms.len()).map(form).collect()
+    }
+
+    /// By how much each value of a profile differs from the cubic through the two neighbours of either side, or
+    /// through every second of them (`stride` 2); zero where there are none.
+    fn errors(&self, profile: &DVector<f64>, stride: usize) -> Vec<f64> {
+        let n = self.positions.len();
+        let error = |k: usize| {
+            if k < 2 * stride || k + 2 * stride >= n {
+                return 0.0;
+            }
+            let nodes = [k - 2 * stride, k - stride, k + stride, k + 2 * stride];
+            let x = self.positions[k];
+            let predicted: f64 = (nodes.iter())
+                .map(|&j| {
+                    let weight = |&i: &usize| {
+                        (x - self.positions[i]) / (self.positions[j] - self.positions[i])
+                    };
+                    let others = nodes.iter().filter(|i| **i != j);
+                    profile[j] * others.map(weight).product::<f64>()
+                })
+                .sum();
+            profile[k] - predicted
+        };
+        (0..n).map(error).collect()
+    }
+}
+
+/// The mean of the products of different repeats over a range, and the standard deviation that noise gives it.
+fn in_common(repeats: &[Vec<f64>], range: std::ops::Range<usize>) -> (f64, f64) {
+    let count = repeats.len() as f64;
+    let length = range.len() as f64;
+    let (mut squares, mut sums) = (0.0, 0.0);
+    for k in range {
+        squares += repeats.iter().map(|r| r[k] * r[k]).sum::<f64>();
+        sums += repeats.iter().map(|r| r[k]).sum::<f64>().powi(2);
+    }
+    let pairs = count * (count - 1.0);
+    let common = (sums - squares) / (pairs * length);
+    let noise = (squares / (count * length) - common).max(0.0);
+    (common, noise * (2.0 * SHARED / (length * pairs)).sqrt())
+}
+
+/// A place where a form is seen, with the readings that see it.
+struct Seen {
+    shift: f64,
+    rows: Vec<usize>,
+    factors: Vec<f64>,
+}
+
+impl Seen {
+    fn new(shift: f64, row: usize, factor: f64) -> Self {
+        Self {
+            shift,
+            rows: vec![row],
+            factors: vec![factor],
+        }
+    }
+
+    fn add(&mut self, row: usize, factor: f64) {
+        self.rows.push(row);
+        self.factors.push(factor);
+    }
+
+    fn column(&self, size: f64) -> Column {
+        Column {
+            rows: self.rows.clone(),
+            values: self.factors.iter().map(|f| size * f).collect(),
+        }
+    }
+}

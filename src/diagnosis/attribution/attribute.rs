@@ -13,12 +13,21 @@ use crate::diagnosis::levels::{
     BETTER, EARNED, HOPELESS, MOST_CAUSES, PAIR_REACH, PAIRS, POLISHED, REFINED,
 };
 
-/// Seeks the causes of what stands out in readings.
+/// Seeks the causes of what stands out in readings; `begun` are those without which noise and state were had.
 pub(in crate::diagnosis) fn attribute<M: FittedModel>(
     context: &Context<'_, M>,
     readings: &DVector<f64>,
     first: &Remainder,
+    begun: &[Cause],
 ) -> Option<Answer> {
+    if let [only] = begun {
+        let start = finer(&only.shape);
+        let (cause, _) = context.refine(context.model, readings, only.effect, &start, &[]);
+        let answer = confidence_set(context, readings, &[cause]);
+        if answer.complete {
+            return Some(answer);
+        }
+    }
     let mut causes: Vec<Cause> = Vec::new();
     let mut partial: Option<Answer> = None;
     for size in 1..=MOST_CAUSES {

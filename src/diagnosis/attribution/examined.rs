@@ -43,7 +43,7 @@ pub(in crate::diagnosis) fn examined<M: FittedModel, R>(
     let (state, law, readings) = afresh(context, &found, changes.as_ref());
     let context = context.moved(&state, law);
     let first = context.remainder(&readings, &[]);
-    let found = attribute(&context, &readings, &first);
+    let found = attribute(&context, &readings, &first, &found);
     then(Examined {
         context: &context,
         readings: &readings,

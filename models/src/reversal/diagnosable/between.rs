@@ -16,6 +16,8 @@ use crate::model::{Column, Place};
 const WINDOW: usize = 7;
 /// Errors of neighbouring positions share readings: so many stand for one.
 const SHARED: f64 = 3.0;
+/// Standard deviations by which a mean over so few may fall short.
+const SHORT: f64 = 2.0;
 /// Standard deviations of chance beyond which a form is rough.
 const ROUGH: f64 = 3.0;
 /// Squared displacements, in the unit of the reading, below which a form between positions is known.
@@ -109,7 +111,11 @@ impl FirstOrder {
         } else {
             0.0
         };
-        slide.filter(|(k, _)| *k == form).map(|(_, f)| f).sum::<f64>() + own
+        slide
+            .filter(|(k, _)| *k == form)
+            .map(|(_, f)| f)
+            .sum::<f64>()
+            + own
     }
 
     /// For each form and each gap between positions the variance of the form half-way, µm²; nothing where
@@ -135,9 +141,10 @@ impl FirstOrder {
                     if common < ROUGH * chance {
                         return 0.0;
                     }
-                    let (wider, _) = in_common(&far, range);
+                    let (wider, _) = in_common(&far, range.clone());
                     let part = if wider > common { common / wider } else { 1.0 };
-                    common * part
+                    let short = SHORT * (2.0 * SHARED / range.len() as f64).sqrt();
+                    common * part * (1.0 + short)
                 })
                 .collect()
         };

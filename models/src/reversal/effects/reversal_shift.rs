@@ -113,7 +113,12 @@ impl Effect<FirstOrder> for ReversalShift {
         model.between_positions(|place| {
             let position = model.seat(place).position;
             let shift = own.clone().position(|p| p == position);
-            [0.0, shift.and_then(|k| shape.values.get(k)).map_or(0.0, |shift| -shift)]
+            [
+                0.0,
+                shift
+                    .and_then(|k| shape.values.get(k))
+                    .map_or(0.0, |shift| -shift),
+            ]
         })
     }
 

@@ -20,19 +20,27 @@ pub(in crate::diagnosis) fn attribute<M: FittedModel>(
     first: &Remainder,
     begun: &[Cause],
 ) -> Option<Answer> {
+    let strongest_alone = strongest(context, readings, first, &[]);
     if let [only] = begun {
         let start = finer(&only.shape);
-        let (cause, _) = context.refine(context.model, readings, only.effect, &start, &[]);
-        let answer = confidence_set(context, readings, &[cause]);
-        if answer.complete {
-            return Some(answer);
+        let (cause, t) = context.refine(context.model, readings, only.effect, &start, &[]);
+        let better = |(other, other_t): &(Cause, f64)| other.effect == only.effect && *other_t > t;
+        if !strongest_alone.as_ref().is_some_and(better) {
+            let answer = confidence_set(context, readings, &[cause]);
+            if answer.complete {
+                return Some(answer);
+            }
         }
     }
     let mut causes: Vec<Cause> = Vec::new();
     let mut partial: Option<Answer> = None;
     for size in 1..=MOST_CAUSES {
         let here = partial.as_ref().map_or(first, |answer| &answer.remainder);
-        let Some(next) = strongest(context, readings, here, &causes) else {
+        let next = match size {
+            1 => strongest_alone.clone(),
+            _ => strongest(context, readings, here, &causes),
+        };
+        let Some((next, _)) = next else {
             break;
         };
         causes.push(next);
@@ -74,7 +82,7 @@ pub(in crate::diagnosis) fn roughly<M: FittedModel>(
     let mut left: Option<Remainder> = None;
     for _ in 0..MOST_CAUSES {
         let here = left.as_ref().unwrap_or(first);
-        let Some(next) = strongest(context, readings, here, &causes) else {
+        let Some((next, _)) = strongest(context, readings, here, &causes) else {
             break;
         };
         causes.push(next);
@@ -132,13 +140,13 @@ fn pairs<M: FittedModel>(
     polished.collect()
 }
 
-/// The refined effect with the greatest statistic beside the causes.
+/// The refined effect with the greatest statistic beside the causes, and that statistic.
 fn strongest<M: FittedModel>(
     context: &Context<'_, M>,
     readings: &DVector<f64>,
     remainder: &Remainder,
     causes: &[Cause],
-) -> Option<Cause> {
+) -> Option<(Cause, f64)> {
     let mut ranked: Vec<(f64, usize)> = (0..context.catalogue.len())
         .filter(|effect| causes.iter().all(|c| c.effect != *effect))
         .filter(|effect| context.p_value(remainder, *effect) < EARNED)
@@ -159,7 +167,6 @@ fn strongest<M: FittedModel>(
         .collect::<Vec<_>>()
         .into_iter()
         .max_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(cause, _)| cause)
 }
 
 /// Refines each cause beside the others, and swaps it for any effect that explains more, itself
@@ -173,7 +180,7 @@ fn polish<M: FittedModel>(context: &Context<'_, M>, readings: &DVector<f64>, cau
             let (refined, t) =
                 context.refine(context.model, readings, causes[k].effect, &start, &others);
             let remainder = context.remainder(readings, &others);
-            let swapped = strongest(context, readings, &remainder, &others).map(|c| {
+            let swapped = strongest(context, readings, &remainder, &others).map(|(c, _)| {
                 context.refine(context.model, readings, c.effect, &finer(&c.shape), &others)
             });
             match swapped {

@@ -1,7 +1,9 @@
 //! A command called by a program: the arguments of the command line, the answer in place of its
 //! printing. The Python package calls by this.
 
-use clap::Parser;
+use std::cell::RefCell;
+
+use clap::{CommandFactory, FromArgMatches};
 
 use super::common::{Called, Wanted};
 use super::{Answer, Cli, Command, Traced};
@@ -46,7 +48,7 @@ pub(super) fn answer(
     wanted: Wanted,
 ) -> Result<Answer, Message> {
     let words = std::iter::once("errsep").chain(arguments.iter().map(String::as_str));
-    let cli = Cli::try_parse_from(words).map_err(|error| not_understood(&error))?;
+    let cli = parsed(words).map_err(|error| not_understood(&error))?;
     let Command::Answer(command) = &cli.command else {
         return Err(Message::bad_input("this command answers no question")
             .remedy("call one that does, such as `reversal`"));
@@ -54,6 +56,18 @@ pub(super) fn answer(
     begin_record_with(true, in_memory);
     let _called = Called::begin(wanted);
     command.run()
+}
+
+thread_local! {
+    /// The command line as it is declared: made once for all calls of a thread.
+    static DECLARED: RefCell<clap::Command> = RefCell::new(Cli::command());
+}
+
+fn parsed<'w>(words: impl Iterator<Item = &'w str>) -> Result<Cli, clap::Error> {
+    DECLARED.with_borrow_mut(|declared| {
+        let mut matches = declared.try_get_matches_from_mut(words)?;
+        Cli::from_arg_matches_mut(&mut matches).map_err(|error| error.format(declared))
+    })
 }
 
 /// What is wrong with the arguments, and the hint that comes with it.

@@ -272,7 +272,9 @@ fn read_row(row: Row<'_>, columns: &Columns, data: &mut ReversalData) -> Result<
 pub(super) fn channel_of(row: Row<'_>, column: &Column) -> Result<Channel, Message> {
     let text = row.text(column);
     let names = Channel::ALL.map(Channel::name);
-    Channel::from_name(&text.to_ascii_uppercase()).ok_or_else(|| {
+    let found = Channel::from_name(text);
+    let found = found.or_else(|| Channel::from_name(&text.to_ascii_uppercase()));
+    found.ok_or_else(|| {
         if text.is_empty() {
             return row
                 .error(column, "channel is missing: the field is empty")

@@ -41,6 +41,10 @@ impl TableReader {
                 break;
             }
         }
+        // Most lines are ASCII without quotes: one look at each byte splits them.
+        if self.split_plain() {
+            return Ok(true);
+        }
         let wrong = match std::str::from_utf8(&self.line) {
             Err(e) => Some(e.valid_up_to()),
             Ok(_) => self.line.iter().position(|&b| is_binary(b)),
@@ -88,4 +92,38 @@ impl TableReader {
         self.field_count = fields;
         Ok(true)
     }
+
+    /// Splits a line in which every delimiter ends a field; false where a byte is not ASCII, binary, a quote
+    /// or a line end.
+    fn split_plain(&mut self) -> bool {
+        let delimiter = self.dialect.delimiter.byte();
+        self.ends.clear();
+        self.fields.clear();
+        let mut start = 0;
+        for (at, byte) in self.line.iter().enumerate() {
+            if *byte == delimiter {
+                self.fields.extend_from_slice(&self.line[start..at]);
+                self.ends.push(self.fields.len());
+                start = at + 1;
+            } else if NOT_PLAIN[usize::from(*byte)] {
+                return false;
+            }
+        }
+        self.fields.extend_from_slice(&self.line[start..]);
+        self.ends.push(self.fields.len());
+        self.field_count = self.ends.len();
+        true
+    }
 }
+
+/// Bytes that a line may not have to be split by its delimiters alone.
+const NOT_PLAIN: [bool; 256] = {
+    let mut not_plain = [false; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        not_plain[byte] =
+            byte >= 128 || is_binary(byte as u8) || matches!(byte as u8, b'"' | b'\r' | b'\n');
+        byte += 1;
+    }
+    not_plain
+};

@@ -29,11 +29,13 @@ impl<'a> Row<'a> {
             i => t.ends.get(i - 1).copied().unwrap_or(0),
         };
         let end = t.ends.get(index).copied().unwrap_or(start);
-        t.fields
-            .get(start..end)
-            .and_then(|f| std::str::from_utf8(f).ok())
-            .unwrap_or("")
-            .trim()
+        let text = t.fields.get(start..end);
+        let text = text.and_then(|f| std::str::from_utf8(f).ok()).unwrap_or("");
+        match text.as_bytes() {
+            // Nothing to take off.
+            [b'!'..=b'~'] | [b'!'..=b'~', .., b'!'..=b'~'] => text,
+            _ => text.trim(),
+        }
     }
 
     /// The text of a field, without the blanks around it.

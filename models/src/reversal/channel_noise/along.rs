@@ -11,6 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::sum_of_squares;
+use super::supposed::Counted;
 use super::survey::Survey;
 use super::traces::Group;
 use crate::noise::{Contrasts, Law, Posterior, decays, markov_form};
@@ -141,30 +142,21 @@ impl Gathered {
         sum_of_squares(&sums)
     }
 
-    /// The variance of a combination under a law, relative to that under white noise of the same
-    /// variance of one reading.
-    pub fn against_white(
+    /// What the cells count for in a combination of unknowns of the border, trace by trace.
+    pub fn counted(
         &self,
         covariance: &BorderedCovariance,
         border: &[(usize, f64)],
-        share: f64,
-        length: f64,
-    ) -> f64 {
+    ) -> Vec<Counted> {
         let counting = self.counting(&covariance.times(&[], border));
-        let (mut white, mut correlated) = (0.0, 0.0);
-        for (trace, own) in self.traces.iter().zip(&counting) {
-            white += own
-                .iter()
-                .zip(&trace.rows)
-                .map(|(w, row)| w * w / row.count)
-                .sum::<f64>();
-            correlated += markov_form(&decays(&trace.positions, length), own, own);
-        }
-        if white > 0.0 {
-            1.0 - share + share * correlated / white
-        } else {
-            1.0
-        }
+        let traces = self.traces.iter().zip(counting);
+        traces
+            .map(|(trace, counting)| Counted {
+                positions: trace.positions.clone(),
+                counting,
+                readings: trace.rows.iter().map(|row| row.count).collect(),
+            })
+            .collect()
     }
 }
 

@@ -9,6 +9,7 @@ pub mod along;
 pub mod levels;
 pub mod scatter;
 pub mod settle;
+pub mod supposed;
 pub mod survey;
 pub mod traces;
 pub mod white;

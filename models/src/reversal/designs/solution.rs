@@ -16,6 +16,7 @@ use crate::basis::bspline::{Cubic, CubicBSpline, horner};
 use crate::reversal::channel_noise::along::Gathered;
 use crate::reversal::channel_noise::scatter::Scatter;
 use crate::reversal::channel_noise::settle::Settled;
+use crate::reversal::channel_noise::supposed::against_white;
 use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::channel_noise::white::Told;
 use crate::reversal::channel_noise::{rms, traces};
@@ -217,8 +218,8 @@ impl DesignFit {
         let row = |channel, row| problem.derivatives(&prepared, channel, row);
         let gathered = Gathered::new(row, &survey, &groups, &self.weights)?;
         let factor = |p: &usize| {
-            let own = gathered.against_white(&self.covariance, &[(*p, 1.0)], share, length);
-            own.sqrt()
+            let counted = gathered.counted(&self.covariance, &[(*p, 1.0)]);
+            against_white(&counted, share, length).sqrt()
         };
         Ok(self.slope_order().iter().map(factor).collect())
     }

@@ -59,15 +59,29 @@ pub fn constraints(
     channels: &[ChannelReadings],
     axis: Axis,
 ) -> Constraints {
+    constraints_at(unknowns, bases, &places(channels), axis)
+}
+
+/// The different positions of all channels, mm, growing.
+pub fn places(channels: &[ChannelReadings]) -> Vec<f64> {
+    Union::of(channels.iter().map(|c| &c.x[..])).collect()
+}
+
+/// The constraints where the different positions are known.
+pub fn constraints_at(
+    unknowns: &Unknowns,
+    bases: &[CubicBSpline],
+    places: &[f64],
+    axis: Axis,
+) -> Constraints {
     let forms = unknowns.forms.len();
-    let places: Vec<f64> = Union::of(channels.iter().map(|c| &c.x[..])).collect();
     let mut band = Vec::with_capacity(2 * forms);
     let mut border = DMatrix::zeros(2 * forms, unknowns.border_count());
     let mut last: Option<(usize, [Vec<f64>; 2])> = None;
     for (form, basis) in bases.iter().enumerate() {
         let rows = match last.take() {
             Some((of, rows)) if bases[of] == *basis => rows,
-            _ => line_of_spline(basis, &places, axis),
+            _ => line_of_spline(basis, places, axis),
         };
         for (l, row) in rows.iter().enumerate() {
             let mut column = vec![0.0; unknowns.band_count()];

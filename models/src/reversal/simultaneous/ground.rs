@@ -97,7 +97,8 @@ impl<'a> Ground<'a> {
         .with_effects(effects.map_or_else(Vec::new, |e| e.joined.names()))
     }
 
-    fn choice<'c>(&'c self, effects: Option<&'c Begun<'a>>) -> Choice<'c> {
+    /// What the ladder of knots shares.
+    pub(super) fn choice<'c>(&'c self, effects: Option<&'c Begun<'a>>) -> Choice<'c> {
         Choice {
             channels: self.channels,
             lines: &self.lines,

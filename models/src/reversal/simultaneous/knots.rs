@@ -1,6 +1,6 @@
 //! How many knots: from the data, by an information criterion over a ladder of fits.
 //!
-//! At the seed's tilts one factorisation gives the cost of the linear fit with K cells. The choice
+//! At the seed's tilts the cost of the linear fit with K cells is that of one linear problem. The choice
 //! is the least corrected Akaike criterion (Hurvich and Tsai, Biometrika 76, 1989),
 //! m ln(RSS/m) + 2pm/(m − p − 1); Schwarz's criterion and generalised cross-validation stand beside
 //! it in the table.
@@ -13,6 +13,7 @@ use super::error::FEWEST_FREE;
 use super::ground::{Begun, begin};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
+use super::rungs::{Rungs, Squares};
 use super::seed;
 use super::unknowns::Unknowns;
 use super::{Axis, ReversalError, gauge};
@@ -158,56 +159,169 @@ impl Choice<'_> {
         Ok(bases)
     }
 
-    /// Goes up the ladder; the table and the best number of cells.
+    /// Goes up the ladder; the table and the best number of cells. Without effects the rungs come from
+    /// normal equations, and from orthogonal factorisations where rounding could decide.
     pub fn choose(
         &self,
         unknowns_of: impl Fn(usize) -> Unknowns,
     ) -> Result<(usize, Vec<KnotTrial>), ReversalError> {
+        if let Some(climbed) = self.by_moments(&unknowns_of)? {
+            return Ok(climbed);
+        }
+        let squares = |unknowns, bases| {
+            let squares = self.by_factors(unknowns, bases)?;
+            Ok(squares.map(|left| Squares {
+                left,
+                rounding: 0.0,
+            }))
+        };
+        Ok(self.climb(&unknowns_of, squares)?.chosen())
+    }
+
+    /// The ladder by normal equations; `None` where they do not tell.
+    fn by_moments(
+        &self,
+        unknowns_of: &impl Fn(usize) -> Unknowns,
+    ) -> Result<Option<(usize, Vec<KnotTrial>)>, ReversalError> {
+        let Some(rungs) = self.rungs(unknowns_of) else {
+            return Ok(None);
+        };
+        let mut told = true;
+        let squares = |unknowns: Unknowns, bases: Vec<CubicBSpline>| {
+            let squares = rungs.squares(&unknowns, &bases);
+            told &= squares.is_some();
+            Ok(squares)
+        };
+        let climbed = self.climb(unknowns_of, squares)?;
+        Ok((told && climbed.clear).then(|| climbed.chosen()))
+    }
+
+    /// The readings gathered for normal equations; `None` with effects, which know single readings.
+    fn rungs(&self, unknowns_of: &impl Fn(usize) -> Unknowns) -> Option<Rungs<'_>> {
+        if self.effects.is_some() {
+            return None;
+        }
+        let unknowns = unknowns_of(FEWEST_POSITIONS);
+        let start = self.start(&unknowns);
+        let begin = (0..self.channels.len()).map(|c| {
+            let offset = start.border[unknowns.offset(c)];
+            (unknowns.slope(c, &start.border), offset)
+        });
+        let ground = (self.axis, self.thickness_mm);
+        Rungs::new(self.channels, begin, self.weights, ground)
+    }
+
+    /// Goes up the ladder with the sums of squares that `squares` finds.
+    fn climb(
+        &self,
+        unknowns_of: &impl Fn(usize) -> Unknowns,
+        mut squares: impl FnMut(Unknowns, Vec<CubicBSpline>) -> Result<Option<Squares>, ReversalError>,
+    ) -> Result<Climbed, ReversalError> {
         let readings: usize = self.channels.iter().map(ChannelReadings::len).sum();
         let most = positions(self.channels) / POSITIONS_A_CELL;
-        let mut table: Vec<KnotTrial> = Vec::new();
-        let mut best = 0;
+        let mut climbed = Climbed::default();
         for cells in std::iter::once(1).chain(ladder(most)) {
             let breaks = self.breaks(&unknowns_of(cells + 3), cells)?;
             let unknowns = unknowns_of(breaks.len() + 2);
             let count = unknowns.free_count();
-            if table.last().is_some_and(|t| t.cells == breaks.len() - 1) {
+            let cells = breaks.len() - 1;
+            if climbed.table.last().is_some_and(|t| t.cells == cells) {
                 continue;
             }
             if readings < count + FEWEST_FREE {
                 break;
             }
             let bases = self.bases(&unknowns, &breaks)?;
-            let tilts = seed::tilts(&unknowns, self.lines);
-            let start = begin(
-                &unknowns,
-                &tilts,
-                self.lines,
-                self.thickness_mm,
-                self.effects,
-            );
-            let problem = Reversal::new(
-                self.channels,
-                unknowns,
-                bases,
-                self.axis,
-                self.thickness_mm,
-                self.weights.to_vec(),
-            )
-            .joining(self.effects.map(|e| &e.joined));
-            let Some(squares) = squares_left(problem, start)? else {
+            let Some(squares) = squares(unknowns, bases)? else {
                 break;
             };
-            table.push(trial(breaks.len() - 1, readings, count, squares));
-            let last = table.len() - 1;
-            if table[last].aicc < table[best].aicc {
-                best = last;
-            } else if last >= best + PATIENCE {
+            climbed.add(
+                trial(cells, readings, count, squares.left),
+                readings,
+                squares,
+            );
+            if climbed.table.len() > climbed.best + PATIENCE {
                 break;
             }
         }
-        let cells = table.get(best).map_or(1, |t| t.cells);
-        Ok((cells, table))
+        Ok(climbed)
+    }
+
+    /// Where the fit begins: at the tilts that come nearest to the lines.
+    fn start(&self, unknowns: &Unknowns) -> Parameters {
+        let tilts = seed::tilts(unknowns, self.lines);
+        begin(
+            unknowns,
+            &tilts,
+            self.lines,
+            self.thickness_mm,
+            self.effects,
+        )
+    }
+
+    /// The sum of squares that the linear fit leaves, by an orthogonal factorisation of all rows.
+    fn by_factors(
+        &self,
+        unknowns: Unknowns,
+        bases: Vec<CubicBSpline>,
+    ) -> Result<Option<f64>, ReversalError> {
+        let start = self.start(&unknowns);
+        let problem = Reversal::new(
+            self.channels,
+            unknowns,
+            bases,
+            self.axis,
+            self.thickness_mm,
+            self.weights.to_vec(),
+        )
+        .joining(self.effects.map(|e| &e.joined));
+        Ok(squares_left(problem, start)?)
+    }
+}
+
+/// The rungs that were tried.
+#[derive(Debug)]
+struct Climbed {
+    table: Vec<KnotTrial>,
+    /// The place of the best.
+    best: usize,
+    /// By how much the criterion of the best may be off.
+    doubt: f64,
+    /// Whether rounding has decided nothing.
+    clear: bool,
+}
+
+impl Default for Climbed {
+    fn default() -> Self {
+        Self {
+            table: Vec::new(),
+            best: 0,
+            doubt: 0.0,
+            clear: true,
+        }
+    }
+}
+
+impl Climbed {
+    fn add(&mut self, trial: KnotTrial, readings: usize, squares: Squares) {
+        // m ln RSS moves by m δ/RSS.
+        let doubt = readings as f64 * squares.rounding / squares.left;
+        let last = self.table.len();
+        if last == 0 {
+            self.doubt = doubt;
+        } else {
+            let ahead = self.table[self.best].aicc - trial.aicc;
+            self.clear &= squares.rounding <= 0.0 || ahead.abs() > doubt + self.doubt;
+            if ahead > 0.0 {
+                (self.best, self.doubt) = (last, doubt);
+            }
+        }
+        self.table.push(trial);
+    }
+
+    fn chosen(self) -> (usize, Vec<KnotTrial>) {
+        let cells = self.table.get(self.best).map_or(1, |t| t.cells);
+        (cells, self.table)
     }
 }
 
@@ -256,4 +370,112 @@ fn linear_squares(problem: &Reversal, system: &Bordered) -> Option<f64> {
     let left =
         system.sum_of_squares() - 2.0 * system.predicted_reduction(&solved.band, &solved.border);
     Some(left.max(system.unreachable_residual().powi(2)))
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::reversal::Convention;
+    use crate::reversal::simulate::{Plan, TrueForm, simulate};
+    use crate::reversal::simultaneous::ground::Ground;
+    use crate::reversal::simultaneous::options::{Options, Thickness};
+
+    /// A campaign of its own: grids, tilts, forms, noise and channels drawn.
+    fn campaign(seed: u64) -> (Plan, Options) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let noise = 10.0_f64.powf(rng.random_range(-2.5..0.0));
+        let range = 10.0_f64.powf(rng.random_range(1.5..3.3));
+        let from = rng.random_range(-500.0..500.0);
+        let mut plan = Plan::even(from, from + range, rng.random_range(12..120), noise);
+        let mut tilt = || 10.0_f64.powf(rng.random_range(-5.0..-1.0));
+        (plan.alpha_rad, plan.beta_rad, plan.gamma_rad) = (tilt(), -tilt(), tilt());
+        plan.thickness_mm = if seed.is_multiple_of(3) { 0.0 } else { 42.0 };
+        let mut form = |longest: f64| {
+            let (rms, count) = (rng.random_range(0.0..8.0), rng.random_range(1..9));
+            TrueForm::random_waves(&mut rng, rms, longest, count)
+        };
+        (plan.m, plan.s_a, plan.s_b) = (form(2.0 * range), form(range), form(range));
+        if seed.is_multiple_of(4) {
+            plan.repeats = 2;
+        }
+        if seed.is_multiple_of(5) {
+            for trace in &mut plan.traces {
+                let step = range / trace.positions.len() as f64;
+                for x in &mut trace.positions {
+                    *x += rng.random_range(-0.3..0.3) * step;
+                }
+            }
+        }
+        // Without one channel, or without both of one spindle position.
+        match seed % 7 {
+            1 => drop(plan.traces.remove(rng.random_range(0..4))),
+            2 => plan.traces.truncate(2),
+            _ => {}
+        }
+        let options = Options {
+            convention: if seed.is_multiple_of(2) {
+                Convention::Seed
+            } else {
+                Convention::Rigid
+            },
+            thickness: match plan.thickness_mm {
+                0.0 => Thickness::NotKnown,
+                mm => Thickness::Known(mm),
+            },
+            ..Options::default()
+        };
+        (plan, options)
+    }
+
+    #[test]
+    fn normal_equations_choose_the_knots_that_orthogonal_factors_choose() {
+        let (mut by_moments, mut compared) = (0, 0);
+        let campaigns = 300;
+        for seed in 0..campaigns {
+            let (plan, options) = campaign(seed);
+            let (data, _) = simulate(&plan, &[]).unwrap();
+            let channels = ChannelReadings::sort(&data);
+            let weights = vec![1.0 / plan.traces[0].noise; channels.len()];
+            let ground = Ground::new(&data, &options, &channels, weights).unwrap();
+            let choice = ground.choice(None);
+            let of = |coefficients: usize| ground.unknowns(coefficients, None);
+            let rungs = choice.rungs(&of).unwrap();
+            let exact = |unknowns: Unknowns, bases: Vec<CubicBSpline>| {
+                let own = rungs.squares(&unknowns, &bases);
+                let left = choice.by_factors(unknowns, bases)?;
+                if let (Some(own), Some(left)) = (own, left) {
+                    compared += 1;
+                    // Epsilons: the rounding of the sum itself, and that of the factorisation beside it.
+                    let off = (own.left - left).abs();
+                    assert!(
+                        off <= own.rounding + 1e-12 * left,
+                        "campaign {seed}: {off:e}, told {:e} of {left:e}",
+                        own.rounding
+                    );
+                }
+                Ok(left.map(|left| Squares {
+                    left,
+                    rounding: 0.0,
+                }))
+            };
+            let (exact_cells, exact_table) = choice.climb(&of, exact).unwrap().chosen();
+            if let Some((cells, table)) = choice.by_moments(&of).unwrap() {
+                by_moments += 1;
+                assert_eq!(cells, exact_cells, "campaign {seed}");
+                let counts = |table: &[KnotTrial]| -> Vec<_> {
+                    table.iter().map(|t| (t.cells, t.unknowns)).collect()
+                };
+                assert_eq!(counts(&table), counts(&exact_table), "campaign {seed}");
+            }
+        }
+        // Truncation: three of a hundred may be left to the orthogonal factors.
+        assert!(
+            100 * by_moments >= 97 * campaigns,
+            "{by_moments} of {campaigns}"
+        );
+        assert!(compared > 6 * campaigns, "{compared} rungs");
+    }
 }

@@ -7,6 +7,7 @@
 
 mod closure;
 mod columns;
+mod counting;
 mod dense;
 mod descent;
 pub mod effects;
@@ -29,6 +30,7 @@ mod readings;
 mod robust;
 mod row_source;
 pub(super) mod rows;
+mod rungs;
 mod search;
 mod seed;
 mod solution;

@@ -11,6 +11,9 @@ use crate::reversal::combinations::determined;
 /// Names of the forms, in the order of their columns.
 const FORMS: [&str; 3] = ["M", "S_A", "S_B"];
 
+/// Weights of unknowns of band and border.
+type Terms = (Vec<(usize, f64)>, Vec<(usize, f64)>);
+
 impl Simultaneous {
     /// The forms, or the combinations of forms which the channels determine, at positions (mm):
     /// M on the slide, S_A and S_B on the artefact's own axis.
@@ -18,8 +21,12 @@ impl Simultaneous {
         self.determined_forms()
             .into_iter()
             .map(|(name, weights)| {
-                let spread: Vec<(f64, f64)> =
-                    x.par_iter().map(|x| self.form_std(&weights, *x)).collect();
+                let spread: Vec<(f64, f64)> = x
+                    .par_iter()
+                    .map_init(Default::default, |room, x| {
+                        self.form_std(&weights, *x, room)
+                    })
+                    .collect();
                 Profile {
                     name,
                     x: x.to_vec(),
@@ -82,16 +89,17 @@ impl Simultaneous {
     }
 
     /// Standard uncertainty of a form and its degrees of freedom. What the model misses may lie in the
-    /// form itself, finer than the knots.
-    fn form_std(&self, weights: &[f64], x: f64) -> (f64, f64) {
-        let (mut band, mut border) = (Vec::with_capacity(12), Vec::with_capacity(6));
+    /// form itself, finer than the knots. `room` is for the weights of the unknowns.
+    fn form_std(&self, weights: &[f64], x: f64, (band, border): &mut Terms) -> (f64, f64) {
+        band.clear();
+        border.clear();
         for (form, weight) in weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
-            self.push_basis(form, x, *weight, &mut band);
+            self.push_basis(form, x, *weight, band);
             let [height, slope] = self.unknowns.line(form);
             border.push((height, -weight));
             border.push((slope, -weight * self.axis.xi(x)));
         }
-        let (std, freedom) = self.scatter.spread(&self.covariance, &band, &border);
+        let (std, freedom) = self.scatter.spread(&self.covariance, band, border);
         (std.hypot(self.agreement.missed), freedom)
     }
 

@@ -32,6 +32,8 @@ const MOST_CELLS: usize = 40;
 const POSITIONS_A_CELL: usize = 3;
 /// A start whose change the fit takes up but for this share of its square tells nothing.
 const TAKEN_UP: f64 = 1e-8;
+/// Gains closer than this share of them differ by rounding.
+const SAME_GAIN: f64 = 1e-9;
 
 /// The effects that are asked for, with their values to begin with.
 ///
@@ -236,7 +238,7 @@ impl<'g, 'a> Search<'g, 'a> {
             return Ok(None);
         };
         let score = Score::new(&problem, &placed, &covariance, &begun.joined);
-        let best = starts
+        let scored: Vec<(f64, Found)> = starts
             .par_iter()
             .filter_map(|(effect, values)| {
                 let single = Joined::new(
@@ -247,7 +249,12 @@ impl<'g, 'a> Search<'g, 'a> {
                 let (gain, values) = score.of(&single, values)?;
                 Some((gain, (name, Arc::clone(effect), values)))
             })
-            .max_by(|a, b| a.0.total_cmp(&b.0));
+            .collect();
+        // Of variants that the readings do not tell apart the last, the widest, whatever rounding says.
+        let most = scored.iter().fold(f64::NEG_INFINITY, |m, s| m.max(s.0));
+        let best = scored
+            .into_iter()
+            .rfind(|s| s.0 >= most - SAME_GAIN * most.abs());
         Ok(best.map(|b| b.1))
     }
 }

@@ -14,13 +14,12 @@ use super::gauge::Axis;
 use super::joined::Joined;
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
-use super::row_source::RowSource;
 use super::told::FittedEffect;
 use super::unknowns::Unknowns;
 use crate::basis::bspline::{Cubic, CubicBSpline};
 use crate::noise::Law;
-use crate::reversal::channel_noise::along::Gathered;
 use crate::reversal::channel_noise::scatter::Scatter;
+use crate::reversal::channel_noise::supposed::{against_white, counted};
 use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::channel_noise::traces;
 use crate::reversal::combinations::determined;
@@ -295,17 +294,15 @@ impl Simultaneous {
         let times = times(observations);
         let joined = self.joined(observations, &times);
         let problem = self.problem(&channels, joined.as_ref());
-        let rows = RowSource::new(self, &problem)?;
-        let gathered = Gathered::new(
-            |c, row| rows.derivatives(c, row),
-            &survey,
-            &groups,
-            &self.weights,
-        )?;
-        let factors = self.tilt_terms().into_iter().map(|(_, terms)| {
-            gathered
-                .against_white(&self.covariance, &terms, share, length)
-                .sqrt()
+        let combinations: Vec<_> = self
+            .tilt_terms()
+            .into_iter()
+            .map(|(_, terms)| self.covariance.times(&[], &terms))
+            .collect();
+        let counting = problem.counting(&self.parameters, &combinations)?;
+        let factors = counting.iter().map(|by_channel| {
+            let counted = counted(&survey, &groups, by_channel);
+            against_white(&counted, share, length).sqrt()
         });
         Ok(factors.collect())
     }

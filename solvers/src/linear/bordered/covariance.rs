@@ -98,9 +98,10 @@ impl BorderedCovariance {
         let highest = band.iter().map(|b| b.0).max().unwrap_or(0);
         let own = if highest - lowest < self.triangle.width() {
             let mut sum = 0.0;
-            for (i, a) in band {
-                for (j, b) in band {
-                    sum += a * b * self.inverse.get(*i, *j);
+            for (k, (i, a)) in band.iter().enumerate() {
+                sum += a * a * self.inverse.get(*i, *i);
+                for (j, b) in &band[..k] {
+                    sum += 2.0 * a * b * self.inverse.get(*i, *j);
                 }
             }
             sum
@@ -112,24 +113,18 @@ impl BorderedCovariance {
             self.triangle.solve_transposed(&mut x);
             x.iter().map(|v| v * v).sum()
         };
-        let combined =
-            |m: &DMatrix<f64>, k: usize| -> f64 { band.iter().map(|(i, a)| a * m[(*i, k)]).sum() };
-        let lost: f64 = (0..self.p.ncols())
-            .map(|k| combined(&self.p, k).powi(2))
-            .sum();
-        let mut seen: Vec<f64> = (0..self.border.nrows())
-            .map(|k| combined(&self.u, k))
-            .collect();
+        let (q, stride) = (self.border.nrows(), self.border.nrows() + self.p.ncols());
+        // Along the root of C_y what is gained, along P what the constraints take away.
+        let mut beside = vec![0.0; stride];
+        for (i, a) in band {
+            add(&mut beside, *a, &self.beside[i * stride..(i + 1) * stride]);
+        }
         for (j, v) in border {
-            seen[*j] += v;
+            add(&mut beside, *v, &self.root[j * q..(j + 1) * q]);
         }
-        let mut through = 0.0;
-        for (j, a) in seen.iter().enumerate() {
-            for (k, b) in seen.iter().enumerate() {
-                through += a * b * self.border[(j, k)];
-            }
-        }
-        (own - lost + through).max(0.0)
+        let (gained, lost) = beside.split_at(q);
+        let squares = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
+        (own - squares(lost) + squares(gained)).max(0.0)
     }
 
     /// The covariance matrix times a vector over the unknowns of band and border: what each unknown has
@@ -225,5 +220,15 @@ impl BorderedCovariance {
             }
         }
         weight * weight * trace
+    }
+}
+
+/// Adds a multiple of a row, as far as it goes.
+#[inline]
+fn add(sums: &mut [f64], factor: f64, row: &[f64]) {
+    let n = sums.len().min(row.len());
+    let (sums, row) = (&mut sums[..n], &row[..n]);
+    for k in 0..n {
+        sums[k] += factor * row[k];
     }
 }

@@ -46,6 +46,10 @@ pub struct Solved {
 /// ten thousand roundings.
 const RANK_TOLERANCE: f64 = 1e-12;
 
+/// Below this ratio of norms there is no need to look at the singular values: a hundredth of what the
+/// tolerance allows.
+const CLEARLY_FULL_RANK: f64 = 0.01 / RANK_TOLERANCE;
+
 impl Bordered {
     /// Minimises ‖R δ + t‖ under the constraints W ᵀδ_c = A δ_y + k, with held border unknowns
     /// at zero.
@@ -188,6 +192,33 @@ struct Small {
     null: Vec<DVector<f64>>,
 }
 
+impl Small {
+    /// From the inverse of the triangle over scaled unknowns.
+    fn of_full_rank(mut root: DMatrix<f64>, rhs: &DVector<f64>, scales: &[f64]) -> Self {
+        for (i, scale) in scales.iter().enumerate() {
+            root.row_mut(i).scale_mut(1.0 / scale);
+        }
+        Self {
+            solution: -(&root * rhs),
+            covariance: &root * root.transpose(),
+            root,
+            null: Vec::new(),
+        }
+    }
+}
+
+/// The inverse of a triangle whose least singular value is clearly not zero: ‖R‖‖R⁻¹‖ in the norm of
+/// Frobenius is at least the ratio of the largest to the least.
+fn inverse_root(triangle: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = triangle.nrows();
+    if n != triangle.ncols() {
+        return None;
+    }
+    let mut inverse = DMatrix::identity(n, n);
+    let solved = triangle.solve_upper_triangular_mut(&mut inverse);
+    (solved && triangle.norm() * inverse.norm() < CLEARLY_FULL_RANK).then_some(inverse)
+}
+
 /// Least squares min ‖M y + m‖ of a few unknowns by singular values. Columns are scaled by the
 /// norms they had before the band was taken out of them: one of which only rounding is left shows.
 fn solve_small(mut matrix: DMatrix<f64>, value: &DVector<f64>, mut scales: Vec<f64>) -> Small {
@@ -199,8 +230,13 @@ fn solve_small(mut matrix: DMatrix<f64>, value: &DVector<f64>, mut scales: Vec<f
         matrix.column_mut(j).scale_mut(1.0 / *scale);
     }
     let qr = matrix.qr();
-    let rhs = qr.q().tr_mul(value);
-    let svd = JacobiSvd::new(qr.r());
+    let mut rhs = value.clone();
+    qr.q_tr_mul(&mut rhs);
+    let (rhs, triangle) = (rhs.rows(0, unknowns).into_owned(), qr.r());
+    if let Some(root) = inverse_root(&triangle) {
+        return Small::of_full_rank(root, &rhs, &scales);
+    }
+    let svd = JacobiSvd::new(triangle);
     let largest = svd.values.iter().fold(0.0_f64, |m, s| m.max(*s));
     let mut solution = DVector::zeros(unknowns);
     let mut root = DMatrix::zeros(unknowns, unknowns);

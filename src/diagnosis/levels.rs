@@ -135,6 +135,17 @@ pub(in crate::diagnosis) const NOISE_DIFFERS: f64 = 0.15;
 /// repeat; below the rest it is said not to.
 pub(in crate::diagnosis) const MOSTLY: f64 = 0.8;
 
+// Severity.
+
+/// *Quantile.* A name is strong where the lower limit of its severity, with the probability of
+/// [`SURE`], reaches this.
+pub(in crate::diagnosis) const STRONG: f64 = 0.95;
+/// See [`STRONG`].
+pub(in crate::diagnosis) const SURE: f64 = 0.95;
+/// *Reckoned.* What is smooth, and nearer to an effect than this cosine, is that effect to whoever acts on
+/// the name.
+pub(in crate::diagnosis) const SAME: f64 = 0.9;
+
 // Planning.
 
 /// *Quantile.* Power at which an effect of the smallest size is seen.

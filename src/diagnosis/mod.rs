@@ -13,6 +13,7 @@ mod noise;
 mod options;
 mod planning;
 mod search;
+mod severity;
 pub mod turning;
 mod verdict;
 
@@ -31,6 +32,8 @@ use noise::spikes::calmed;
 pub use options::Options;
 pub use planning::certificate::{Diagnosability, certificate};
 pub use planning::prove::{Trials, prove};
+pub use severity::agreement::{Agreement, agreement};
+pub use severity::{Confidence, Rival, Severity};
 pub use verdict::told::{Told, for_people, scaled};
 pub use verdict::types::{
     Detail, Diagnosis, Fingerprint, Gap, Harm, Hidden, Kind, Nearest, NoiseOut, Verdict, Where,

@@ -11,6 +11,8 @@ pub struct Options {
     pub seed: u64,
     /// Effects to leave out of the catalogue.
     pub without: Vec<String>,
+    /// Most rivals drawn from each family for the severity of a name; none: it is left out.
+    pub severity: usize,
 }
 
 impl Default for Options {
@@ -20,6 +22,7 @@ impl Default for Options {
             draws: 1000,
             seed: 1,
             without: Vec::new(),
+            severity: 0,
         }
     }
 }

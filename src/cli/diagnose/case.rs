@@ -39,6 +39,7 @@ impl<M: FittedModel> Case<M> {
             false_alarm: args.false_alarm,
             seed: args.common.seed,
             without: args.without.clone(),
+            severity: args.severity,
             ..Options::default()
         };
         let bar = progress("diagnosing", None);
@@ -51,6 +52,11 @@ impl<M: FittedModel> Case<M> {
             let clean = self
                 .model
                 .refit(self.model.observed() - diagnosis.detail.change());
+            // A trial counts names, whatever they are worth.
+            let options = Options {
+                severity: 0,
+                ..options.clone()
+            };
             let trials = prove(&clean, &own, &options, count);
             bar.finish_and_clear();
             trials

@@ -78,6 +78,10 @@ pub struct Args {
     /// Probability of naming anything where nothing is there.
     #[arg(long, value_name = "P", default_value_t = 0.01)]
     false_alarm: f64,
+    /// Most rivals of a family that are drawn to say what else would have been given the same name;
+    /// 0: none are.
+    #[arg(long, value_name = "N", default_value_t = RIVALS)]
+    severity: usize,
     /// Put N sealed effects and none into these data, diagnose them blind, and say how often it
     /// was right.
     #[arg(long, value_name = "N")]
@@ -91,6 +95,13 @@ pub struct Args {
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
+
+/// Rivals of a family where the user states no number: 5 of them named alike are still below 5 %
+/// (Clopper and Pearson).
+pub(super) const RIVALS: usize = 256;
+
+/// Most rivals of a family.
+const MOST_RIVALS: usize = 100_000;
 
 /// Most blind trials: each is a diagnosis of its own.
 const MOST_TRIALS: usize = 100_000;
@@ -116,6 +127,15 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         })
         .remedy(format!(
             "give the number of sealed effects, such as --prove 200, at most {MOST_TRIALS}"
+        )));
+    }
+    if args.severity > MOST_RIVALS {
+        return Err(Message::bad_input(format!(
+            "--severity {} would not come to an end",
+            args.severity
+        ))
+        .remedy(format!(
+            "give the number of rivals of a family, such as --severity {RIVALS}, at most {MOST_RIVALS}; 0 draws none"
         )));
     }
     let model = recognise::model(args)?;

@@ -38,6 +38,7 @@ pub fn view<M: FittedModel>(
         places: diagnosis.places.iter().map(place).collect(),
         candidates: diagnosis.candidates.iter().map(candidate).collect(),
         groups: groups(diagnosis),
+        severities: diagnosis.verdict.severity.iter().map(severity).collect(),
         residuals: residuals(model, &diagnosis.detail.before, &diagnosis.detail.after),
         x: (along.to_owned(), model.position_unit().to_owned()),
         shifts: diagnosis.bias.iter().map(shift).collect(),
@@ -207,6 +208,15 @@ fn candidate(candidate: &crate::diagnosis::Candidate) -> sheet::Candidate {
             .collect(),
         physics: candidate.physics.clone(),
         confirm: candidate.confirm.clone(),
+    }
+}
+
+fn severity(severity: &crate::diagnosis::Severity) -> sheet::Severity {
+    let rivals = severity.rivals.iter();
+    sheet::Severity {
+        effect: severity.effect.clone(),
+        line: severity.in_words(),
+        rivals: rivals.map(|r| (r.in_words(), r.probability)).collect(),
     }
 }
 

@@ -49,6 +49,9 @@ pub fn in_words(diagnosis: &Diagnosis) -> String {
             number(held.floor)
         );
     }
+    for severity in &diagnosis.verdict.severity {
+        let _ = writeln!(text, "{}", severity.in_words());
+    }
     if !diagnosis.places.is_empty() {
         let _ = writeln!(
             text,

@@ -7,7 +7,7 @@ use errsep_models::reversal::diagnosable::FirstOrder;
 use errsep_models::reversal::simultaneous::Simultaneous;
 use serde_json::Value;
 
-use crate::cli::diagnose::{page, reversal, within_reach_of, words};
+use crate::cli::diagnose::{RIVALS, page, reversal, within_reach_of, words};
 use crate::cli::{Answer, CommonArgs};
 use crate::diagnosis::{Diagnosis, Options, diagnose};
 use crate::io::Message;
@@ -55,6 +55,7 @@ impl Diagnosed {
         within_reach_of(&model, reversal::ALONG, file)?;
         let options = Options {
             seed,
+            severity: RIVALS,
             ..Options::default()
         };
         let mut diagnosis = diagnose(&model, &options);

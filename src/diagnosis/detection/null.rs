@@ -14,13 +14,14 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use crate::diagnosis::detection::dictionary::{Dictionary, inverse, surprise};
+use crate::diagnosis::detection::dictionary::{Dictionary, Family, inverse, surprise};
+use crate::diagnosis::detection::folding::Sums;
 use crate::diagnosis::detection::space::Space;
 use crate::diagnosis::noise::law::{NoiseLaw, draw_scatter};
 use crate::diagnosis::noise::spikes::Spikes;
 
 /// Draws handled at once.
-const BATCH: usize = 64;
+pub(in crate::diagnosis) const BATCH: usize = 64;
 
 /// The law of the greatest score of every family, of the misfit as a whole, and of the smallest tail
 /// probability among them.
@@ -193,33 +194,20 @@ fn greatest<M: FittedModel>(
         column.copy_from(&(noise + draw_scatter(model, &mut random)));
     }
     let (left, _) = space.forward(draws);
+    rows_of(dictionary, space, left)
+}
+
+/// The greatest score of each family, and last the misfit, of `BATCH` whitened, projected residuals.
+pub(in crate::diagnosis) fn rows_of(
+    dictionary: &Dictionary,
+    space: &Space,
+    left: DMatrix<f64>,
+) -> Vec<Vec<f64>> {
     let misfits: Vec<f64> = left.column_iter().map(|c| c.norm_squared()).collect();
-    let adjoint = space.adjoint(left);
-    // Single precision: this is for a law found by drawing, and signatures of which less than 10⁻⁴ is
-    // visible are not drawn.
-    let adjoint = dictionary.places.sums::<f32, BATCH>(adjoint.as_view());
+    let adjoint = seen(dictionary, space, left);
     let mut rows: Vec<Vec<f64>> = vec![vec![0.0; dictionary.families.len()]; BATCH];
     for (place, family) in dictionary.families.iter().enumerate() {
-        // Signatures of one, two … columns are weighed each by its own law.
-        let mut greatest: BTreeMap<usize, [f64; BATCH]> = BTreeMap::new();
-        for entry in &dictionary.entries[family.entries.clone()] {
-            let most = greatest.entry(entry.order()).or_insert([0.0; BATCH]);
-            let products = entry.products(&adjoint);
-            let inverse = inverse(&entry.gram);
-            for (draw, most) in most.iter_mut().enumerate() {
-                let score = |k: usize| f64::from(products[k][draw]);
-                let t = if entry.positive && score(0) <= 0.0 {
-                    0.0
-                } else {
-                    (0..products.len())
-                        .flat_map(|i| (0..products.len()).map(move |j| (i, j)))
-                        .map(|(i, j)| score(i) * inverse[(i, j)] * score(j))
-                        .sum()
-                };
-                *most = most.max(t);
-            }
-        }
-        for (order, most) in greatest {
+        for (order, most) in statistics(dictionary, family, &adjoint) {
             for (row, t) in rows.iter_mut().zip(most) {
                 row[place] = row[place].max(surprise(t, order));
             }
@@ -229,4 +217,42 @@ fn greatest<M: FittedModel>(
         row.push(misfit);
     }
     rows
+}
+
+/// Residuals as signatures see them. Single precision: this is for laws found by drawing, and
+/// signatures of which less than 10⁻⁴ is visible are not drawn.
+pub(in crate::diagnosis) fn seen(
+    dictionary: &Dictionary,
+    space: &Space,
+    left: DMatrix<f64>,
+) -> Sums<f32, BATCH> {
+    dictionary.places.sums(space.adjoint(left).as_view())
+}
+
+/// The greatest statistic of a family in each residual, by the number of columns: signatures of one,
+/// two … columns are weighed each by its own law.
+pub(in crate::diagnosis) fn statistics(
+    dictionary: &Dictionary,
+    family: &Family,
+    adjoint: &Sums<f32, BATCH>,
+) -> BTreeMap<usize, [f64; BATCH]> {
+    let mut greatest: BTreeMap<usize, [f64; BATCH]> = BTreeMap::new();
+    for entry in &dictionary.entries[family.entries.clone()] {
+        let most = greatest.entry(entry.order()).or_insert([0.0; BATCH]);
+        let products = entry.products(adjoint);
+        let inverse = inverse(&entry.gram);
+        for (draw, most) in most.iter_mut().enumerate() {
+            let score = |k: usize| f64::from(products[k][draw]);
+            let t = if entry.positive && score(0) <= 0.0 {
+                0.0
+            } else {
+                (0..products.len())
+                    .flat_map(|i| (0..products.len()).map(move |j| (i, j)))
+                    .map(|(i, j)| score(i) * inverse[(i, j)] * score(j))
+                    .sum()
+            };
+            *most = most.max(t);
+        }
+    }
+    greatest
 }

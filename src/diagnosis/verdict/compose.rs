@@ -16,6 +16,7 @@ use crate::diagnosis::noise::law::{NoiseSource, of_repeats};
 use crate::diagnosis::noise::spikes::Calmed;
 use crate::diagnosis::options::Options;
 use crate::diagnosis::planning::splitting::splits;
+use crate::diagnosis::severity::severities;
 use crate::diagnosis::verdict::conclusion::{Conclusion, Measured};
 use crate::diagnosis::verdict::hidden::hidden;
 use crate::diagnosis::verdict::places::places;
@@ -105,6 +106,12 @@ pub(in crate::diagnosis) fn compose<M: FittedModel>(
             own.clone()
         } else {
             Vec::new()
+        },
+        severity: match (found, kind) {
+            (Some(answer), Kind::Effect) if options.severity > 0 => {
+                severities(context, readings, answer, options)
+            }
+            _ => Vec::new(),
         },
         indistinguishable,
         partial: if kind == Kind::Unknown {

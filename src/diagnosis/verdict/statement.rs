@@ -3,6 +3,7 @@
 use crate::diagnosis::attribution::reported::{Candidate, ParameterOut};
 use crate::diagnosis::levels::MOSTLY;
 use crate::diagnosis::planning::splitting::Split;
+use crate::diagnosis::severity::Confidence;
 use crate::diagnosis::verdict::told::for_people;
 use crate::diagnosis::verdict::types::{Fingerprint, Gap, Hidden, Kind, Verdict, Where};
 use crate::number::{percent, plain, probability};
@@ -118,10 +119,22 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
             .filter(|c| verdict.effects.contains(&c.effect))
             .map(|c| c.confirm.as_str())
             .collect();
-        format!("To confirm: {}.", confirm.join("; "))
+        let weak = verdict
+            .severity
+            .iter()
+            .any(|s| s.confidence == Confidence::Weak);
+        let purpose = if weak {
+            "To tell them apart"
+        } else {
+            "To confirm"
+        };
+        format!("{purpose}: {}.", confirm.join("; "))
     };
+    let weak = weak_names(verdict);
     let missed = gap.before.in_words(gap.unit);
-    let beginning = if gap.before.rms > 0.0 {
+    let beginning = if gap.before.rms > 0.0 && !weak.is_empty() {
+        format!("The model misses {missed}, which is consistent with {said}")
+    } else if gap.before.rms > 0.0 {
         format!("The model misses {missed} because of {said}")
     } else {
         format!("The model misses {missed}, but what stands out of the noise is {said}")
@@ -139,9 +152,35 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
         ""
     };
     format!(
-        "{beginning}; with {with} {} remain{more}. {doubt}",
+        "{beginning}; with {with} {} remain{more}. {weak}{doubt}",
         gap.after.in_words(gap.unit)
     )
+}
+
+/// Of each name that is weak, what else would have looked the same.
+fn weak_names(verdict: &Verdict) -> String {
+    let weak = verdict
+        .severity
+        .iter()
+        .filter(|s| s.confidence == Confidence::Weak);
+    weak.filter_map(|severity| {
+        let worst = severity.rivals.first()?;
+        let whose = if verdict.effects.len() > 1 {
+            format!("as {}", severity.effect)
+        } else {
+            "the same".to_owned()
+        };
+        Some(if worst.probability > 0.0 {
+            format!(
+                "Of {} of this size {} would have looked {whose}. ",
+                worst.in_words(),
+                percent(worst.probability)
+            )
+        } else {
+            format!("Too few rivals were drawn to say what else would have looked {whose}. ")
+        })
+    })
+    .collect()
 }
 
 fn describe(candidate: &Candidate) -> String {

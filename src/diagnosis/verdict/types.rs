@@ -8,6 +8,7 @@ use crate::diagnosis::attribution::shrink::{HeldOut, Size};
 use crate::diagnosis::detection::localise::Item;
 use crate::diagnosis::levels::INVISIBLE;
 use crate::diagnosis::noise::law::NoiseLaw;
+use crate::diagnosis::severity::Severity;
 use crate::diagnosis::verdict::told::for_people;
 use crate::number::plain;
 
@@ -30,6 +31,9 @@ pub struct Verdict {
     pub kind: Kind,
     /// The effects, by what each adds; of a group the one of greatest evidence.
     pub effects: Vec<String>,
+    /// How severe the test of each effect was, in the same order; empty where no rivals were drawn.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub severity: Vec<Severity>,
     /// Groups of effects that these data cannot tell apart, the greatest evidence first.
     pub indistinguishable: Vec<Vec<String>>,
     /// Effects that explain a part of an unknown gap.

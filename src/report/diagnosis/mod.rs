@@ -4,7 +4,8 @@
 mod view;
 
 pub use view::{
-    Candidate, Finding, Gap, Group, Hidden, Place, Profile, Residual, Shift, Size, Trials, View,
+    Candidate, Finding, Gap, Group, Hidden, Place, Profile, Residual, Severity, Shift, Size,
+    Trials, View,
 };
 
 use super::plot::{Axis, Bar, Bars, Chart, HeatMap, HeatMaps, Panels, Series};
@@ -22,6 +23,7 @@ pub fn page(view: &View) -> Page {
         .section(gap(view))
         .section(residuals(view))
         .section(causes(view))
+        .section(severities(view))
         .section(places(view))
         .section(shifts(view))
         .section(hidden(view))
@@ -234,6 +236,24 @@ fn causes(view: &View) -> Section {
             .rows(rows)
             .sorted_by(1, Order::Descending),
         )
+}
+
+/// Worst rivals of a name that the page shows.
+const WORST: usize = 6;
+
+fn severities(view: &View) -> Section {
+    let mut section = Section::new("What else would have looked the same");
+    for severity in &view.severities {
+        let rows = severity.rivals.iter().take(WORST);
+        section = section.paragraph(severity.line.clone()).table(
+            Table::new(
+                format!("Rivals of {}", severity.effect),
+                ["gap of the same size made by", "named the same"],
+            )
+            .rows(rows.map(|(name, share)| [name.clone().into(), Cell::Share(*share)])),
+        );
+    }
+    section
 }
 
 fn places(view: &View) -> Section {

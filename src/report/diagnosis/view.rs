@@ -33,6 +33,8 @@ pub struct View {
     /// Groups that these data cannot tell apart, the greatest evidence first, and the measurement
     /// that would.
     pub groups: Vec<Group>,
+    /// For each named effect how severe its test was.
+    pub severities: Vec<Severity>,
     /// Residuals before and after.
     pub residuals: Vec<Residual>,
     /// Axis of `Residual::x` and its unit.
@@ -47,6 +49,17 @@ pub struct View {
     pub notes: Vec<String>,
     /// Outcome of blind trials with effects put into these data, where they were asked for.
     pub trials: Option<Trials>,
+}
+
+/// What else would have been given the name of an effect.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Severity {
+    /// The effect.
+    pub effect: String,
+    /// The severity in a line.
+    pub line: String,
+    /// Rivals and the probability of each, the greatest first.
+    pub rivals: Vec<(String, f64)>,
 }
 
 /// A root mean square with its 95 % interval.

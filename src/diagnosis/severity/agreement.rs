@@ -1,0 +1,93 @@
+//! How often the score stage and a whole diagnosis say the same of a rival.
+
+use errsep_models::model::FittedModel;
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use crate::diagnosis::attribution::context::Context;
+use crate::diagnosis::attribution::examined::examined;
+use crate::diagnosis::detection::estimate::estimate;
+use crate::diagnosis::detection::space::Space;
+use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
+use crate::diagnosis::options::Options;
+use crate::diagnosis::severity::rivals::{Drawn, Family};
+use crate::diagnosis::severity::stage::Name;
+
+/// Rivals that were named by the score stage and by whole diagnoses.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Agreement {
+    /// Rivals.
+    pub cases: usize,
+    /// Given the name by the score stage.
+    pub scored: usize,
+    /// Given the name by a whole diagnosis.
+    pub whole: usize,
+    /// Given it by both.
+    pub both: usize,
+}
+
+/// Names what is in a model's readings, draws rivals of every name, `each` of each family, and names
+/// every one by the score stage and by a diagnosis of its own.
+pub fn agreement<M: FittedModel>(model: &M, options: &Options, each: usize) -> Agreement {
+    let catalogue = model.effects();
+    let readings = model.linearised();
+    let law = estimate(model, &readings);
+    let context = Context::new(model, &catalogue, law, options.draws, options.seed);
+    examined(&context, &readings, options.false_alarm, |found| {
+        let Some(answer) = found.found.filter(|answer| answer.complete) else {
+            return Agreement::default();
+        };
+        let names = Name::all(found.context, found.readings, &answer, options.false_alarm);
+        let mut sum = Agreement::default();
+        for name in &names {
+            for family in Family::beside(found.context, &name.members) {
+                add(&mut sum, found.context, name, family, options, each);
+            }
+        }
+        sum
+    })
+}
+
+fn add<M: FittedModel>(
+    sum: &mut Agreement,
+    context: &Context<'_, M>,
+    name: &Name,
+    family: Family,
+    options: &Options,
+    each: usize,
+) {
+    let rivals = Drawn::of(context, name, family, (options.seed, 0), each);
+    let scored = name.given(context, &rivals);
+    let base = without_misfit(context.model);
+    let whole: Vec<bool> = (0..rivals.count)
+        .into_par_iter()
+        .map(|k| {
+            let made = context.model.refit(&base + rivals.readings.column(k));
+            let own = Options {
+                severity: 0,
+                ..options.clone()
+            };
+            let verdict = crate::diagnosis::diagnose(&made, &own).verdict;
+            let causes = verdict.causes();
+            let of_group = |said: &&str| {
+                let mut own = name.members.iter();
+                own.any(|k| context.catalogue[*k].name() == *said)
+            };
+            causes.len() == 1 && causes.iter().flatten().all(of_group)
+        })
+        .collect();
+    let count = |kept: &dyn Fn(usize) -> bool| (0..rivals.count).filter(|k| kept(*k)).count();
+    sum.cases += rivals.count;
+    sum.scored += count(&|k| scored[k]);
+    sum.whole += count(&|k| whole[k]);
+    sum.both += count(&|k| scored[k] && whole[k]);
+}
+
+/// Readings that a model fits without a residual.
+fn without_misfit<M: FittedModel>(model: &M) -> DVector<f64> {
+    model.smooth().unwrap_or_else(|| {
+        let unit = NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated);
+        let left = Space::new(model, &unit).forward_vector(&model.linearised());
+        model.observed() - left
+    })
+}

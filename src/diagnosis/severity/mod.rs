@@ -1,0 +1,224 @@
+//! What else would have been given the same name: the severity of a test (Mayo and Spanos, Brit. J.
+//! Phil. Sci. 57 (2006) 323).
+//!
+//! Rivals of the visible size of the gap found are drawn from families (`rivals.rs`), each with a draw of
+//! the noise, and named as the diagnosis names (`stage.rs`). One minus the greatest of the
+//! probabilities, over the families, of coming to the same name is the severity.
+
+pub(super) mod agreement;
+mod rivals;
+mod stage;
+
+use errsep_models::model::FittedModel;
+use nalgebra::DVector;
+use rayon::prelude::*;
+use serde::Serialize;
+use statrs::distribution::{Beta, ContinuousCDF};
+
+use crate::diagnosis::attribution::confidence::Answer;
+use crate::diagnosis::attribution::context::Context;
+use crate::diagnosis::detection::null::BATCH;
+use crate::diagnosis::levels::{STRONG, SURE};
+use crate::diagnosis::options::Options;
+use crate::diagnosis::severity::rivals::{Drawn, Family};
+use crate::diagnosis::severity::stage::Name;
+use crate::number::{percent, plain};
+
+/// Rivals that a line tells.
+const TOLD: usize = 3;
+
+/// How much a name is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Confidence {
+    /// The lower limit of the severity is 0.95 or more.
+    Strong,
+    /// It is not.
+    Weak,
+}
+
+/// The severity of the test that a named effect has passed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Severity {
+    /// The effect, of a group the one named first.
+    pub effect: String,
+    /// One minus the greatest of the rivals' probabilities.
+    pub value: f64,
+    /// Its one-sided 95 % lower limit (Clopper and Pearson, of the least known family).
+    pub lower: f64,
+    /// Whether the lower limit reaches 0.95.
+    pub confidence: Confidence,
+    /// The families of rivals, the greatest probability first.
+    pub rivals: Vec<Rival>,
+}
+
+/// A family of rivals.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rival {
+    /// An effect, or `smooth in position`, `smooth in time`, `smooth in reading`.
+    pub name: String,
+    /// Probability that a gap of this size made by it would have been given the same name alone.
+    pub probability: f64,
+}
+
+impl Rival {
+    /// The family in words.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        self.name
+            .strip_prefix("smooth in ")
+            .map_or_else(|| self.name.clone(), |of| format!("smooth errors in {of}"))
+    }
+}
+
+impl Severity {
+    /// The severity in a line.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let worst: Vec<String> = self
+            .rivals
+            .iter()
+            .filter(|rival| rival.probability > 0.0)
+            .take(TOLD)
+            .map(|rival| format!("{} {}", rival.in_words(), percent(rival.probability)))
+            .collect();
+        let alike = if worst.is_empty() {
+            "no rival that was drawn would have looked the same".to_owned()
+        } else {
+            format!("would have looked the same: {}", worst.join(", "))
+        };
+        let word = match self.confidence {
+            Confidence::Strong => "strong",
+            Confidence::Weak => "weak",
+        };
+        format!(
+            "Severity of {}: {} (at least {}), {word}; {alike}",
+            self.effect,
+            plain(self.value, 3),
+            plain(self.lower, 3)
+        )
+    }
+}
+
+/// Rivals drawn and rivals named alike.
+#[derive(Debug, Clone, Copy, Default)]
+struct Count {
+    drawn: usize,
+    alike: usize,
+}
+
+impl Count {
+    fn probability(self) -> f64 {
+        self.alike as f64 / self.drawn.max(1) as f64
+    }
+
+    /// One-sided upper limit of the probability.
+    fn upper(self) -> f64 {
+        if self.alike >= self.drawn {
+            return 1.0;
+        }
+        let (a, n) = (self.alike as f64, self.drawn as f64);
+        Beta::new(a + 1.0, n - a).map_or(1.0, |law| law.inverse_cdf(SURE))
+    }
+
+    /// One-sided lower limit.
+    fn lower(self) -> f64 {
+        if self.alike == 0 {
+            return 0.0;
+        }
+        let (a, n) = (self.alike as f64, self.drawn as f64);
+        Beta::new(a, n - a + 1.0).map_or(0.0, |law| law.inverse_cdf(1.0 - SURE))
+    }
+
+    /// Whether more draws can hardly change on which side of the limit it is.
+    fn settled(self) -> bool {
+        self.upper() <= 1.0 - STRONG || self.lower() > 1.0 - STRONG
+    }
+}
+
+/// The severity of each cause of an answer.
+pub(in crate::diagnosis) fn severities<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    answer: &Answer,
+    options: &Options,
+) -> Vec<Severity> {
+    Name::all(context, readings, answer, options.false_alarm)
+        .iter()
+        .map(|name| severity(context, name, options))
+        .collect()
+}
+
+fn severity<M: FittedModel>(context: &Context<'_, M>, name: &Name, options: &Options) -> Severity {
+    let families = Family::beside(context, &name.members);
+    let mut counts: Vec<(Family, Count)> = families
+        .into_par_iter()
+        .map(|family| {
+            let count = drawn(context, name, family, options);
+            (family, count)
+        })
+        .filter(|(_, count)| count.drawn > 0)
+        .collect();
+    counts.sort_by(|a, b| b.1.probability().total_cmp(&a.1.probability()));
+    let upper = counts.iter().map(|(_, c)| c.upper()).fold(0.0, f64::max);
+    let most = counts.first().map_or(0.0, |(_, c)| c.probability());
+    let lower = 1.0 - upper;
+    Severity {
+        effect: name.effect.clone(),
+        value: 1.0 - most,
+        lower,
+        confidence: if lower >= STRONG {
+            Confidence::Strong
+        } else {
+            Confidence::Weak
+        },
+        rivals: counts
+            .iter()
+            .map(|(family, count)| Rival {
+                name: family.name(context),
+                probability: count.probability(),
+            })
+            .collect(),
+    }
+}
+
+/// Draws rivals of a family until it is settled on which side of the limit they are.
+fn drawn<M: FittedModel>(
+    context: &Context<'_, M>,
+    name: &Name,
+    family: Family,
+    options: &Options,
+) -> Count {
+    let mut count = Count::default();
+    for batch in 0..options.severity.div_ceil(BATCH) {
+        let most = BATCH.min(options.severity - count.drawn);
+        let rivals = Drawn::of(context, name, family, (options.seed, batch), most);
+        if rivals.count == 0 {
+            break;
+        }
+        let alike = name.given(context, &rivals);
+        count.drawn += rivals.count;
+        count.alike += alike.iter().filter(|alike| **alike).count();
+        if count.settled() || count.drawn >= options.severity {
+            break;
+        }
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Count;
+
+    #[test]
+    fn a_limit_is_that_of_clopper_and_pearson() {
+        let count = |alike, drawn| Count { drawn, alike };
+        // Closed forms: none of n, 1 − 0.05^(1/n); all of n, 0.05^(1/n). Rounding of the search for a
+        // quantile: 1e-6.
+        assert!((count(0, 64).upper() - (1.0 - 0.05f64.powf(1.0 / 64.0))).abs() < 1e-6);
+        assert!((count(64, 64).lower() - 0.05f64.powf(1.0 / 64.0)).abs() < 1e-6);
+        // 59 draws are the fewest that settle a family of which none is named alike.
+        assert!(count(0, 59).settled() && !count(0, 58).settled());
+        assert!(count(32, 64).settled());
+    }
+}

@@ -1,0 +1,289 @@
+//! Rivals: what else could have made a gap of the same visible size.
+
+use errsep_models::model::FittedModel;
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::diagnosis::attribution::context::Context;
+use crate::diagnosis::detection::dictionary::{Entry, Meaning};
+use crate::diagnosis::detection::null::{BATCH, seen, statistics};
+use crate::diagnosis::levels::{INVISIBLE, SAME};
+use crate::diagnosis::noise::law::draw_scatter;
+use crate::diagnosis::noise::spikes::Spikes;
+use crate::diagnosis::severity::stage::Name;
+
+/// Cosines that make a smooth function: their sum is a Gaussian process but for its fourth moments,
+/// which are off by 1/16 of themselves.
+const COSINES: usize = 24;
+/// Points a length at which it is reckoned, straight between them.
+const FINENESS: f64 = 8.0;
+/// Rounds of drawing until a batch is full: fewer rivals are taken where most are like the effect.
+const ROUNDS: usize = 6;
+
+/// A family of rivals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Family {
+    /// An effect of the catalogue.
+    Effect(usize),
+    /// Smooth functions of the position.
+    Position,
+    /// Of the time.
+    Time,
+    /// Of the reading.
+    Reading,
+}
+
+impl Family {
+    /// All families but the effects of a group.
+    pub fn beside<M: FittedModel>(context: &Context<'_, M>, members: &[usize]) -> Vec<Self> {
+        let others = (0..context.catalogue.len()).filter(|k| !members.contains(k));
+        others
+            .map(Self::Effect)
+            .chain([Self::Position, Self::Time, Self::Reading])
+            .collect()
+    }
+
+    pub fn name<M: FittedModel>(self, context: &Context<'_, M>) -> String {
+        match self {
+            Self::Effect(k) => context.catalogue[k].name().to_owned(),
+            Self::Position => "smooth in position".to_owned(),
+            Self::Time => "smooth in time".to_owned(),
+            Self::Reading => "smooth in reading".to_owned(),
+        }
+    }
+
+    /// The stream of random numbers that is its own, whatever else is in the catalogue.
+    fn stream<M: FittedModel>(self, context: &Context<'_, M>) -> u64 {
+        let name = self.name(context);
+        // FNV-1a.
+        name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        })
+    }
+}
+
+/// Rivals with their noise, one a column; those beyond `count` are zero.
+pub(super) struct Drawn {
+    pub readings: DMatrix<f64>,
+    pub count: usize,
+}
+
+impl Drawn {
+    /// At most `most` rivals of a family, each of the visible size of the gap.
+    pub fn of<M: FittedModel>(
+        context: &Context<'_, M>,
+        name: &Name,
+        family: Family,
+        (seed, batch): (u64, usize),
+        most: usize,
+    ) -> Self {
+        let n = context.space.readings();
+        let mut random = ChaCha8Rng::seed_from_u64(seed ^ family.stream(context));
+        random.set_stream(batch as u64 + 1);
+        let spikes = Spikes::new(context.model);
+        let mut readings = DMatrix::zeros(n, BATCH);
+        let mut count = 0;
+        let ground = Ground::of(context, family);
+        for _ in 0..ROUNDS {
+            let (raw, effects) = many(context, family, ground.as_ref(), &mut random);
+            let (left, whole) = context.space.forward(raw.clone());
+            let sizes: Vec<f64> = left.column_iter().map(|c| c.norm()).collect();
+            let alike = cosines(context, name, family, left);
+            for k in 0..BATCH {
+                let visible = sizes[k] * sizes[k] > INVISIBLE * whole[k] * whole[k];
+                if count >= most || !visible || alike[k] >= SAME {
+                    continue;
+                }
+                let scale = name.size / sizes[k];
+                if !plausible(context, family, effects.get(k), scale) {
+                    continue;
+                }
+                let draw = batch * BATCH + count;
+                let noise = context
+                    .law
+                    .draw_possible(context.model, &spikes, draw, &mut random)
+                    + draw_scatter(context.model, &mut random);
+                let sum = raw.column(k) * scale + noise;
+                readings.column_mut(count).copy_from(&sum);
+                count += 1;
+            }
+            if count >= most {
+                break;
+            }
+        }
+        Self { readings, count }
+    }
+}
+
+/// The entry of the dictionary that an effect was drawn at, and its amplitudes.
+type At = (usize, DVector<f64>);
+
+/// `BATCH` rivals of any size, without noise.
+fn many<M: FittedModel>(
+    context: &Context<'_, M>,
+    family: Family,
+    ground: Option<&Ground>,
+    random: &mut ChaCha8Rng,
+) -> (DMatrix<f64>, Vec<At>) {
+    let mut raw = DMatrix::zeros(context.space.readings(), BATCH);
+    let mut effects = Vec::new();
+    let entries = match family {
+        Family::Effect(k) => context
+            .family_of(k)
+            .map_or(0..0, |f| context.dictionary.families[f].entries.clone()),
+        _ => 0..0,
+    };
+    for mut column in raw.column_iter_mut() {
+        if let Some(ground) = ground {
+            column.copy_from(&ground.smooth(context, random));
+        } else if !entries.is_empty() {
+            let at = random.random_range(entries.clone());
+            let entry = &context.dictionary.entries[at];
+            let amplitudes = amplitudes(entry, random);
+            let columns = context.dictionary.columns(entry);
+            for (signature, amplitude) in columns.iter().zip(amplitudes.iter()) {
+                for (&row, value) in signature.rows.iter().zip(&signature.values) {
+                    column[row] += amplitude * value;
+                }
+            }
+            effects.push((at, amplitudes));
+        }
+    }
+    (raw, effects)
+}
+
+/// Amplitudes of which all visible directions are as probable.
+fn amplitudes(entry: &Entry, random: &mut ChaCha8Rng) -> DVector<f64> {
+    let n = entry.order();
+    let normal = DVector::from_fn(n, |_, _| StandardNormal.sample(random));
+    if n == 1 {
+        let sign: f64 = normal[0];
+        return DVector::from_element(1, if entry.positive { 1.0 } else { sign.signum() });
+    }
+    let lifted = &entry.gram + DMatrix::identity(n, n) * (1e-9 * entry.gram.trace());
+    let root = lifted.cholesky().map(|factor| factor.l().transpose());
+    root.and_then(|root| root.solve_upper_triangular(&normal))
+        .unwrap_or(normal)
+}
+
+/// Whether an effect could be of the size that makes such a gap.
+fn plausible<M: FittedModel>(
+    context: &Context<'_, M>,
+    family: Family,
+    at: Option<&At>,
+    scale: f64,
+) -> bool {
+    let (Family::Effect(effect), Some((entry, amplitudes))) = (family, at) else {
+        return !matches!(family, Family::Effect(_));
+    };
+    let Meaning::Effect(shape) = &context.dictionary.entries[*entry].meaning else {
+        return false;
+    };
+    let sizes = amplitudes * scale;
+    let known = vec![0.0; sizes.len()];
+    context.plausible(effect, shape, sizes.as_slice(), &known)
+}
+
+/// Cosine of each smooth rival to the nearest member of the group; effects are rivals whatever they are
+/// like.
+fn cosines<M: FittedModel>(
+    context: &Context<'_, M>,
+    name: &Name,
+    family: Family,
+    left: DMatrix<f64>,
+) -> Vec<f64> {
+    if matches!(family, Family::Effect(_)) {
+        return vec![0.0; BATCH];
+    }
+    let squares: Vec<f64> = left.column_iter().map(|c| c.norm_squared()).collect();
+    let adjoint = seen(&context.dictionary, &context.space, left);
+    let mut greatest = vec![0.0f64; BATCH];
+    for family in name.members.iter().filter_map(|k| context.family_of(*k)) {
+        let family = &context.dictionary.families[family];
+        for most in statistics(&context.dictionary, family, &adjoint).values() {
+            for (greatest, t) in greatest.iter_mut().zip(most) {
+                *greatest = greatest.max(*t);
+            }
+        }
+    }
+    let pairs = greatest.iter().zip(squares);
+    pairs
+        .map(|(t, square)| (t / square.max(f64::MIN_POSITIVE)).sqrt())
+        .collect()
+}
+
+/// That of which a smooth rival is a function.
+struct Ground {
+    values: Vec<f64>,
+    from: f64,
+    range: f64,
+    spacing: f64,
+}
+
+impl Ground {
+    fn of<M: FittedModel>(context: &Context<'_, M>, family: Family) -> Option<Self> {
+        let places = context.model.places();
+        let values: Vec<f64> = match family {
+            Family::Effect(_) => return None,
+            Family::Position => places.iter().map(|p| p.x).collect(),
+            Family::Time => places.iter().map(|p| p.time).collect(),
+            Family::Reading => context.model.observed().iter().copied().collect(),
+        };
+        let mut sorted = values.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted.dedup();
+        let (from, to) = (*sorted.first()?, *sorted.last()?);
+        let spacing = (to - from) / sorted.len().saturating_sub(1).max(1) as f64;
+        Some(Self {
+            values,
+            from,
+            range: to - from,
+            spacing,
+        })
+    }
+
+    /// A smooth function times a normal weight for each channel: zero where there is no range.
+    fn smooth<M: FittedModel>(
+        &self,
+        context: &Context<'_, M>,
+        random: &mut ChaCha8Rng,
+    ) -> DVector<f64> {
+        let n = self.values.len();
+        let shortest = 2.0 * self.spacing;
+        if !(self.range > shortest) {
+            return DVector::zeros(n);
+        }
+        let length = shortest * (self.range / shortest).powf(random.random::<f64>());
+        let cosines: Vec<(f64, f64)> = (0..COSINES)
+            .map(|_| {
+                let frequency: f64 = StandardNormal.sample(random);
+                (
+                    frequency / length,
+                    random.random::<f64>() * std::f64::consts::TAU,
+                )
+            })
+            .collect();
+        let channels = context.model.channel_names().len();
+        let weights: Vec<f64> = (0..channels.max(1))
+            .map(|_| StandardNormal.sample(random))
+            .collect();
+        let step = length / FINENESS;
+        let points = (self.range / step).ceil() as usize + 2;
+        let grid: Vec<f64> = (0..points)
+            .map(|k| {
+                let u = k as f64 * step;
+                cosines.iter().map(|(w, phase)| (w * u + phase).cos()).sum()
+            })
+            .collect();
+        let places = context.model.places();
+        DVector::from_fn(n, |k, _| {
+            let at = (self.values[k] - self.from) / step;
+            let low = (at as usize).min(points - 2);
+            let part = at - low as f64;
+            let value = (1.0 - part) * grid[low] + part * grid[low + 1];
+            value * weights.get(places[k].channel).copied().unwrap_or(1.0)
+        })
+    }
+}

@@ -1,5 +1,36 @@
 //! A derivative-free search for functions that are smooth in places, with kinks and steps in others.
 
+/// Values that a search may take, and for each coordinate where there are many.
+const FEWEST: usize = 400;
+const EACH: usize = 32;
+/// Points of a cycle at which a coordinate that comes back is tried.
+const AROUND: usize = 24;
+
+/// The best of the points around a cycle, one coordinate after the other, the rest kept: a saw's drop that has
+/// crossed a reading is seen by no step that is smaller than the way to the next one.
+pub(super) fn around(
+    start: &[f64],
+    cycles: &[(usize, f64)],
+    mut value: impl FnMut(&[f64]) -> f64,
+) -> (Vec<f64>, bool) {
+    let mut at = start.to_vec();
+    let mut best = value(&at);
+    let mut moved = false;
+    for &(k, cycle) in cycles {
+        let centre = at[k];
+        let mut kept = centre;
+        for point in 1..AROUND {
+            at[k] = centre + cycle * point as f64 / AROUND as f64;
+            let here = value(&at);
+            if here < best {
+                (best, kept, moved) = (here, at[k], true);
+            }
+        }
+        at[k] = kept;
+    }
+    (at, moved)
+}
+
 /// Coordinate search: the smallest value found from a start, with a first step for each coordinate
 /// (zero keeps it). Each coordinate is tried on both sides and at the vertex of the parabola through
 /// the three values; steps shrink to what the vertex asks for, or to half, down to `precision` of
@@ -13,7 +44,8 @@ pub(super) fn coordinate_search(
     let mut at = start.to_vec();
     let mut best = value(&at);
     let mut scales = vec![1.0; steps.len()];
-    let mut left = 400;
+    let free = steps.iter().filter(|s| **s != 0.0).count();
+    let mut left = FEWEST.max(EACH * free) as isize;
     loop {
         let mut searching = false;
         for (k, step) in steps.iter().enumerate().filter(|(_, s)| **s != 0.0) {
@@ -61,6 +93,27 @@ pub(super) fn coordinate_search(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Beside a narrow hollow that no small step reaches, the cycle is seen whole; what does not come back is
+    /// left where it is.
+    #[test]
+    fn a_hollow_elsewhere_on_the_cycle_is_found() {
+        let hollow = |v: &[f64]| {
+            let away = (v[0] - 0.73).rem_euclid(1.0);
+            let away = away.min(1.0 - away);
+            let hollow = if away < 0.04 { -1.0 + away } else { 0.0 };
+            hollow + (v[1] - 2.0).powi(2)
+        };
+        let (at, value) = coordinate_search(&[0.2, 2.0], &[0.1, 0.1], 1e-2, hollow);
+        assert!(value == 0.0, "small steps: {at:?}");
+        let (at, moved) = around(&[0.2, 2.0], &[(0, 1.0)], hollow);
+        // Half the way between two of the points that are tried.
+        assert!(
+            moved && (at[0] - 0.73).abs() <= 0.5 / AROUND as f64 && at[1] == 2.0,
+            "{at:?}"
+        );
+        assert!(!around(&at, &[], hollow).1);
+    }
 
     /// A parabola is found in its vertex, not by halving alone.
     #[test]

@@ -67,6 +67,9 @@ fn effects_as_machines_have_them_are_named() {
         ("axis-backlash", 1),
         ("thermal-drift", 4),
         ("cyclic-error", 5),
+        ("stick-slip", 4),
+        ("axis-backlash", 2),
+        ("reversal-shift", 1),
     ];
     let told: Vec<String> = cases
         .par_iter()
@@ -83,6 +86,34 @@ fn effects_as_machines_have_them_are_named() {
         })
         .collect();
     assert!(told.is_empty(), "{told:#?}");
+}
+
+/// Where the drive stands anywhere when a pass begins, the lag has a state in each of them. Over few positions
+/// it is a lag of a whole spacing before it shows, which is not followed; this is a design of many.
+#[test]
+fn a_lag_that_begins_anew_in_each_pass_is_named() {
+    let readings = measured("stick-slip", 5, 0.8, 205, 150).unwrap();
+    let diagnosis = diagnosed(&readings);
+    assert_eq!(
+        diagnosis.verdict.effects,
+        ["stick-slip"],
+        "{}",
+        diagnosis.verdict.statement
+    );
+    let mut all = diagnosis.candidates.iter();
+    let own = all.find(|c| c.effect == "stick-slip").unwrap();
+    assert_eq!(
+        own.variant.as_deref(),
+        Some("a lag that begins anew in each pass")
+    );
+    // Each slip is a seventh of the travel as it was made; k·u: five of what is printed, and a hundredth of a
+    // slip for positions that are no continuum.
+    let slips = own.parameters.iter().find(|p| p.name == "slips").unwrap();
+    let made = 1.0 / 0.14;
+    assert!(
+        (slips.value - made).abs() < 5.0 * slips.std + 0.01,
+        "{slips:?}"
+    );
 }
 
 /// One reading position that differs in one channel is a bump of unknown width, or a bump between two

@@ -23,13 +23,16 @@ pub const REALISATIONS: &[(&str, usize)] = &[
     ("hysteresis", 4),
     ("lateral-backlash", 7),
     ("ambient-cycle", 4),
-    ("stick-slip", 5),
+    ("stick-slip", 6),
     ("off-crest", 5),
     ("taper", 1),
     ("gain-mismatch", 2),
-    ("axis-backlash", 2),
-    ("reversal-shift", 1),
+    ("axis-backlash", 3),
+    ("reversal-shift", 2),
 ];
+
+/// Those in which the surfaces are rough at the spacing of the positions.
+const ROUGH: [(&str, usize); 2] = [("axis-backlash", 2), ("reversal-shift", 1)];
 
 /// What an effect makes of a reading: a closure with its own memory.
 pub type Shown = Box<dyn FnMut(&World, &Now) -> f64>;
@@ -220,20 +223,29 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
         }
         // The slide sticks until its drive has wound up by a step, then slips after it.
         ("stick-slip", _) => {
-            let pitch = [uniform(0.03, 0.08), uniform(0.08, 0.2), 0.05, 0.12, 0.15][way];
+            let pitch = [
+                uniform(0.03, 0.08),
+                uniform(0.08, 0.2),
+                0.05,
+                0.12,
+                0.15,
+                0.14,
+            ][way];
             // Half or whole slips at mid travel would add up to a constant lag in both directions.
-            let begin = [0.25, 0.75, 0.18, 0.33, 0.0][way] - 0.5 / pitch;
+            let begin = [0.25, 0.75, 0.18, 0.33, 0.0, 0.0][way] - 0.5 / pitch;
             let anew: Vec<f64> = (0..16).map(|_| uniform(0.0, 1.0)).collect();
             Box::new(move |w, n| {
                 let run = 0.5 * (1.0 + n.direction * n.part);
+                let turned = usize::from(n.direction < 0.0) + 2 * usize::from(n.spindle < 0.0);
+                let begins = anew[4 * (n.repeat as usize - 1) + turned];
                 if way == 4 {
                     // It sticks at one side, and leans away from it until it slips.
-                    let turned = usize::from(n.direction < 0.0) + 2 * usize::from(n.spindle < 0.0);
-                    let begins = anew[4 * (n.repeat as usize - 1) + turned];
                     let leans = (run / pitch + begins).rem_euclid(1.0);
                     return plain(w, n) - size * n.towards() * n.direction * leans;
                 }
-                let wound = (run / pitch + begin).rem_euclid(1.0);
+                // The drive stands anywhere when a pass begins.
+                let stands = if way == 5 { begins } else { begin };
+                let wound = (run / pitch + stands).rem_euclid(1.0);
                 let at = n.x - n.direction * 100.0 * size * wound;
                 w.seen(n, at, at)
             })
@@ -269,7 +281,10 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
         ("axis-backlash", _) => Box::new(move |w, n| {
             // A screw that is worn at one end loses more there.
             let worn = if way == 1 { 1.0 + 0.7 * n.part } else { 1.0 };
-            let at = n.x - 50.0 * size * worn * n.direction;
+            // A stop that takes up what is lost when it goes back.
+            let taken_up = way == 2 && n.direction < 0.0;
+            let lost = if taken_up { 0.0 } else { 50.0 * size };
+            let at = n.x - lost * worn * n.direction;
             w.seen(n, at, at)
         }),
         ("reversal-shift", _) => Box::new(move |w, n| {
@@ -297,7 +312,10 @@ pub fn measured(
     } else {
         1.5e-5
     };
-    let world = World::random(positions, seed, tilt);
+    let mut world = World::random(positions, seed, tilt);
+    if ROUGH.contains(&(effect, way)) {
+        world = world.roughened(seed);
+    }
     let bare = world.run(|w, n| w.plain(n));
     let mut readings = bare.clone();
     if visible > 0.0 {

@@ -46,6 +46,8 @@ pub struct World {
     pub(super) tilts: [f64; 3],
     pub(super) zeros: [f64; 4],
     pub(super) forms: [Vec<[f64; 3]>; 3],
+    /// Waves of the forms: height, turns over the travel, phase.
+    pub(super) waves: [Vec<[f64; 3]>; 3],
     /// Straight lines of the forms, taken off them.
     pub(super) lines: [f64; 3],
     /// Span of the readings about their middles, µm.
@@ -76,26 +78,58 @@ impl World {
             tilts: [0; 3].map(|_| tilt * uniform(-1.5, 1.5)),
             zeros: [0; 4].map(|_| uniform(-6.0, 6.0)),
             forms,
+            waves: [Vec::new(), Vec::new(), Vec::new()],
             lines: [0.0; 3],
             span: 1.0,
             alternating: seed.is_multiple_of(2),
             white,
             correlated: if seed % 4 < 2 { 0.0 } else { 0.7 * white },
         };
+        world.levelled();
+        world
+    }
+
+    /// Takes the straight lines off the forms.
+    fn levelled(&mut self) {
+        let positions = self.positions;
         let at = |k: usize| 2.0 * k as f64 / (positions - 1) as f64 - 1.0;
         let square: f64 = (0..positions).map(|k| at(k) * at(k)).sum();
-        world.lines = [0, 1, 2].map(|which| {
-            let along = (0..positions).map(|k| world.form(which, at(k)) * at(k));
+        self.lines = [0, 1, 2].map(|which| {
+            let along = (0..positions).map(|k| self.form(which, at(k)) * at(k));
             along.sum::<f64>() / square
         });
-        world.span = world.reading_span();
-        world
+        self.span = self.reading_span();
+    }
+
+    /// The same with ground surfaces: waves down to less than two positions, lower the shorter they are.
+    pub fn roughened(mut self, seed: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0f0f);
+        let most = 0.75 * self.positions as f64;
+        for waves in &mut self.waves {
+            waves.extend((0..60).map(|k| {
+                let turns = 5.0 * (most / 5.0).powf((f64::from(k) + random.random::<f64>()) / 60.0);
+                let height = 0.5 * (5.0 / turns) * (0.5 + random.random::<f64>());
+                [
+                    height,
+                    turns,
+                    std::f64::consts::TAU * random.random::<f64>(),
+                ]
+            }));
+        }
+        self.levelled();
+        self
     }
 
     pub(super) fn form(&self, which: usize, part: f64) -> f64 {
         let steps = self.forms[which].iter();
+        let waves = self.waves[which].iter();
         steps
             .map(|[h, at, w]| 0.7 * h * ((part - at) / w).tanh())
+            .chain(
+                waves.map(|[h, turns, phase]| {
+                    h * (std::f64::consts::PI * turns * part + phase).sin()
+                }),
+            )
             .sum()
     }
 

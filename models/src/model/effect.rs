@@ -186,6 +186,12 @@ pub trait Effect<M>: Send + Sync {
         Vec::new()
     }
 
+    /// Values of a shape, by their places, that are the same again after a period, and this period, where
+    /// a search by small steps may stop beside the best.
+    fn cycles(&self, _model: &M, _shape: &Shape) -> Vec<(usize, f64)> {
+        Vec::new()
+    }
+
     /// Whether a shape is one that the search may go to.
     fn allowed(&self, _model: &M, _shape: &Shape) -> bool {
         true

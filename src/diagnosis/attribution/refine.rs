@@ -6,10 +6,12 @@ use nalgebra::{DMatrix, DVector};
 use crate::diagnosis::attribution::context::{Cause, Context, as_matrix, column, span};
 use crate::diagnosis::detection::dictionary::{inverse, is_positive, products, statistic};
 use crate::diagnosis::levels::UNSEARCHED;
-use crate::diagnosis::search::coordinate_search;
+use crate::diagnosis::search::{around, coordinate_search};
 
 /// Part of a shape's first step that its search settles to.
 const PRECISION: f64 = 1e-2;
+/// How often values that come back are tried around their cycles.
+const ROUNDS: usize = 4;
 
 impl<M: FittedModel> Context<'_, M> {
     /// The best shape of an effect beside other causes, from a start, and the statistic there; its
@@ -116,7 +118,7 @@ impl<'s, M: FittedModel> Seen<'s, M> {
     fn searched(&self, start: &Shape) -> (Shape, f64) {
         let mut shape = start.clone();
         if shape.free() > 0 {
-            let (values, _) = coordinate_search(&start.values, &start.steps, PRECISION, |values| {
+            let misfit = |values: &[f64]| {
                 let trial = Shape {
                     values: values.to_vec(),
                     ..start.clone()
@@ -126,8 +128,18 @@ impl<'s, M: FittedModel> Seen<'s, M> {
                 } else {
                     f64::INFINITY
                 }
-            });
-            shape.values = values;
+            };
+            let searched =
+                |from: &[f64]| coordinate_search(from, &start.steps, PRECISION, misfit).0;
+            shape.values = searched(&start.values);
+            let cycles = self.effect.cycles(self.state, &shape);
+            for _ in 0..ROUNDS {
+                let (values, moved) = around(&shape.values, &cycles, misfit);
+                if !moved {
+                    break;
+                }
+                shape.values = searched(&values);
+            }
         }
         let (mut t, mut gram, mut score) = self.value(&shape);
         for _ in 0..8 {

@@ -80,6 +80,7 @@ pub fn joins_the_fit(effect: &str, variant: Option<&str>) -> bool {
                 || [
                     local_contamination::STAYS,
                     cyclic_error::OWN_PHASES,
+                    stick_slip::LAG,
                     stick_slip::LEAN,
                 ]
                 .iter()

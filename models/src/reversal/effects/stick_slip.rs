@@ -2,11 +2,12 @@
 //!
 //! It lags behind its command by a sawtooth of the way run, the same in every trace of a direction, and
 //! what is seen comes with it. What both directions have in common passes for form; with a half or a whole
-//! slip at mid travel the rest is a constant lag, `axis-backlash`. Or it crabs: it leans sideways by such a
-//! sawtooth, with the sign of the direction of travel, which begins anew in each pass (a spindle position,
-//! a repeat and a direction, all indicators read together). That is found by its first wave, with a
-//! cosine and a sine in each pass, and followed from there. Free: the greatest lag or lean, the way from
-//! slip to slip, told by the slips over the travel, the state at mid travel or where each pass begins.
+//! slip at mid travel the rest is a constant lag, `axis-backlash`. Or the sawtooth begins anew in each pass (a
+//! spindle position, a repeat and a direction, all indicators read together), of a lag, or of a lean where the
+//! slide crabs: sideways, with the sign of the direction of travel. These are found by their mean and first wave,
+//! with a cosine and a sine in each pass, and followed from there. Free: the greatest lag or
+//! lean, the way from slip to slip, told by the slips over the travel, the state at mid travel or where each
+//! pass begins.
 
 use std::ops::Range;
 
@@ -17,7 +18,7 @@ use crate::model::{About, Column, Effect, Estimate, FittedModel, Link, Parameter
 use crate::reversal::diagnosable::Arrangement;
 
 /// See the head of the file. Variants: a lag; then [`KINDS`] of a lean for each direction across: its first
-/// waves, and the sawtooth towards and away.
+/// waves, and the sawtooth towards and away; then first waves and sawtooth of a lag that begins anew.
 pub(super) struct StickSlip {
     /// Directions across the travel that channels see: horizontal (0), vertical (1).
     across: Vec<usize>,
@@ -29,11 +30,16 @@ const KINDS: usize = 3;
 /// The variants of a lean in words.
 pub(super) const LEAN: &str = "a lean sideways that begins anew in each pass";
 
+/// That of a lag in words.
+pub(super) const LAG: &str = "a lag that begins anew in each pass";
+
 /// Slips over the travel between neighbouring starts of the search, and starts of the state.
 const STRIDE: f64 = 0.4;
 const STATES: [f64; 2] = [0.25, 0.75];
 /// The same for first waves: the peak of a wave is one slip wide.
 const WAVE_STRIDE: f64 = 0.6;
+/// First step of the search of where a pass begins: the phase of a wave is known to less.
+const STATE_STEP: f64 = 0.12;
 /// With more passes the phases of all of them are no explanation.
 const MOST_PASSES: usize = 32;
 
@@ -44,9 +50,17 @@ const ASIDE: f64 = 0.1;
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Lag,
-    /// First waves of a lean in a direction across, then its sawtooth with its sign.
-    Waves(usize),
-    Sawtooth(usize, f64),
+    /// First waves of what begins anew, then its sawtooth with its sign.
+    Waves(Anew),
+    Sawtooth(Anew, f64),
+}
+
+/// What begins anew in each pass.
+#[derive(Clone, Copy, PartialEq)]
+enum Anew {
+    Lag,
+    /// In a direction across.
+    Lean(usize),
 }
 
 impl StickSlip {
@@ -58,14 +72,23 @@ impl StickSlip {
     }
 
     fn kind(&self, variant: usize) -> Kind {
-        let lean = variant.checked_sub(1);
-        let axis = lean.and_then(|k| Some((k % KINDS, *self.across.get(k / KINDS)?)));
-        match axis {
-            None => Kind::Lag,
-            Some((0, axis)) => Kind::Waves(axis),
-            Some((1, axis)) => Kind::Sawtooth(axis, 1.0),
-            Some((_, axis)) => Kind::Sawtooth(axis, -1.0),
+        let Some(own) = variant.checked_sub(1) else {
+            return Kind::Lag;
+        };
+        let what = match self.across.get(own / KINDS) {
+            Some(axis) => Anew::Lean(*axis),
+            None => Anew::Lag,
+        };
+        match own % KINDS {
+            0 => Kind::Waves(what),
+            1 => Kind::Sawtooth(what, 1.0),
+            _ => Kind::Sawtooth(what, -1.0),
         }
+    }
+
+    /// Where the variants begin of a lag that begins anew.
+    fn lag_anew(&self) -> usize {
+        1 + KINDS * self.across.len()
     }
 }
 
@@ -93,9 +116,15 @@ impl Effect<FirstOrder> for StickSlip {
     fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
         match self.kind(shape.variant) {
             Kind::Lag => self.amplitudes(),
+            Kind::Sawtooth(Anew::Lag, _) => self.amplitudes(),
             Kind::Sawtooth(..) => vec![Parameter::between("lean", "um", 0.0, 100.0)],
-            Kind::Waves(_) => {
-                vec![Parameter::symmetric("wave", "um", 100.0); 2 * (shape.values.len() - 1)]
+            Kind::Waves(what) => {
+                let count = 2 * shape.values.len().saturating_sub(1) + 1;
+                let wave = match what {
+                    Anew::Lag => Parameter::symmetric("wave", "mm", 5.0),
+                    Anew::Lean(_) => Parameter::symmetric("wave", "um", 100.0),
+                };
+                vec![wave; count]
             }
         }
     }
@@ -122,14 +151,15 @@ impl Effect<FirstOrder> for StickSlip {
         if passes > MOST_PASSES || model.repeats().len() < 2 {
             return shapes;
         }
-        for axis in 0..self.across.len() {
-            shapes.extend((0..(reach / WAVE_STRIDE) as usize).map(|k| {
+        let starts = (0..self.across.len()).map(|axis| 1 + KINDS * axis);
+        for variant in starts.chain([self.lag_anew()]) {
+            shapes.extend((0..=(reach / WAVE_STRIDE) as usize).map(|k| {
                 let mut values = vec![0.0; 1 + passes];
                 let mut steps = values.clone();
                 values[0] = 2.0 + WAVE_STRIDE * k as f64;
                 steps[0] = 0.5 * WAVE_STRIDE;
                 Shape {
-                    variant: 1 + KINDS * axis,
+                    variant,
                     values,
                     steps,
                 }
@@ -140,7 +170,7 @@ impl Effect<FirstOrder> for StickSlip {
 
     /// Across the travel a sawtooth may lean to either side; its first wave tells nothing of it.
     fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
-        let Kind::Sawtooth(_, sign) = self.kind(shape.variant) else {
+        let Kind::Sawtooth(Anew::Lean(_), sign) = self.kind(shape.variant) else {
             return Vec::new();
         };
         let mut other = shape.clone();
@@ -162,7 +192,11 @@ impl Effect<FirstOrder> for StickSlip {
             return Vec::new();
         };
         let run = |place: &Place| 0.5 * place.direction * part_of_travel(model, place.x);
-        let lean = |axis: usize, place: &Place| place.direction * model.seat(place).phi[axis];
+        // What a unit of lag or lean changes: a lag as far as it is, by what the slide comes upon there.
+        let change = |what: Anew, k: usize, place: &Place, lag: f64| match what {
+            Anew::Lean(axis) => place.direction * model.seat(place).phi[axis],
+            Anew::Lag => -place.direction * model.reading_chord(k, -place.direction * lag),
+        };
         match self.kind(shape.variant) {
             Kind::Lag => {
                 let &[_, state, lag] = shape.values.as_slice() else {
@@ -178,23 +212,28 @@ impl Effect<FirstOrder> for StickSlip {
                     model.of_cell(change)
                 }]
             }
-            Kind::Waves(axis) => {
+            Kind::Waves(what) => {
                 let turn = std::f64::consts::TAU * slips;
-                let wave = |pass: &Vec<Range<usize>>, function: fn(f64) -> f64| {
-                    in_pass(model, pass, |place| {
-                        lean(axis, place) * function(turn * run(place))
+                let of = |pass: &[Range<usize>], function: &dyn Fn(f64) -> f64| {
+                    in_pass(model, pass, |k, place| {
+                        change(what, k, place, 0.0) * function(turn * run(place))
                     })
                 };
                 let own = passes(model);
-                let pairs = own.iter().map(|p| [wave(p, f64::cos), wave(p, f64::sin)]);
-                pairs.flatten().collect()
+                let pairs = own.iter().map(|p| [of(p, &f64::cos), of(p, &f64::sin)]);
+                let mut columns: Vec<Column> = pairs.flatten().collect();
+                let all: Vec<Range<usize>> = own.concat();
+                columns.push(of(&all, &|_| 1.0));
+                columns
             }
-            Kind::Sawtooth(axis, sign) => {
+            Kind::Sawtooth(what, sign) => {
+                let own = passes(model);
+                let lag = shape.values.get(1 + own.len()).copied().unwrap_or(0.0);
                 let mut column = Column::default();
-                for (pass, state) in passes(model).iter().zip(shape.values.iter().skip(1)) {
-                    let own = in_pass(model, pass, |place| {
+                for (pass, state) in own.iter().zip(shape.values.iter().skip(1)) {
+                    let own = in_pass(model, pass, |k, place| {
                         let part = (slips * run(place) + state).rem_euclid(1.0);
-                        sign * part * lean(axis, place)
+                        sign * part * change(what, k, place, part * lag)
                     });
                     column.rows.extend(own.rows);
                     column.values.extend(own.values);
@@ -210,16 +249,21 @@ impl Effect<FirstOrder> for StickSlip {
         let mut settled = shape.clone();
         match self.kind(shape.variant) {
             Kind::Lag => *settled.values.get_mut(2)? = *amplitudes.first()?,
-            Kind::Sawtooth(..) => return None,
-            Kind::Waves(_) => {
+            Kind::Sawtooth(Anew::Lean(_), _) => return None,
+            Kind::Sawtooth(Anew::Lag, _) => *settled.values.last_mut()? = *amplitudes.first()?,
+            Kind::Waves(what) => {
                 let pairs = amplitudes.chunks_exact(2);
                 let phase = |pair: &[f64]| (-pair[0]).atan2(-pair[1]) / std::f64::consts::TAU;
                 let states: Vec<f64> = pairs.map(phase).collect();
                 settled.variant += 1;
                 settled.values = vec![*shape.values.first()?];
                 settled.steps = vec![0.1 * WAVE_STRIDE];
-                settled.steps.extend(vec![0.05; states.len()]);
+                settled.steps.extend(vec![STATE_STEP; states.len()]);
                 settled.values.extend(states);
+                if what == Anew::Lag {
+                    settled.values.push(2.0 * *amplitudes.last()?);
+                    settled.steps.push(0.0);
+                }
             }
         }
         Some(settled)
@@ -229,12 +273,27 @@ impl Effect<FirstOrder> for StickSlip {
         let reach = 1.5..highest(model) + STRIDE;
         let aside = |state: &f64| (ASIDE..=0.5 - ASIDE).contains(&state.rem_euclid(0.5));
         let within = shape.values.first().is_some_and(|s| reach.contains(s));
-        let lean = self.kind(shape.variant) != Kind::Lag;
-        within && (lean || shape.values.get(1).is_some_and(aside))
+        let anew = self.kind(shape.variant) != Kind::Lag;
+        within && (anew || shape.values.get(1).is_some_and(aside))
+    }
+
+    fn cycles(&self, _model: &FirstOrder, shape: &Shape) -> Vec<(usize, f64)> {
+        match self.kind(shape.variant) {
+            Kind::Sawtooth(..) => {
+                let states = (1..shape.values.len()).filter(|k| shape.steps.get(*k) != Some(&0.0));
+                states.map(|k| (k, 1.0)).collect()
+            }
+            _ => Vec::new(),
+        }
     }
 
     fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
-        (self.kind(shape.variant) != Kind::Lag).then(|| LEAN.to_owned())
+        let words = match self.kind(shape.variant) {
+            Kind::Lag => return None,
+            Kind::Waves(Anew::Lag) | Kind::Sawtooth(Anew::Lag, _) => LAG,
+            _ => LEAN,
+        };
+        Some(words.to_owned())
     }
 
     /// Where each pass begins is not told.
@@ -304,9 +363,16 @@ impl Pass {
 }
 
 /// A change of the readings of one pass.
-fn in_pass(model: &FirstOrder, pass: &[Range<usize>], change: impl Fn(&Place) -> f64) -> Column {
+fn in_pass(
+    model: &FirstOrder,
+    pass: &[Range<usize>],
+    change: impl Fn(usize, &Place) -> f64,
+) -> Column {
     let rows: Vec<usize> = pass.iter().flat_map(Clone::clone).collect();
-    let values = rows.iter().map(|k| change(&model.places()[*k])).collect();
+    let values = rows
+        .iter()
+        .map(|k| change(*k, &model.places()[*k]))
+        .collect();
     Column { rows, values }
 }
 

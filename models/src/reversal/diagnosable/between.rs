@@ -6,6 +6,9 @@
 //! Means of products of different repeats are free of noise. The ratio of the two errors, over spacings that
 //! differ by two, tells how much smaller the error is between neighbours; a form that is rough at every
 //! spacing has it as great there, which is the most it can be.
+//!
+//! Beyond the first and the last position a form goes on straight. How far it may be from there, the form itself
+//! says: as far as it gets, within the travel, from its tangents over the same distance.
 
 use nalgebra::DVector;
 
@@ -20,25 +23,26 @@ const SHARED: f64 = 3.0;
 const SHORT: f64 = 2.0;
 /// Standard deviations of chance beyond which a form is rough.
 const ROUGH: f64 = 3.0;
+/// Places of a form from which its tangents are followed.
+const TANGENTS: usize = 200;
+/// Squared departure from the tangent at an end to that from tangents within: an end has one side.
+const ONE_SIDED: f64 = 2.0;
 /// Squared displacements, in the unit of the reading, below which a form between positions is known.
 const PLACES_ALIKE: f64 = 1e-6;
 
 impl FirstOrder {
     /// Changes of the readings, of one standard deviation each, by what the forms may be where an effect has them
-    /// touched: `shifts` gives for a reading how far from its position, mm, the forms of the slide and that of
+    /// touched: `shifts` gives for a reading, by its number and place, how far from its position, mm, the forms of the slide and that of
     /// the artefact are seen. What all readings at a position have in common is form.
     pub(in crate::reversal) fn between_positions(
         &self,
-        shifts: impl Fn(&Place) -> [f64; 2],
+        shifts: impl Fn(usize, &Place) -> [f64; 2],
     ) -> Vec<Column> {
         let rough = self.roughness();
         let slides = self.forms.len() - self.sides();
         let n = self.positions.len();
         let mut columns = Vec::new();
         for (form, variances) in rough.iter().enumerate() {
-            if variances.iter().all(|v| *v == 0.0) {
-                continue;
-            }
             // By position: the places where the form is seen, with readings and factors.
             let mut seen: Vec<Vec<Seen>> = (0..n).map(|_| Vec::new()).collect();
             for (k, place) in self.record.places.iter().enumerate() {
@@ -46,7 +50,7 @@ impl FirstOrder {
                 if factor == 0.0 {
                     continue;
                 }
-                let shift = shifts(place)[usize::from(form >= slides)];
+                let shift = shifts(k, place)[usize::from(form >= slides)];
                 let own = &mut seen[self.at(place)];
                 let known = own
                     .iter_mut()
@@ -57,18 +61,18 @@ impl FirstOrder {
                 }
             }
             for (at, own) in seen.into_iter().enumerate() {
-                columns.extend(self.open_at(at, own, variances));
+                columns.extend(self.open_at(at, own, (form, variances)));
             }
         }
         columns
     }
 
     /// The columns of one position: of two places the difference alone shows.
-    fn open_at(&self, at: usize, own: Vec<Seen>, variances: &[f64]) -> Vec<Column> {
-        let variance = |seen: &Seen| self.open_variance(self.positions[at] + seen.shift, variances);
+    fn open_at(&self, at: usize, own: Vec<Seen>, rough: (usize, &[f64])) -> Vec<Column> {
         if own.len() < 2 {
             return Vec::new();
         }
+        let variance = |seen: &Seen| self.open_variance(self.positions[at] + seen.shift, rough);
         let all: f64 = own.iter().map(&variance).sum();
         let columns = own.iter().enumerate().filter_map(|(k, seen)| {
             let square = match own.len() {
@@ -82,18 +86,38 @@ impl FirstOrder {
     }
 
     /// Variance of a form at a place, given what it is at the positions.
-    fn open_variance(&self, x: f64, variances: &[f64]) -> f64 {
+    fn open_variance(&self, x: f64, (form, variances): (usize, &[f64])) -> f64 {
         let positions = &self.positions;
+        let (first, last) = (positions[0], positions[positions.len() - 1]);
         let after = positions.partition_point(|p| *p < x);
         let gap = after.clamp(1, positions.len() - 1) - 1;
+        let beyond = (first - x).max(x - last);
+        if beyond > PLACES_ALIKE * (last - first) {
+            return variances[gap] + ONE_SIDED * self.departure(form, beyond);
+        }
         let part = (x - positions[gap]) / (positions[gap + 1] - positions[gap]);
-        // Beyond the ends a form is as open as half-way between positions, and more.
-        let swing = if (0.0..=1.0).contains(&part) {
-            (std::f64::consts::PI * part).sin()
-        } else {
-            1.0
-        };
+        let swing = (std::f64::consts::PI * part).sin();
         variances[gap] * swing * swing
+    }
+
+    /// Mean square of a form's departure from its tangents over a distance, mm, to either side.
+    fn departure(&self, form: usize, distance: f64) -> f64 {
+        let (form, positions) = (&self.forms[form], &self.positions);
+        let n = positions.len();
+        let places = (0..n).step_by(n.div_ceil(TANGENTS));
+        let (mut sum, mut count) = (0.0, 0);
+        for k in places {
+            for way in [-distance, distance] {
+                let x = positions[k] + way;
+                if x < positions[0] || x > positions[n - 1] {
+                    continue;
+                }
+                let straight = form.values[k] + form.slopes[k] * way;
+                sum += (form.at(positions, x) - straight).powi(2);
+                count += 1;
+            }
+        }
+        sum / f64::from(count.max(1))
     }
 
     /// Number of forms of the artefact.

@@ -89,7 +89,7 @@ impl Effect<FirstOrder> for AxisBacklash {
     fn open(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let lost = shape.values.first().copied().unwrap_or(0.0);
         let more = shape.values.get(1).copied().unwrap_or(0.0);
-        model.between_positions(|place| {
+        model.between_positions(|_, place| {
             let part = part_of_travel(model, place.x);
             [-0.5 * place.direction * (lost + more * part); 2]
         })

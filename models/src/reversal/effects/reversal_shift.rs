@@ -110,7 +110,7 @@ impl Effect<FirstOrder> for ReversalShift {
 
     fn open(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let own = self.shifted(shape.variant);
-        model.between_positions(|place| {
+        model.between_positions(|_, place| {
             let position = model.seat(place).position;
             let shift = own.clone().position(|p| p == position);
             [

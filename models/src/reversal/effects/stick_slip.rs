@@ -277,6 +277,39 @@ impl Effect<FirstOrder> for StickSlip {
         within && (anew || shape.values.get(1).is_some_and(aside))
     }
 
+    /// Where it begins anew the places differ from pass to pass; they are open beyond the ends of the travel
+    /// alone.
+    fn open(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+        let kind = self.kind(shape.variant);
+        let (&[slips, state, ..], Some(lag)) = (shape.values.as_slice(), shape.values.last())
+        else {
+            return Vec::new();
+        };
+        let states: Vec<f64> = match kind {
+            Kind::Lag => vec![state; model.places().len()],
+            Kind::Sawtooth(Anew::Lag, _) => {
+                let mut states = vec![0.0; model.places().len()];
+                for (pass, state) in passes(model).iter().zip(shape.values.iter().skip(1)) {
+                    let own = pass.iter().flat_map(Clone::clone);
+                    own.for_each(|k| states[k] = *state);
+                }
+                states
+            }
+            _ => return Vec::new(),
+        };
+        let (first, last) = ends(model);
+        model.between_positions(|k, place| {
+            let run = 0.5 * place.direction * part_of_travel(model, place.x);
+            let shift = -place.direction * lag * (slips * run + states[k]).rem_euclid(1.0);
+            let inside = (first..=last).contains(&(place.x + shift));
+            [if inside && kind != Kind::Lag {
+                0.0
+            } else {
+                shift
+            }; 2]
+        })
+    }
+
     fn cycles(&self, _model: &FirstOrder, shape: &Shape) -> Vec<(usize, f64)> {
         match self.kind(shape.variant) {
             Kind::Sawtooth(..) => {
@@ -303,21 +336,31 @@ impl Effect<FirstOrder> for StickSlip {
         amplitudes: &[f64],
         covariance: &DMatrix<f64>,
     ) -> Vec<Estimate> {
-        let names = self.amplitudes_at(shape).into_iter().zip(amplitudes);
-        let shapes = self.shape_parameters().into_iter().zip(&shape.values);
-        let told = match self.kind(shape.variant) {
-            Kind::Lag => 2,
-            _ => 1,
+        let (names, told) = match self.kind(shape.variant) {
+            // The waves of the passes are a step of the search.
+            Kind::Waves(_) => (Vec::new(), 1),
+            Kind::Lag => (self.amplitudes_at(shape), 2),
+            Kind::Sawtooth(..) => (self.amplitudes_at(shape), 1),
         };
+        let skipped = amplitudes.len().saturating_sub(names.len());
+        let names = names.into_iter().zip(amplitudes);
+        let shapes = self.shape_parameters().into_iter().zip(&shape.values);
         let all = names.chain(shapes.take(told)).enumerate();
         all.map(|(k, (parameter, value))| Estimate {
             name: parameter.name.into_owned(),
             value: *value,
-            std: spread(covariance, &[(k, 1.0)]),
+            std: spread(covariance, &[(k + skipped, 1.0)]),
             unit: parameter.unit.to_owned(),
         })
         .collect()
     }
+}
+
+/// First and last position.
+fn ends(model: &FirstOrder) -> (f64, f64) {
+    let positions = model.positions();
+    let at = |k: usize| positions.get(k).copied().unwrap_or(0.0);
+    (at(0), at(positions.len().saturating_sub(1)))
 }
 
 /// Traces of one spindle position, repeat and direction that are read at the same time: each pass of the

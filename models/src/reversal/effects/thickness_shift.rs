@@ -50,7 +50,7 @@ impl Effect<FirstOrder> for ThicknessShift {
 
     fn open(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
         let thickness = shape.values.first().copied().unwrap_or(0.0);
-        model.between_positions(|place| [0.0, 0.5 * model.tilt(place) * thickness])
+        model.between_positions(|_, place| [0.0, 0.5 * model.tilt(place) * thickness])
     }
 
     fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {

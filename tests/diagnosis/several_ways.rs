@@ -55,6 +55,7 @@ fn effects_as_machines_have_them_are_named() {
         ("cyclic-error", 2),
         ("local-contamination", 1),
         ("local-contamination", 2),
+        ("local-contamination", 6),
         ("hysteresis", 1),
         ("hysteresis", 2),
         ("lateral-backlash", 1),

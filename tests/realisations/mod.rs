@@ -19,7 +19,7 @@ pub const REALISATIONS: &[(&str, usize)] = &[
     ("indicator-nonlinearity", 5),
     ("zero-jump", 4),
     ("cyclic-error", 6),
-    ("local-contamination", 6),
+    ("local-contamination", 7),
     ("hysteresis", 4),
     ("lateral-backlash", 7),
     ("ambient-cycle", 4),
@@ -155,6 +155,11 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
                     0..3 => true,
                     // It came after the third pass forward, and stays.
                     5 => n.repeat > 3 || n.repeat == 3 && n.direction < 0.0,
+                    // It came in that pass, while the stylus stood on its place.
+                    6 => {
+                        n.repeat > 3
+                            || n.repeat == 3 && (n.direction < 0.0 || n.part > at + 0.2 * wide)
+                    }
                     _ => n.repeat == repeat,
                 };
                 let there = n.channel() == channel && met;

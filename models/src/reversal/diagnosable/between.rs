@@ -96,6 +96,9 @@ impl FirstOrder {
             return variances[gap] + ONE_SIDED * self.departure(form, beyond);
         }
         let part = (x - positions[gap]) / (positions[gap + 1] - positions[gap]);
+        if part.min(1.0 - part) < PLACES_ALIKE {
+            return 0.0;
+        }
         let swing = (std::f64::consts::PI * part).sin();
         variances[gap] * swing * swing
     }
@@ -241,5 +244,108 @@ impl Seen {
             rows: self.rows.clone(),
             values: self.factors.iter().map(|f| size * f).collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::reversal::diagnosable::Assumptions;
+    use crate::reversal::{Channel, Direction, Observations, Reading};
+
+    const SPACING: f64 = 2.0;
+    const COUNT: usize = 60;
+
+    /// Two repeats of four channels: the slide straight, side A as given, side B straight.
+    fn model(noise: f64, side: impl Fn(f64) -> f64) -> FirstOrder {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut readings = Vec::new();
+        for channel in Channel::ALL {
+            let sees = matches!(channel, Channel::C1A | Channel::C2A);
+            for repeat in 1..=2 {
+                readings.extend((0..COUNT).map(|k| {
+                    let x = SPACING * k as f64;
+                    let chance = noise * (random.random::<f64>() - 0.5);
+                    Reading {
+                        channel,
+                        repeat,
+                        direction: Direction::Forward,
+                        time: None,
+                        x,
+                        value: if sees { side(x) } else { 0.0 } + chance,
+                    }
+                }));
+            }
+        }
+        FirstOrder::new(&Observations { readings }, Assumptions::default()).unwrap()
+    }
+
+    /// The places of the columns' rows.
+    fn places(model: &FirstOrder, columns: &[Column]) -> Vec<f64> {
+        let rows = columns.iter().flat_map(|c| c.rows.iter());
+        rows.map(|k| model.record.places[*k].x).collect()
+    }
+
+    fn moved(by: f64) -> impl Fn(usize, &Place) -> [f64; 2] {
+        // The artefact is moved in the channels of the second position of the spindle.
+        move |_, place| [0.0, if place.channel >= 2 { by } else { 0.0 }]
+    }
+
+    #[test]
+    fn a_parabola_leaves_its_tangent_by_its_square() {
+        // µm/mm².
+        let bend = 2e-3;
+        let model = model(1e-6, |x| bend * x * x);
+        let form = (0..model.forms.len())
+            .max_by(|a, b| {
+                let span = |k: &usize| model.forms[*k].values.max() - model.forms[*k].values.min();
+                span(a).total_cmp(&span(b))
+            })
+            .unwrap();
+        // Half of the bend may be in each of two forms; whatever part it is, the departure goes with the fourth
+        // power of the distance. A natural spline has no bend at its ends: a tenth.
+        let [near, far] = [3.0, 6.0].map(|d| model.departure(form, d));
+        assert!(
+            near > 0.0 && (far / near / 16.0 - 1.0).abs() < 0.1,
+            "{near} {far}"
+        );
+    }
+
+    #[test]
+    fn a_smooth_form_is_open_beyond_the_ends_alone() {
+        let smooth = model(0.1, |x| 3.0 * (0.09 * x).sin());
+        let columns = smooth.between_positions(moved(5.0));
+        let open = places(&smooth, &columns);
+        let last = SPACING * (COUNT - 1) as f64;
+        assert!(
+            !open.is_empty() && open.iter().all(|x| x + 5.0 > last),
+            "{open:?}"
+        );
+        // By the size of what the wave leaves its tangent by: 3/2 · 0.09² · 5² is 0.3 µm.
+        let greatest = columns
+            .iter()
+            .flat_map(|c| &c.values)
+            .fold(0.0f64, |a, v| a.max(v.abs()));
+        assert!((0.1..1.0).contains(&greatest), "{greatest}");
+    }
+
+    #[test]
+    fn a_rough_form_is_open_between_the_positions() {
+        // A wave of 2.4 positions.
+        let rough = model(0.1, |x| (std::f64::consts::TAU * x / (2.4 * SPACING)).sin());
+        let half = rough.between_positions(moved(0.5 * SPACING));
+        assert!(places(&rough, &half).len() > COUNT);
+        let greatest = half
+            .iter()
+            .flat_map(|c| &c.values)
+            .fold(0.0f64, |a, v| a.max(v.abs()));
+        assert!((0.3..6.0).contains(&greatest), "{greatest}");
+        // Moved by whole spacings it is seen where it is known.
+        let whole = rough.between_positions(moved(-3.0 * SPACING));
+        assert!(places(&rough, &whole).iter().all(|x| *x < 3.0 * SPACING));
+        assert!(rough.between_positions(moved(0.0)).is_empty());
     }
 }

@@ -4,8 +4,8 @@
 //! fits into) or triangular (a burr).
 //! It only shows where it was not always there: in one channel (it came or went when the spindle was
 //! turned), in one repeat of one channel or in all of its traces from one on; of designs that see a side
-//! more often, in one repeat of all channels of the side, or on it from a position of the spindle on. Free:
-//! height, place, width, section, channels, trace.
+//! more often, in one repeat of all channels of the side, or on it from a position of the spindle on. It may come
+//! while the stylus is upon its place. Free: height, place, width, section, channels, trace, where in it.
 
 use std::ops::Range;
 
@@ -36,6 +36,20 @@ enum Scope {
     All,
     Repeat(u32),
     From(usize),
+}
+
+/// Where in a trace a bump may come while the stylus is upon it, in widths from its middle.
+const COMES: [f64; 4] = [-1.0, -0.3, 0.3, 1.0];
+
+impl Scope {
+    /// The first trace of a bump that stays.
+    fn first(self) -> Option<usize> {
+        match self {
+            Self::All => Some(0),
+            Self::Repeat(_) => None,
+            Self::From(first) => Some(first),
+        }
+    }
 }
 
 /// The words that tell a bump that stays once it has come.
@@ -206,20 +220,37 @@ impl Effect<FirstOrder> for LocalContamination {
         let stays = (repeats + 1)..(repeats + group.traces(model).len());
         let within = shape.variant - shape.variant % scopes;
         let others = (alone..repeats + 1).chain(stays).map(|k| within + k);
-        sections
+        let mut relatives: Vec<Shape> = sections
             .chain(others)
             .filter(|variant| *variant != shape.variant)
             .map(|variant| Shape {
                 variant,
                 ..shape.clone()
             })
-            .collect()
+            .collect();
+        let first = self.told(model, shape.variant).map(|(_, _, s)| s.first());
+        let (&[position, log_width], Some(Some(first))) = (shape.values.as_slice(), first) else {
+            return relatives;
+        };
+        // In the trace before the first that holds it whole, or in the one that was taken for that.
+        for order in first.saturating_sub(1)..=first {
+            let from = if order == 0 { 0 } else { repeats + order };
+            for comes in COMES {
+                let mut other = shape.clone();
+                other.variant = within + from;
+                other.values.push(position + comes * log_width.exp());
+                other.steps.push(0.3 * log_width.exp());
+                relatives.push(other);
+            }
+        }
+        relatives
     }
 
     fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
-        let &[position, log_width] = shape.values.as_slice() else {
+        let &[position, log_width, ..] = shape.values.as_slice() else {
             return Vec::new();
         };
+        let comes = shape.values.get(2);
         let Some(((section, _), group, scope)) = self.told(model, shape.variant) else {
             return Vec::new();
         };
@@ -231,9 +262,12 @@ impl Effect<FirstOrder> for LocalContamination {
                 Scope::Repeat(own) => model.places()[trace.start].repeat == own,
                 Scope::From(first) => order >= first,
             };
+            let partly = comes.filter(|_| scope.first() == Some(order));
             for k in trace.filter(|_| met) {
-                let away = (model.places()[k].x - position) / width;
-                if away.abs() < 5.0 {
+                let place = &model.places()[k];
+                let away = (place.x - position) / width;
+                let there = partly.is_none_or(|comes| place.direction * (place.x - comes) >= 0.0);
+                if there && away.abs() < 5.0 {
                     column.rows.push(k);
                     column.values.push(section(away));
                 }
@@ -247,7 +281,7 @@ impl Effect<FirstOrder> for LocalContamination {
         else {
             return false;
         };
-        matches!(shape.values.as_slice(), &[position, log_width]
+        matches!(shape.values.as_slice(), &[position, log_width, ..]
             if (*first..=*last).contains(&position)
                 && log_width.exp() > 0.4 * spacing(model)
                 // Anything wider is no chip but a form.
@@ -257,12 +291,14 @@ impl Effect<FirstOrder> for LocalContamination {
     fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
         let ((_, section), group, scope) = self.told(model, shape.variant)?;
         let name = &group.name;
-        Some(match scope {
-            Scope::All => format!("{section}, {name}"),
-            Scope::Repeat(repeat) => format!("{section}, {name}, repeat {repeat}"),
-            Scope::From(first) => {
-                let all = group.traces(model).len();
-                format!("{section}, {name}, {STAYS} {} of {all} on", first + 1)
+        let all = group.traces(model).len();
+        let stays = |first: usize| format!("{section}, {name}, {STAYS} {} of {all}", first + 1);
+        Some(match (scope, shape.values.get(2)) {
+            (Scope::All, None) => format!("{section}, {name}"),
+            (Scope::Repeat(repeat), _) => format!("{section}, {name}, repeat {repeat}"),
+            (Scope::From(first), None) => stays(first) + " on",
+            (scope, Some(comes)) => {
+                format!("{} at {comes:.1} mm on", stays(scope.first().unwrap_or(0)))
             }
         })
     }

@@ -55,7 +55,6 @@ fn effects_as_machines_have_them_are_named() {
         ("cyclic-error", 2),
         ("local-contamination", 1),
         ("local-contamination", 2),
-        ("local-contamination", 6),
         ("hysteresis", 1),
         ("hysteresis", 2),
         ("lateral-backlash", 1),
@@ -115,6 +114,23 @@ fn a_lag_that_begins_anew_in_each_pass_is_named() {
         (slips.value - made).abs() < 5.0 * slips.std + 0.01,
         "{slips:?}"
     );
+}
+
+/// It is told in which trace it came, and where.
+#[test]
+fn dirt_that_comes_while_the_stylus_is_upon_its_place_is_named() {
+    let readings = measured("local-contamination", 6, 0.96, 206, 150).unwrap();
+    let diagnosis = diagnosed(&readings);
+    assert_eq!(
+        diagnosis.verdict.effects,
+        ["local-contamination"],
+        "{}",
+        diagnosis.verdict.statement
+    );
+    let mut all = diagnosis.candidates.iter();
+    let own = all.find(|c| c.effect == "local-contamination").unwrap();
+    let words = own.variant.as_deref().unwrap();
+    assert!(words.contains("from trace 5 of 8 at "), "{words}");
 }
 
 /// One reading position that differs in one channel is a bump of unknown width, or a bump between two

@@ -4,7 +4,7 @@
 //! state that is left without the causes and at the sizes that belong to them. With D the total
 //! derivative of Σ aE(a), noise ν of the readings moves them by G ν, G = (SᵀD)⁻¹Sᵀ; D = S where a
 //! signature depends on nothing. Noise also moves the state at which signatures are taken: that is
-//! drawn.
+//! drawn. What the state leaves open, W of one standard deviation each, adds G W (G W)ᵀ.
 
 use errsep_models::model::{Estimate, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -94,7 +94,9 @@ impl Sizes {
             return Some(plain);
         };
         let gain = inverse * columns.transpose();
-        let added = draws.added(&gain);
+        // What the state leaves open is independent of the noise.
+        let open = &gain * context.open(readings, causes);
+        let added = draws.added(&gain) + &open * open.transpose();
         Some(Self {
             covariance: with_state(&gain * gain.transpose(), &added),
             gain,

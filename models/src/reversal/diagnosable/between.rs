@@ -27,6 +27,8 @@ const ROUGH: f64 = 3.0;
 const TANGENTS: usize = 200;
 /// Squared departure from the tangent at an end to that from tangents within: an end has one side.
 const ONE_SIDED: f64 = 2.0;
+/// Changes by readings that are told, the greatest first: a diagnosis holds them in a table.
+const MOST_VALUES: usize = 20_000_000;
 /// Squared displacements, in the unit of the reading, below which a form between positions is known.
 const PLACES_ALIKE: f64 = 1e-6;
 
@@ -63,6 +65,12 @@ impl FirstOrder {
             for (at, own) in seen.into_iter().enumerate() {
                 columns.extend(self.open_at(at, own, (form, variances)));
             }
+        }
+        let most = (MOST_VALUES / self.record.places.len().max(1)).max(1);
+        if columns.len() > most {
+            let size = |c: &Column| c.values.iter().map(|v| v * v).sum::<f64>();
+            columns.sort_by(|a, b| size(b).total_cmp(&size(a)));
+            columns.truncate(most);
         }
         columns
     }

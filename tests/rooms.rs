@@ -3,14 +3,16 @@
 use std::path::Path;
 
 /// In the order in which they work; what is on one level may not know each other either.
-const ORDER: [&[&str]; 7] = [
+const ORDER: [&[&str]; 9] = [
     &["search", "options", "levels"],
     &["noise"],
     &["detection"],
     &["attribution"],
     &["planning"],
+    &["severity"],
     &["verdict", "catalogue"],
-    &["joined"],
+    &["diagnose"],
+    &["joined", "agreement"],
 ];
 
 fn level(room: &str) -> Option<usize> {

@@ -5,9 +5,8 @@
 //! the noise, and named as the diagnosis names (`stage.rs`). One minus the greatest of the
 //! probabilities, over the families, of coming to the same name is the severity.
 
-pub(super) mod agreement;
-mod rivals;
-mod stage;
+pub(super) mod rivals;
+pub(super) mod stage;
 
 use errsep_models::model::FittedModel;
 use nalgebra::DVector;

@@ -24,7 +24,7 @@ const ROUNDS: usize = 6;
 
 /// A family of rivals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Family {
+pub(in crate::diagnosis) enum Family {
     /// An effect of the catalogue.
     Effect(usize),
     /// Smooth functions of the position.
@@ -65,7 +65,7 @@ impl Family {
 }
 
 /// Rivals with their noise, one a column; those beyond `count` are zero.
-pub(super) struct Drawn {
+pub(in crate::diagnosis) struct Drawn {
     pub readings: DMatrix<f64>,
     pub count: usize,
 }

@@ -15,7 +15,7 @@ use crate::diagnosis::levels::{EARNED, REFINED, UNSEARCHED};
 use crate::diagnosis::severity::rivals::Drawn;
 
 /// A name that was given.
-pub(super) struct Name {
+pub(in crate::diagnosis) struct Name {
     /// The effect, of a group the first.
     pub effect: String,
     /// All effects of its group by their places in the catalogue.

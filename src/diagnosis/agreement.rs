@@ -8,6 +8,7 @@ use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::attribution::examined::examined;
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::space::Space;
+use crate::diagnosis::diagnose::diagnose;
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
 use crate::diagnosis::options::Options;
 use crate::diagnosis::severity::rivals::{Drawn, Family};
@@ -67,7 +68,7 @@ fn add<M: FittedModel>(
                 severity: 0,
                 ..options.clone()
             };
-            let verdict = crate::diagnosis::diagnose(&made, &own).verdict;
+            let verdict = diagnose(&made, &own).verdict;
             let causes = verdict.causes();
             let of_group = |said: &&str| {
                 let mut own = name.members.iter();

@@ -233,7 +233,8 @@ fn fitted<M: FittedModel>(context: &Context<'_, M>, readings: &DVector<f64>) -> 
         };
         let start = context.start(&remainder, effect).cloned().or_else(first);
         let start = start.unwrap_or_else(Shape::only);
-        let (cause, _) = context.refine(context.model, readings, effect, &start, &causes);
+        let found = context.refine(context.model, readings, effect, &start, &causes);
+        let (cause, _) = context.come_back(context.model, readings, found, &causes);
         causes.push(cause);
     }
     for _ in 0..if causes.len() > 1 { POLISHED } else { 0 } {

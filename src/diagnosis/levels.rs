@@ -114,6 +114,8 @@ pub(in crate::diagnosis) const REFINED: usize = 5;
 pub(in crate::diagnosis) const POLISHED: usize = 3;
 /// *Limit.* Part of a statistic that searching may add to that of a relative where it stands.
 pub(in crate::diagnosis) const UNSEARCHED: f64 = 0.2;
+/// *Limit.* Part of the greatest statistic from which on values that come back are tried around their cycles.
+pub(in crate::diagnosis) const IN_REACH: f64 = 0.5;
 
 // Verdict.
 

@@ -41,21 +41,58 @@ impl SmoothProfile {
         }
     }
 
-    /// The value at any position by the cubic between neighbours; straight beyond the ends.
-    pub fn at(&self, positions: &[f64], x: f64) -> f64 {
+    /// The value at a spot by the cubic between neighbours; straight beyond the ends.
+    pub fn at(&self, spot: &Spot) -> f64 {
+        let Spot { left, right, of } = *spot;
+        of[0] * self.values[left]
+            + of[1] * self.values[right]
+            + of[2] * self.slopes[left]
+            + of[3] * self.slopes[right]
+    }
+}
+
+/// Where a position lies among those of the profiles: the neighbours, and the parts of their values and
+/// slopes in the cubic between them (Hermite). One spot serves every profile over the same positions.
+#[derive(Debug, Clone, Copy)]
+pub struct Spot {
+    left: usize,
+    right: usize,
+    of: [f64; 4],
+}
+
+impl Spot {
+    /// The spot of a position, sought from a neighbour on.
+    pub fn new(positions: &[f64], near: usize, x: f64) -> Self {
         let n = positions.len();
-        let right = positions.partition_point(|p| *p < x);
+        let mut right = near.min(n);
+        while right < n && positions[right] < x {
+            right += 1;
+        }
+        while right > 0 && positions[right - 1] >= x {
+            right -= 1;
+        }
         if right == 0 || right >= n {
             let end = if right == 0 { 0 } else { n - 1 };
-            return self.values[end] + self.slopes[end] * (x - positions[end]);
+            return Self {
+                left: end,
+                right: end,
+                of: [1.0, 0.0, x - positions[end], 0.0],
+            };
         }
-        let (left, h) = (right - 1, positions[right] - positions[right - 1]);
+        let left = right - 1;
+        let h = positions[right] - positions[left];
         let t = (x - positions[left]) / h;
-        let (u, tt) = (1.0 - t, t * t);
-        let (uu, rest) = (u * u, t * u);
-        self.values[left] * uu * (1.0 + 2.0 * t)
-            + self.values[right] * tt * (1.0 + 2.0 * u)
-            + h * rest * (self.slopes[left] * u - self.slopes[right] * t)
+        let u = 1.0 - t;
+        Self {
+            left,
+            right,
+            of: [
+                u * u * (1.0 + 2.0 * t),
+                t * t * (1.0 + 2.0 * u),
+                h * t * u * u,
+                -h * t * t * u,
+            ],
+        }
     }
 }
 

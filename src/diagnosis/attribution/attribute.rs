@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::diagnosis::attribution::confidence::{Answer, confidence_set, possible, without};
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder, finer};
 use crate::diagnosis::levels::{
-    BETTER, EARNED, HOPELESS, MOST_CAUSES, PAIR_REACH, PAIRS, POLISHED, REFINED,
+    BETTER, EARNED, HOPELESS, IN_REACH, MOST_CAUSES, PAIR_REACH, PAIRS, POLISHED, REFINED,
 };
 
 /// Seeks the causes of what stands out in readings; `begun` are those without which noise and state were had.
@@ -20,7 +20,7 @@ pub(in crate::diagnosis) fn attribute<M: FittedModel>(
     first: &Remainder,
     begun: &[Cause],
 ) -> Option<Answer> {
-    let strongest_alone = strongest(context, readings, first, &[]);
+    let strongest_alone = strongest(context, readings, first, &[], 0.0);
     if let [only] = begun {
         let start = finer(&only.shape);
         let (cause, t) = context.refine(context.model, readings, only.effect, &start, &[]);
@@ -38,7 +38,7 @@ pub(in crate::diagnosis) fn attribute<M: FittedModel>(
         let here = partial.as_ref().map_or(first, |answer| &answer.remainder);
         let next = match size {
             1 => strongest_alone.clone(),
-            _ => strongest(context, readings, here, &causes),
+            _ => strongest(context, readings, here, &causes, 0.0),
         };
         let Some((next, _)) = next else {
             break;
@@ -82,7 +82,7 @@ pub(in crate::diagnosis) fn roughly<M: FittedModel>(
     let mut left: Option<Remainder> = None;
     for _ in 0..MOST_CAUSES {
         let here = left.as_ref().unwrap_or(first);
-        let Some((next, _)) = strongest(context, readings, here, &causes) else {
+        let Some((next, _)) = strongest(context, readings, here, &causes, 0.0) else {
             break;
         };
         causes.push(next);
@@ -140,12 +140,14 @@ fn pairs<M: FittedModel>(
     polished.collect()
 }
 
-/// The refined effect with the greatest statistic beside the causes, and that statistic.
+/// The refined effect with the greatest statistic beside the causes, and that statistic. `known`: one that
+/// another cause has there already.
 fn strongest<M: FittedModel>(
     context: &Context<'_, M>,
     readings: &DVector<f64>,
     remainder: &Remainder,
     causes: &[Cause],
+    known: f64,
 ) -> Option<(Cause, f64)> {
     let mut ranked: Vec<(f64, usize)> = (0..context.catalogue.len())
         .filter(|effect| causes.iter().all(|c| c.effect != *effect))
@@ -157,15 +159,23 @@ fn strongest<M: FittedModel>(
         .collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     ranked.truncate(REFINED);
-    ranked
+    let refined: Vec<(Cause, f64)> = ranked
         .into_par_iter()
         .filter_map(|(_, effect)| {
             let start = context.start(remainder, effect)?;
-            let (cause, t) = context.refine(context.model, readings, effect, start, causes);
-            possible(context, readings, causes, &cause).then_some((cause, t))
+            Some(context.refine(context.model, readings, effect, start, causes))
         })
-        .collect::<Vec<_>>()
+        .collect();
+    let best = refined.iter().map(|(_, t)| *t).fold(known, f64::max);
+    refined
         .into_iter()
+        .map(|found| {
+            if found.1 < IN_REACH * best {
+                return found;
+            }
+            context.come_back(context.model, readings, found, causes)
+        })
+        .filter(|(cause, _)| possible(context, readings, causes, cause))
         .max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -180,7 +190,8 @@ fn polish<M: FittedModel>(context: &Context<'_, M>, readings: &DVector<f64>, cau
             let (refined, t) =
                 context.refine(context.model, readings, causes[k].effect, &start, &others);
             let remainder = context.remainder(readings, &others);
-            let swapped = strongest(context, readings, &remainder, &others).map(|(c, _)| {
+            let strongest = strongest(context, readings, &remainder, &others, t);
+            let swapped = strongest.map(|(c, _)| {
                 context.refine(context.model, readings, c.effect, &finer(&c.shape), &others)
             });
             match swapped {

@@ -13,8 +13,8 @@ use crate::diagnosis::attribution::shrink::held_out_square;
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::detection::space::{Space, orthonormal};
 use crate::diagnosis::levels::{
-    EARNED, EQUAL_EVIDENCE, HELD, HOPELESS, HOPELESS_PART, NEAR, OUTDONE, STANDS, WEIGHTY,
-    chi_squared_of_two, chi_squared_quantile,
+    EARNED, EQUAL_EVIDENCE, HELD, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, OUTDONE, STANDS,
+    WEIGHTY, chi_squared_of_two, chi_squared_quantile,
 };
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
 
@@ -208,9 +208,12 @@ fn alternatives<M: FittedModel>(
             }
             let start = context.start(&remainder, effect);
             vec![start.map(|start| {
-                context
-                    .refine(context.model, readings, effect, start, &others)
-                    .0
+                let found = context.refine(context.model, readings, effect, start, &others);
+                if strength(&found.0) < IN_REACH * own {
+                    return found.0;
+                }
+                let (cause, _) = context.come_back(context.model, readings, found, &others);
+                cause
             })]
         };
         let judged = trials.into_iter().flatten().filter_map(|cause| {

@@ -55,7 +55,25 @@ impl<M: FittedModel> Context<'_, M> {
         (self.cause(state, effect, shape), t)
     }
 
-    /// The same without its relatives.
+    /// A refined cause once its values that come back were tried around their cycles, and its statistic; the
+    /// cause as it is where none does.
+    pub fn come_back(
+        &self,
+        state: &M,
+        readings: &DVector<f64>,
+        (cause, t): (Cause, f64),
+        beside: &[Cause],
+    ) -> (Cause, f64) {
+        let cycles = self.catalogue[cause.effect].cycles(state, &cause.shape);
+        if cycles.is_empty() {
+            return (cause, t);
+        }
+        let seen = Seen::of(self, state, readings, cause.effect, beside);
+        let (shape, t) = seen.come_back(&cause.shape, &cycles);
+        (self.cause(state, cause.effect, shape), t)
+    }
+
+    /// As [`Context::refine`], without relatives.
     pub fn refine_alone(
         &self,
         state: &M,
@@ -118,29 +136,41 @@ impl<'s, M: FittedModel> Seen<'s, M> {
     fn searched(&self, start: &Shape) -> (Shape, f64) {
         let mut shape = start.clone();
         if shape.free() > 0 {
-            let misfit = |values: &[f64]| {
-                let trial = Shape {
-                    values: values.to_vec(),
-                    ..start.clone()
-                };
-                if self.effect.allowed(self.state, &trial) {
-                    -self.value(&trial).0
-                } else {
-                    f64::INFINITY
-                }
-            };
-            let searched =
-                |from: &[f64]| coordinate_search(from, &start.steps, PRECISION, misfit).0;
-            shape.values = searched(&start.values);
-            let cycles = self.effect.cycles(self.state, &shape);
-            for _ in 0..ROUNDS {
-                let (values, moved) = around(&shape.values, &cycles, misfit);
-                if !moved {
-                    break;
-                }
-                shape.values = searched(&values);
-            }
+            let misfit = |values: &[f64]| self.misfit(start, values);
+            shape.values = coordinate_search(&start.values, &start.steps, PRECISION, misfit).0;
         }
+        self.settled(shape)
+    }
+
+    /// What small steps stop beside: the best around the cycles, searched on from there.
+    fn come_back(&self, start: &Shape, cycles: &[(usize, f64)]) -> (Shape, f64) {
+        let mut shape = start.clone();
+        let misfit = |values: &[f64]| self.misfit(start, values);
+        for _ in 0..ROUNDS {
+            let (values, moved) = around(&shape.values, cycles, misfit);
+            if !moved {
+                break;
+            }
+            shape.values = coordinate_search(&values, &start.steps, PRECISION, misfit).0;
+        }
+        self.settled(shape)
+    }
+
+    /// The statistic of other values of a shape, the greatest the least; infinite where they are not allowed.
+    fn misfit(&self, shape: &Shape, values: &[f64]) -> f64 {
+        let trial = Shape {
+            values: values.to_vec(),
+            ..shape.clone()
+        };
+        if self.effect.allowed(self.state, &trial) {
+            -self.value(&trial).0
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// A shape with what its size makes of it.
+    fn settled(&self, mut shape: Shape) -> (Shape, f64) {
         let (mut t, mut gram, mut score) = self.value(&shape);
         for _ in 0..8 {
             // What the model absorbs of several columns together stays as small as may be.

@@ -12,6 +12,7 @@
 
 use nalgebra::DVector;
 
+use super::super::smooth_profile::Spot;
 use super::FirstOrder;
 use crate::model::{Column, Place};
 
@@ -124,7 +125,7 @@ impl FirstOrder {
                     continue;
                 }
                 let straight = form.values[k] + form.slopes[k] * way;
-                sum += (form.at(positions, x) - straight).powi(2);
+                sum += (form.at(&Spot::new(positions, k, x)) - straight).powi(2);
                 count += 1;
             }
         }

@@ -22,7 +22,7 @@ use thiserror::Error;
 use super::cells::cell_width;
 use super::designs::{DesignFit, DesignObservations, DesignReading, Zero};
 use super::simultaneous::Simultaneous;
-use super::smooth_profile::{SmoothProfile, Smoother};
+use super::smooth_profile::{SmoothProfile, Smoother, Spot};
 use super::{Convention, Observations};
 use crate::model::{Column, FittedModel, Place, Record};
 pub use arrangement::{Arrangement, Seat, indicator_name};
@@ -347,10 +347,11 @@ impl FirstOrder {
         self.smooth = (0..n * self.present().len())
             .map(|cell| self.smooth_at(cell / n, cell % n))
             .collect();
+        let middle = Spot::new(&self.positions, n / 2, self.middle);
         self.mid_readings = (0..self.present().len())
             .map(|channel| {
                 let line = &self.lines[channel];
-                let at = |form: &SmoothProfile| form.at(&self.positions, self.middle);
+                let at = |form: &SmoothProfile| form.at(&middle);
                 line.offset
                     + line.slope * self.middle
                     + self.slide_sum(channel, at)
@@ -480,8 +481,9 @@ impl FirstOrder {
             return self.side_slope(place);
         }
         let side = self.side(place.channel);
-        let moved = side.at(&self.positions, place.x + shift);
-        (moved - side.values[self.at(place)]) / shift
+        let k = self.at(place);
+        let spot = Spot::new(&self.positions, k, place.x + shift);
+        (side.at(&spot) - side.values[k]) / shift
     }
 
     /// Change of the smooth value of a reading when the slide stands `shift` mm further, per mm.
@@ -489,13 +491,12 @@ impl FirstOrder {
         let place = &self.record.places[reading];
         let shift = self.chord_length(shift);
         let (channel, k) = (place.channel, self.at(place));
-        let moved = |form: &SmoothProfile| {
-            let moved = form.at(&self.positions, place.x + shift) - form.values[k];
-            moved / shift
-        };
+        let spot = Spot::new(&self.positions, k, place.x + shift);
+        let moved = |form: &SmoothProfile| (form.at(&spot) - form.values[k]) / shift;
         self.lines[channel].slope
             + self.slide_sum(channel, moved)
-            + self.probed_chord(reading, shift)
+            + moved(self.side(channel))
+            + self.beneath_chord(reading, shift)
     }
 
     /// Change of a reading when the probed point moves `shift` mm along the artefact, per mm.

@@ -189,11 +189,15 @@ fn figure(figure: &Figure, values: &mut Values) -> Markup {
         .iter()
         .filter_map(|d| d.thinned)
         .reduce(Thinned::and);
-    let several = drawings.len() > 1;
+    let class = match &drawings[..] {
+        [only] if only.is_small() => "plots small",
+        [_] | [] => "plots",
+        _ => "plots panels",
+    };
     html! {
         figure {
             h3 { (figure.title) }
-            div class=(if several { "plots panels" } else { "plots" }) {
+            div class=(class) {
                 @for drawing in drawings { (svg(drawing, values)) }
             }
             figcaption {

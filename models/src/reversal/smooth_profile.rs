@@ -31,6 +31,9 @@ pub struct SmoothProfile {
     weight: f64,
 }
 
+/// Positions that are tried one by one before halving.
+const NEARBY: usize = 4;
+
 impl SmoothProfile {
     /// Nothing over a number of positions.
     pub fn zero(positions: usize) -> Self {
@@ -44,7 +47,7 @@ impl SmoothProfile {
     /// The value at any position by the cubic between neighbours; straight beyond the ends.
     pub fn at(&self, positions: &[f64], x: f64) -> f64 {
         let n = positions.len();
-        let right = positions.partition_point(|p| *p < x);
+        let right = first_not_below(positions, x);
         if right == 0 || right >= n {
             let end = if right == 0 { 0 } else { n - 1 };
             return self.values[end] + self.slopes[end] * (x - positions[end]);
@@ -57,6 +60,34 @@ impl SmoothProfile {
             + self.values[right] * tt * (1.0 + 2.0 * u)
             + h * rest * (self.slopes[left] * u - self.slopes[right] * t)
     }
+}
+
+/// The first of increasing positions that is not below `x`, or their number: looked for from where it is
+/// among even ones.
+fn first_not_below(positions: &[f64], x: f64) -> usize {
+    let n = positions.len();
+    let (Some(first), Some(last)) = (positions.first(), positions.last()) else {
+        return 0;
+    };
+    // What is no number counts from zero, as does what lies before the first.
+    let part = (x - first) / (last - first) * n.saturating_sub(1) as f64;
+    let mut at = (part as usize).min(n - 1);
+    let mut steps = 0;
+    while at > 0 && positions[at - 1] >= x {
+        at -= 1;
+        steps += 1;
+        if steps > NEARBY {
+            return positions[..at].partition_point(|p| *p < x);
+        }
+    }
+    while at < n && positions[at] < x {
+        at += 1;
+        steps += 1;
+        if steps > NEARBY {
+            return at + positions[at..].partition_point(|p| *p < x);
+        }
+    }
+    at
 }
 
 impl Smoother {
@@ -298,6 +329,22 @@ mod tests {
             missed > 2.5 * kept && missed < 4.5 * kept,
             "{missed} {kept}"
         );
+    }
+
+    /// The place among the positions is that of a search by halving, evenly spaced or not, also outside them
+    /// and for what is no number.
+    #[test]
+    fn the_place_is_found_from_where_even_positions_have_it() {
+        let even: Vec<f64> = (0..40).map(|k| 0.1 * f64::from(k) - 1.0).collect();
+        let uneven: Vec<f64> = even.iter().map(|t| (3.0 * t).exp()).collect();
+        for positions in [&even[..], &uneven[..], &even[..1], &[]] {
+            let between = (-20..2000).map(|k| 0.01 * f64::from(k) - 1.5);
+            for x in between.chain(positions.iter().copied()).chain([f64::NAN]) {
+                // Exact limit.
+                let halved = positions.partition_point(|p| *p < x);
+                assert_eq!(first_not_below(positions, x), halved, "{x}");
+            }
+        }
     }
 
     #[test]

@@ -86,23 +86,42 @@ fn nothing(gap: &Gap, hidden: &[Hidden]) -> String {
 
 /// One or several causes, each alone or one of a group.
 fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
-    let described = |effect: &str| {
+    let described = |effect: &str, weak: &str| {
         let candidate = candidates.iter().find(|c| c.effect == effect);
-        format!("{effect}{}", candidate.map_or(String::new(), describe))
+        let own = candidate.map_or(String::new(), describe);
+        let parts: Vec<&str> = [own.as_str(), weak]
+            .into_iter()
+            .filter(|part| !part.is_empty())
+            .collect();
+        if parts.is_empty() {
+            effect.to_owned()
+        } else {
+            format!("{effect} ({})", parts.join("; "))
+        }
     };
     let causes = verdict.causes();
     let open = causes.iter().any(|group| group.len() > 1);
     let said: Vec<String> = causes
         .iter()
         .map(|group| match group[..] {
-            [only] => described(only),
+            [only] => described(only, &weakness(verdict, only, "this name")),
             ref several => {
-                let each: Vec<String> = several.iter().map(|e| described(e)).collect();
-                format!("one of: {}", each.join("; "))
+                let each: Vec<String> = several.iter().map(|e| described(e, "")).collect();
+                let weak = weakness(verdict, several[0], "one of these names");
+                let weak = if weak.is_empty() {
+                    weak
+                } else {
+                    format!(" ({weak})")
+                };
+                format!("one of: {}{weak}", each.join("; "))
             }
         })
         .collect();
     let said = said.join(" and ");
+    let weak = verdict
+        .severity
+        .iter()
+        .any(|s| s.confidence == Confidence::Weak);
     let doubt = if open {
         format!(
             "These readings cannot tell {} apart. To tell them apart: {}.",
@@ -119,10 +138,6 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
             .filter(|c| verdict.effects.contains(&c.effect))
             .map(|c| c.confirm.as_str())
             .collect();
-        let weak = verdict
-            .severity
-            .iter()
-            .any(|s| s.confidence == Confidence::Weak);
         let purpose = if weak {
             "To tell them apart"
         } else {
@@ -130,9 +145,8 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
         };
         format!("{purpose}: {}.", confirm.join("; "))
     };
-    let weak = weak_names(verdict);
     let missed = gap.before.in_words(gap.unit);
-    let beginning = if gap.before.rms > 0.0 && !weak.is_empty() {
+    let beginning = if gap.before.rms > 0.0 && weak {
         format!("The model misses {missed}, which is consistent with {said}")
     } else if gap.before.rms > 0.0 {
         format!("The model misses {missed} because of {said}")
@@ -152,37 +166,28 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
         ""
     };
     format!(
-        "{beginning}; with {with} {} remain{more}. {weak}{doubt}",
+        "{beginning}; with {with} {} remain{more}. {doubt}",
         gap.after.in_words(gap.unit)
     )
 }
 
-/// Of each name that is weak, what else would have looked the same.
-fn weak_names(verdict: &Verdict) -> String {
-    let weak = verdict
-        .severity
-        .iter()
-        .filter(|s| s.confidence == Confidence::Weak);
-    weak.filter_map(|severity| {
-        let worst = severity.rivals.first()?;
-        let whose = if verdict.effects.len() > 1 {
-            format!("as {}", severity.effect)
-        } else {
-            "the same".to_owned()
-        };
-        Some(if worst.probability > 0.0 {
-            format!(
-                "Of {} of this size {} would have looked {whose}. ",
-                worst.in_words(),
-                percent(worst.probability)
-            )
-        } else {
-            format!("Too few rivals were drawn to say what else would have looked {whose}. ")
-        })
-    })
-    .collect()
+/// What a weak name is worth: what else would be given it. Nothing for one that is strong.
+fn weakness(verdict: &Verdict, effect: &str, name: &str) -> String {
+    let severity = verdict.severity.iter().find(|s| s.effect == effect);
+    let Some(severity) = severity.filter(|s| s.confidence == Confidence::Weak) else {
+        return String::new();
+    };
+    match severity.rivals.first() {
+        Some(worst) if worst.probability > 0.0 => format!(
+            "weak: {} of this size would be given {name} in {} of cases",
+            worst.in_words(),
+            percent(worst.probability)
+        ),
+        _ => format!("weak: too few rivals were drawn to say what else would be given {name}"),
+    }
 }
 
+/// Variant and sizes, and the others that are as likely.
 fn describe(candidate: &Candidate) -> String {
     let own = detail(candidate.variant.as_deref(), &candidate.parameters);
     if own.is_empty() {
@@ -192,7 +197,7 @@ fn describe(candidate: &Candidate) -> String {
         let there = detail(Some(&other.variant), &other.parameters);
         format!("; as likely {there}")
     });
-    format!(" ({own}{})", others.collect::<String>())
+    format!("{own}{}", others.collect::<String>())
 }
 
 fn detail(variant: Option<&str>, parameters: &[ParameterOut]) -> String {

@@ -59,7 +59,11 @@ pub struct Bars {
     axis: Axis,
     bars: Vec<Bar>,
     rules: Vec<(f64, String)>,
+    width: f64,
 }
+
+/// Width of a small chart: on a telephone its text is hardly smaller than that of the page.
+const SMALL: f64 = 420.0;
 
 impl Bars {
     /// An empty chart of a quantity.
@@ -68,7 +72,15 @@ impl Bars {
             axis,
             bars: Vec::new(),
             rules: Vec::new(),
+            width: Frame::WIDE.width,
         }
+    }
+
+    /// A chart that is read at a glance, on a telephone without being moved.
+    #[must_use]
+    pub const fn small(mut self) -> Self {
+        self.width = SMALL;
+        self
     }
 
     /// Adds a bar.
@@ -93,7 +105,7 @@ impl Bars {
     }
 
     pub(super) fn drawing(&self) -> Drawing {
-        let width = Frame::WIDE.width;
+        let width = self.width;
         let domain = self
             .bars
             .iter()

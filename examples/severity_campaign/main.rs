@@ -1,0 +1,222 @@
+//! What a named effect is worth: `cargo run --release --example severity_campaign -- CASES SEED MODEL`. For each
+//! effect at four times the size that is seen with 80 %: how often it is named, and strong; with it withheld
+//! at 1.5 to 4 times: how often another is named, and strong, and how often that is one which these data
+//! could have told from the withheld one at its size. Then how often score stage and whole diagnosis agree
+//! on rivals.
+
+mod makers;
+#[path = "../../tests/other_models/mod.rs"]
+mod other_models;
+
+use errsep::diagnosis::{
+    Agreement, Confidence, Diagnosability, Diagnosis, NoiseLaw, NoiseSource, Options, agreement,
+    certificate, diagnose,
+};
+use errsep_models::model::FittedModel;
+use makers::Put;
+use other_models::{calibration_line_made, fourier_made, judged};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+/// Rivals of each family that are named in both ways, for one measurement.
+const EACH: usize = 8;
+/// Quantile of the normal law: two effects are told apart with 99 %.
+const TELL: f64 = 2.326;
+
+/// Whether an effect in place of another, at a size of the latter, can be told from it.
+type Told = Box<dyn Fn(&str, &str, f64) -> bool + Sync>;
+
+/// A model, its makers and what its data show.
+struct Model {
+    name: &'static str,
+    effects: &'static [&'static str],
+    diagnosed: fn(Put<'_>, u64, &Options) -> Diagnosis,
+    agreed: fn(Put<'_>, u64, &Options) -> Vec<Agreement>,
+    told: fn() -> Told,
+}
+
+macro_rules! model {
+    ($name:literal, $effects:expr, $made:expr, $noise:expr) => {
+        Model {
+            name: $name,
+            effects: &$effects,
+            diagnosed: |put, seed, options| diagnose(&$made(put, seed), options),
+            agreed: |put, seed, options| agreement(&$made(put, seed), options, EACH),
+            told: || told_by(&$made(&[], 1), $noise),
+        }
+    };
+}
+
+const MODELS: [Model; 5] = [
+    model!(
+        "calibration-line",
+        [
+            "cubic",
+            "drift",
+            "logarithmic",
+            "quadratic",
+            "saturation",
+            "set-offset",
+            "square-root"
+        ],
+        |put: Put<'_>, seed| calibration_line_made(put, seed, 1.0),
+        1e-3
+    ),
+    model!(
+        "fourier",
+        ["height-difference", "probe-spacing", "yaw"],
+        |put: Put<'_>, seed| fourier_made(put, seed, 1.0),
+        1.0
+    ),
+    model!(
+        "circle",
+        ["lobes", "outlier", "ovality", "scale-mismatch"],
+        makers::circle,
+        makers::CIRCLE_NOISE
+    ),
+    model!(
+        "four-sensor",
+        ["drift", "gain", "sensor-position"],
+        makers::four_sensor,
+        makers::SENSOR_NOISE
+    ),
+    model!(
+        "step-diagonal",
+        ["angular-error", "drift", "mirror-misalignment"],
+        makers::step_diagonal,
+        makers::LASER_NOISE
+    ),
+];
+
+fn options(without: &[&str], severity: usize) -> Options {
+    Options {
+        draws: 400,
+        without: without.iter().map(|s| (*s).to_owned()).collect(),
+        severity,
+        ..Options::default()
+    }
+}
+
+/// What the certificate of a measurement says of two effects: at a size with the visible length |Ê| in units
+/// of the noise they are told apart with 99 % from |Ê| sin θ/2 = 2.33 on, θ the angle between them.
+fn told_by<M: FittedModel>(model: &M, noise: f64) -> Told {
+    let law = NoiseLaw::white(noise, f64::INFINITY, NoiseSource::Stated);
+    let rows = certificate(model, &model.effects(), &law, &options(&[], 0));
+    let readings = model.places().len() as f64;
+    Box::new(move |withheld, other, size| {
+        let own = |row: &&Diagnosability| row.effect == withheld;
+        let Some(row) = rows.iter().find(own) else {
+            return true;
+        };
+        let (Some(rms), Some(smallest)) = (row.visible_rms, row.detectable) else {
+            return true;
+        };
+        let length = rms * readings.sqrt() / noise * size / smallest;
+        let rival = row.rivals.iter().find(|(name, _)| name == other);
+        rival.is_none_or(|(_, cosine)| length * (0.5 * cosine.acos()).sin() >= TELL)
+    })
+}
+
+fn strong(diagnosis: &Diagnosis) -> bool {
+    let all = &diagnosis.verdict.severity;
+    !all.is_empty() && all.iter().all(|s| s.confidence == Confidence::Strong)
+}
+
+/// The smallest size of an effect that is seen with 80 %.
+fn seen_from(model: &Model, effect: &str) -> f64 {
+    let bare = (model.diagnosed)(&[], 1, &options(&[], 0));
+    let mut hidden = bare.hidden.iter();
+    let own = hidden.find(|h| h.effect == effect);
+    own.and_then(|h| h.detectable)
+        .unwrap_or_else(|| panic!("{} does not show {effect}", model.name))
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let number = |k: usize, usual: u64| {
+        let given = arguments.get(k).and_then(|a| a.parse().ok());
+        given.unwrap_or(usual)
+    };
+    let (cases, first) = (number(0, 8), number(1, 1));
+    println!("{cases} cases an effect, seed {first}");
+    let chosen = |model: &&Model| arguments.get(2).is_none_or(|name| name == model.name);
+    for model in MODELS.iter().filter(chosen) {
+        table(model, cases, first);
+        agreed(model, cases, first);
+    }
+}
+
+/// What came of one case: named alone, or in its group; strong of these; another named with it withheld,
+/// strong, and the same where these data could have told that one from the withheld.
+fn outcome(model: &Model, effect: &str, smallest: f64, told: &Told, seed: u64) -> [bool; 7] {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let size = smallest * (1.5 + 2.5 * random.random::<f64>());
+    let seed = random.random_range(2..1_000_000);
+    let known = (model.diagnosed)(&[(effect, 4.0 * smallest)], seed, &options(&[], 256));
+    let hidden = (model.diagnosed)(&[(effect, size)], seed, &options(&[effect], 256));
+    let said = judged(&known, Some(effect));
+    let (alone, grouped) = (said == "named alone", said == "in its group");
+    let wrong = judged(&hidden, Some(effect)) == "another named";
+    let mut causes = hidden.verdict.causes().into_iter();
+    let separable = causes.any(|group| group.iter().all(|other| told(effect, other, size)));
+    [
+        alone,
+        grouped,
+        (alone || grouped) && strong(&known),
+        wrong,
+        wrong && strong(&hidden),
+        wrong && separable,
+        wrong && separable && strong(&hidden),
+    ]
+}
+
+fn table(model: &Model, cases: u64, first: u64) {
+    println!("\n### {}\n", model.name);
+    println!(
+        "| effect | at four times: alone | in its group | of both strong | withheld: another named | strong \
+         | another that could be told from it | strong |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    let told = (model.told)();
+    let mut sums = [0; 7];
+    for effect in model.effects {
+        let smallest = seen_from(model, effect);
+        let outcomes: Vec<[bool; 7]> = (0..cases)
+            .into_par_iter()
+            .map(|case| outcome(model, effect, smallest, &told, first * 10_000 + case))
+            .collect();
+        let counts: [usize; 7] = std::array::from_fn(|k| outcomes.iter().filter(|o| o[k]).count());
+        for (sum, count) in sums.iter_mut().zip(counts) {
+            *sum += count;
+        }
+        println!(
+            "| {effect} | {} |",
+            counts.map(|n| n.to_string()).join(" | ")
+        );
+    }
+    let all = cases * model.effects.len() as u64;
+    println!("| of {all} | {} |", sums.map(|n| n.to_string()).join(" | "));
+}
+
+/// Score stage and whole diagnoses, on rivals of names near the limit of detection and well above.
+fn agreed(model: &Model, cases: u64, first: u64) {
+    let mut sum = Agreement::default();
+    for effect in model.effects {
+        let smallest = seen_from(model, effect);
+        for case in 0..cases.div_ceil(4) {
+            let put = [(*effect, smallest * if case % 2 == 0 { 1.5 } else { 4.0 })];
+            let seed = first * 40_000 + case;
+            for own in (model.agreed)(&put, seed, &options(&[], 0)) {
+                sum.cases += own.cases;
+                sum.scored += own.scored;
+                sum.whole += own.whole;
+                sum.both += own.both;
+            }
+        }
+    }
+    println!(
+        "\nRivals named alike: {} by the score stage, {} by whole diagnoses, {} by both, of {}.",
+        sum.scored, sum.whole, sum.both, sum.cases
+    );
+}

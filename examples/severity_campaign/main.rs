@@ -8,6 +8,8 @@ mod makers;
 #[path = "../../tests/other_models/mod.rs"]
 mod other_models;
 
+use std::collections::BTreeMap;
+
 use errsep::diagnosis::{
     Agreement, Confidence, Diagnosability, Diagnosis, NoiseLaw, NoiseSource, Options, agreement,
     certificate, diagnose,
@@ -24,7 +26,8 @@ const EACH: usize = 8;
 /// Quantile of the normal law: two effects are told apart with 99 %.
 const TELL: f64 = 2.326;
 
-/// Whether an effect in place of another, at a size of the latter, can be told from it.
+/// Whether an effect in place of another, at a multiple of the latter's smallest size seen, can be told
+/// from it.
 type Told = Box<dyn Fn(&str, &str, f64) -> bool + Sync>;
 
 /// A model, its makers and what its data show.
@@ -98,24 +101,36 @@ fn options(without: &[&str], severity: usize) -> Options {
     }
 }
 
-/// What the certificate of a measurement says of two effects: at a size with the visible length |Ê| in units
-/// of the noise they are told apart with 99 % from |Ê| sin θ/2 = 2.33 on, θ the angle between them.
+/// What the certificate of a measurement says of two effects: with the visible length |Ê| in units of the
+/// noise they are told apart with 99 % from |Ê| sin θ/2 = 2.33 on, θ the angle between them. An effect that
+/// could only imitate the other at a size that is not plausible is told from it.
 fn told_by<M: FittedModel>(model: &M, noise: f64) -> Told {
     let law = NoiseLaw::white(noise, f64::INFINITY, NoiseSource::Stated);
     let rows = certificate(model, &model.effects(), &law, &options(&[], 0));
     let readings = model.places().len() as f64;
-    Box::new(move |withheld, other, size| {
-        let own = |row: &&Diagnosability| row.effect == withheld;
-        let Some(row) = rows.iter().find(own) else {
+    let cosine = move |of: &Diagnosability, other: &str| {
+        let rival = of.rivals.iter().find(|(name, _)| name == other);
+        rival.map_or(0.0, |(_, cosine)| *cosine)
+    };
+    Box::new(move |withheld, other, times| {
+        let row = |name: &str| rows.iter().find(|row| row.effect == name);
+        let (Some(own), Some(rival)) = (row(withheld), row(other)) else {
             return true;
         };
-        let (Some(rms), Some(smallest)) = (row.visible_rms, row.detectable) else {
-            return true;
-        };
-        let length = rms * readings.sqrt() / noise * size / smallest;
-        let rival = row.rivals.iter().find(|(name, _)| name == other);
-        rival.is_none_or(|(_, cosine)| length * (0.5 * cosine.acos()).sin() >= TELL)
+        let length = own.visible_rms.unwrap_or(0.0) * readings.sqrt() / noise * times;
+        // Each at the middle of its shapes against all shapes of the other: the nearer of both.
+        let nearest = cosine(own, other).max(cosine(rival, withheld));
+        length * (0.5 * nearest.acos()).sin() >= TELL
     })
+}
+
+/// What came of one case.
+struct Outcome {
+    /// Named alone, or in its group; strong of these; another named with it withheld, strong, and the same
+    /// where these data could have told that one from the withheld.
+    counts: [bool; 7],
+    /// Of a right name that is weak the worst rival, of a wrong name the name.
+    said: Vec<String>,
 }
 
 fn strong(diagnosis: &Diagnosis) -> bool {
@@ -147,28 +162,52 @@ fn main() {
     }
 }
 
-/// What came of one case: named alone, or in its group; strong of these; another named with it withheld,
-/// strong, and the same where these data could have told that one from the withheld.
-fn outcome(model: &Model, effect: &str, smallest: f64, told: &Told, seed: u64) -> [bool; 7] {
+fn outcome(model: &Model, effect: &str, smallest: f64, told: &Told, seed: u64) -> Outcome {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let size = smallest * (1.5 + 2.5 * random.random::<f64>());
+    let times = 1.5 + 2.5 * random.random::<f64>();
     let seed = random.random_range(2..1_000_000);
     let known = (model.diagnosed)(&[(effect, 4.0 * smallest)], seed, &options(&[], 256));
-    let hidden = (model.diagnosed)(&[(effect, size)], seed, &options(&[effect], 256));
-    let said = judged(&known, Some(effect));
-    let (alone, grouped) = (said == "named alone", said == "in its group");
+    let hidden = (model.diagnosed)(
+        &[(effect, times * smallest)],
+        seed,
+        &options(&[effect], 256),
+    );
+    let judgement = judged(&known, Some(effect));
+    let (alone, grouped) = (judgement == "named alone", judgement == "in its group");
+    let right = alone || grouped;
     let wrong = judged(&hidden, Some(effect)) == "another named";
     let mut causes = hidden.verdict.causes().into_iter();
-    let separable = causes.any(|group| group.iter().all(|other| told(effect, other, size)));
-    [
-        alone,
-        grouped,
-        (alone || grouped) && strong(&known),
-        wrong,
-        wrong && strong(&hidden),
-        wrong && separable,
-        wrong && separable && strong(&hidden),
-    ]
+    let separable = causes.any(|group| group.iter().all(|other| told(effect, other, times)));
+    let mut said = Vec::new();
+    for severity in known.verdict.severity.iter().filter(|_| right) {
+        if severity.confidence == Confidence::Weak {
+            let worst = &severity.rivals[0];
+            let rival = format!("{} {:.3}", worst.name, worst.probability);
+            said.push(format!(
+                "{effect} weak by {rival}, lower {:.3}",
+                severity.lower
+            ));
+        }
+    }
+    if wrong {
+        let word = if strong(&hidden) { "strong" } else { "weak" };
+        said.push(format!(
+            "{effect} taken for {}, {word}",
+            hidden.verdict.effects.join(" and ")
+        ));
+    }
+    Outcome {
+        counts: [
+            alone,
+            grouped,
+            right && strong(&known),
+            wrong,
+            wrong && strong(&hidden),
+            wrong && separable,
+            wrong && separable && strong(&hidden),
+        ],
+        said,
+    }
 }
 
 fn table(model: &Model, cases: u64, first: u64) {
@@ -180,15 +219,20 @@ fn table(model: &Model, cases: u64, first: u64) {
     println!("|---|---|---|---|---|---|---|---|");
     let told = (model.told)();
     let mut sums = [0; 7];
+    let mut said: BTreeMap<String, usize> = BTreeMap::new();
     for effect in model.effects {
         let smallest = seen_from(model, effect);
-        let outcomes: Vec<[bool; 7]> = (0..cases)
+        let outcomes: Vec<Outcome> = (0..cases)
             .into_par_iter()
             .map(|case| outcome(model, effect, smallest, &told, first * 10_000 + case))
             .collect();
-        let counts: [usize; 7] = std::array::from_fn(|k| outcomes.iter().filter(|o| o[k]).count());
+        let counts: [usize; 7] =
+            std::array::from_fn(|k| outcomes.iter().filter(|o| o.counts[k]).count());
         for (sum, count) in sums.iter_mut().zip(counts) {
             *sum += count;
+        }
+        for what in outcomes.into_iter().flat_map(|outcome| outcome.said) {
+            *said.entry(what).or_default() += 1;
         }
         println!(
             "| {effect} | {} |",
@@ -196,7 +240,13 @@ fn table(model: &Model, cases: u64, first: u64) {
         );
     }
     let all = cases * model.effects.len() as u64;
-    println!("| of {all} | {} |", sums.map(|n| n.to_string()).join(" | "));
+    println!(
+        "| of {all} | {} |\n",
+        sums.map(|n| n.to_string()).join(" | ")
+    );
+    for (what, count) in said {
+        println!("{count} {what}");
+    }
 }
 
 /// Score stage and whole diagnoses, on rivals of names near the limit of detection and well above.

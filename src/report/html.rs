@@ -85,10 +85,12 @@ fn summary(standing: Standing, sentence: &str) -> Markup {
         Standing::Bad => "bad",
         Standing::Neutral => "neutral",
     };
+    // No line begins with the sign of a percentage.
+    let whole = sentence.replace(" %", "\u{a0}%");
     html! {
         div class={ "summary " (class) } {
             strong { (standing.word()) }
-            p { (sentence) }
+            p { (whole) }
         }
     }
 }

@@ -86,42 +86,24 @@ fn nothing(gap: &Gap, hidden: &[Hidden]) -> String {
 
 /// One or several causes, each alone or one of a group.
 fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
-    let described = |effect: &str, weak: &str| {
+    let described = |effect: &str| {
         let candidate = candidates.iter().find(|c| c.effect == effect);
-        let own = candidate.map_or(String::new(), describe);
-        let parts: Vec<&str> = [own.as_str(), weak]
-            .into_iter()
-            .filter(|part| !part.is_empty())
-            .collect();
-        if parts.is_empty() {
-            effect.to_owned()
-        } else {
-            format!("{effect} ({})", parts.join("; "))
-        }
+        format!("{effect}{}", candidate.map_or(String::new(), describe))
     };
     let causes = verdict.causes();
     let open = causes.iter().any(|group| group.len() > 1);
     let said: Vec<String> = causes
         .iter()
         .map(|group| match group[..] {
-            [only] => described(only, &weakness(verdict, only, "this name")),
+            [only] => described(only),
             ref several => {
-                let each: Vec<String> = several.iter().map(|e| described(e, "")).collect();
-                let weak = weakness(verdict, several[0], "one of these names");
-                let weak = if weak.is_empty() {
-                    weak
-                } else {
-                    format!(" ({weak})")
-                };
-                format!("one of: {}{weak}", each.join("; "))
+                let each: Vec<String> = several.iter().map(|e| described(e)).collect();
+                format!("one of: {}", each.join("; "))
             }
         })
         .collect();
     let said = said.join(" and ");
-    let weak = verdict
-        .severity
-        .iter()
-        .any(|s| s.confidence == Confidence::Weak);
+    let weak = weakness(verdict);
     let doubt = if open {
         format!(
             "These readings cannot tell {} apart. To tell them apart: {}.",
@@ -138,20 +120,25 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
             .filter(|c| verdict.effects.contains(&c.effect))
             .map(|c| c.confirm.as_str())
             .collect();
-        let purpose = if weak {
-            "To tell them apart"
-        } else {
+        let purpose = if weak.is_empty() {
             "To confirm"
+        } else {
+            "To tell them apart"
         };
         format!("{purpose}: {}.", confirm.join("; "))
     };
     let missed = gap.before.in_words(gap.unit);
-    let beginning = if gap.before.rms > 0.0 && weak {
-        format!("The model misses {missed}, which is consistent with {said}")
-    } else if gap.before.rms > 0.0 {
-        format!("The model misses {missed} because of {said}")
-    } else {
-        format!("The model misses {missed}, but what stands out of the noise is {said}")
+    let beginning = match (gap.before.rms > 0.0, weak.is_empty()) {
+        (true, true) => format!("The model misses {missed} because of {said}"),
+        (true, false) => {
+            format!("The model misses {missed}, which is consistent ({weak}) with {said}")
+        }
+        (false, true) => {
+            format!("The model misses {missed}, but what stands out of the noise is {said}")
+        }
+        (false, false) => format!(
+            "The model misses {missed}, but what stands out of the noise is consistent ({weak}) with {said}"
+        ),
     };
     let with = if open {
         verdict.effects.join(" and ")
@@ -171,19 +158,34 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
     )
 }
 
-/// What a weak name is worth: what else would be given it. Nothing for one that is strong.
-fn weakness(verdict: &Verdict, effect: &str, name: &str) -> String {
-    let severity = verdict.severity.iter().find(|s| s.effect == effect);
-    let Some(severity) = severity.filter(|s| s.confidence == Confidence::Weak) else {
-        return String::new();
-    };
-    match severity.rivals.first() {
-        Some(worst) if worst.probability > 0.0 => format!(
-            "weak: {} of this size would be given {name} in {} of cases",
-            worst.in_words(),
-            percent(worst.probability)
-        ),
-        _ => format!("weak: too few rivals were drawn to say what else would be given {name}"),
+/// Of each weak name what else would be given it; nothing where all are strong.
+fn weakness(verdict: &Verdict) -> String {
+    let alone = verdict.effects.len() == 1;
+    let weak = verdict
+        .severity
+        .iter()
+        .filter(|s| s.confidence == Confidence::Weak);
+    let each: Vec<String> = weak
+        .map(|severity| {
+            let name = match (alone, verdict.indistinguishable.is_empty()) {
+                (true, true) => "this name".to_owned(),
+                (true, false) => "one of these names".to_owned(),
+                (false, _) => format!("the name {}", severity.effect),
+            };
+            match severity.rivals.first() {
+                Some(worst) if worst.probability > 0.0 => format!(
+                    "{} of this size would be given {name} in {} of cases",
+                    worst.in_words(),
+                    percent(worst.probability)
+                ),
+                _ => format!("too few rivals were drawn to say what else would be given {name}"),
+            }
+        })
+        .collect();
+    if each.is_empty() {
+        String::new()
+    } else {
+        format!("weak: {}", each.join("; "))
     }
 }
 
@@ -197,7 +199,7 @@ fn describe(candidate: &Candidate) -> String {
         let there = detail(Some(&other.variant), &other.parameters);
         format!("; as likely {there}")
     });
-    format!("{own}{}", others.collect::<String>())
+    format!(" ({own}{})", others.collect::<String>())
 }
 
 fn detail(variant: Option<&str>, parameters: &[ParameterOut]) -> String {

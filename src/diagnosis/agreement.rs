@@ -17,7 +17,7 @@ use crate::diagnosis::severity::stage::Name;
 /// Rivals of one family that were named by the score stage and by whole diagnoses.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Agreement {
-    /// The family, by the name that it has in [`crate::diagnosis::Rival`].
+    /// The family, as the rivals of a verdict are named.
     pub family: String,
     /// Rivals.
     pub cases: usize,

@@ -14,9 +14,11 @@ use crate::diagnosis::options::Options;
 use crate::diagnosis::severity::rivals::{Drawn, Family};
 use crate::diagnosis::severity::stage::Name;
 
-/// Rivals that were named by the score stage and by whole diagnoses.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+/// Rivals of one family that were named by the score stage and by whole diagnoses.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Agreement {
+    /// The family, as the rivals of a verdict are named.
+    pub family: String,
     /// Rivals.
     pub cases: usize,
     /// Given the name by the score stage.
@@ -28,35 +30,34 @@ pub struct Agreement {
 }
 
 /// Names what is in a model's readings, draws rivals of every name, `each` of each family, and names
-/// every one by the score stage and by a diagnosis of its own.
-pub fn agreement<M: FittedModel>(model: &M, options: &Options, each: usize) -> Agreement {
+/// every one by the score stage and by a diagnosis of its own. One row for each name and family.
+pub fn agreement<M: FittedModel>(model: &M, options: &Options, each: usize) -> Vec<Agreement> {
     let catalogue = model.effects();
     let readings = model.linearised();
     let law = estimate(model, &readings);
     let context = Context::new(model, &catalogue, law, options.draws, options.seed);
     examined(&context, &readings, options.false_alarm, |found| {
         let Some(answer) = found.found.filter(|answer| answer.complete) else {
-            return Agreement::default();
+            return Vec::new();
         };
         let names = Name::all(found.context, found.readings, &answer, options.false_alarm);
-        let mut sum = Agreement::default();
+        let mut rows = Vec::new();
         for name in &names {
             for family in Family::beside(found.context, &name.members) {
-                add(&mut sum, found.context, name, family, options, each);
+                rows.push(compared(found.context, name, family, options, each));
             }
         }
-        sum
+        rows
     })
 }
 
-fn add<M: FittedModel>(
-    sum: &mut Agreement,
+fn compared<M: FittedModel>(
     context: &Context<'_, M>,
     name: &Name,
     family: Family,
     options: &Options,
     each: usize,
-) {
+) -> Agreement {
     let rivals = Drawn::of(context, name, family, (options.seed, 0), each);
     let scored = name.given(context, &rivals);
     let base = without_misfit(context.model);
@@ -78,10 +79,13 @@ fn add<M: FittedModel>(
         })
         .collect();
     let count = |kept: &dyn Fn(usize) -> bool| (0..rivals.count).filter(|k| kept(*k)).count();
-    sum.cases += rivals.count;
-    sum.scored += count(&|k| scored[k]);
-    sum.whole += count(&|k| whole[k]);
-    sum.both += count(&|k| scored[k] && whole[k]);
+    Agreement {
+        family: family.name(context),
+        cases: rivals.count,
+        scored: count(&|k| scored[k]),
+        whole: count(&|k| whole[k]),
+        both: count(&|k| scored[k] && whole[k]),
+    }
 }
 
 /// Readings that a model fits without a residual.

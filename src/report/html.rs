@@ -85,10 +85,12 @@ fn summary(standing: Standing, sentence: &str) -> Markup {
         Standing::Bad => "bad",
         Standing::Neutral => "neutral",
     };
+    // No line begins with the sign of a percentage.
+    let whole = sentence.replace(" %", "\u{a0}%");
     html! {
         div class={ "summary " (class) } {
             strong { (standing.word()) }
-            p { (sentence) }
+            p { (whole) }
         }
     }
 }
@@ -189,11 +191,15 @@ fn figure(figure: &Figure, values: &mut Values) -> Markup {
         .iter()
         .filter_map(|d| d.thinned)
         .reduce(Thinned::and);
-    let several = drawings.len() > 1;
+    let class = match &drawings[..] {
+        [only] if only.is_small() => "plots small",
+        [_] | [] => "plots",
+        _ => "plots panels",
+    };
     html! {
         figure {
             h3 { (figure.title) }
-            div class=(if several { "plots panels" } else { "plots" }) {
+            div class=(class) {
                 @for drawing in drawings { (svg(drawing, values)) }
             }
             figcaption {

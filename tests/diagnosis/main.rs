@@ -16,5 +16,6 @@ mod realisations;
 #[path = "../scene/mod.rs"]
 mod scene;
 mod several_ways;
+mod severity;
 mod single_effects;
 mod together;

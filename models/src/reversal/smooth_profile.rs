@@ -337,6 +337,31 @@ mod tests {
         );
     }
 
+    /// The place among the positions is that of a search by halving, evenly spaced or not, also outside them
+    /// and for what is no number.
+    /// Wherever it is sought from, a spot lies where halving finds it.
+    #[test]
+    fn a_spot_is_found_from_any_neighbour() {
+        let even: Vec<f64> = (0..12).map(|k| f64::from(k) * 1.5).collect();
+        let uneven: Vec<f64> = even.iter().map(|t| (0.3 * t).exp()).collect();
+        for positions in [even, uneven] {
+            let n = positions.len();
+            let between = (-20..20_000).step_by(7).map(|k| 0.01 * f64::from(k) - 1.5);
+            for x in between.chain(positions.iter().copied()) {
+                let right = positions.partition_point(|p| *p < x);
+                let ends = match right {
+                    0 => (0, 0),
+                    right if right == n => (n - 1, n - 1),
+                    right => (right - 1, right),
+                };
+                for near in [0, n / 2, n, 10 * n] {
+                    let spot = Spot::new(&positions, near, x);
+                    assert_eq!((spot.left, spot.right), ends, "{x} from {near}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_straight_line_is_left_alone() {
         let x = [0.0, 1.0, 2.5, 3.0, 7.0, 8.0];

@@ -3,7 +3,9 @@
 use errsep_models::model::{FittedModel, Place};
 
 use super::words::{harm_in_words, moved, shown};
-use crate::diagnosis::{Diagnosis, Joined, JoinedEffect, Kind, ParameterOut, for_people};
+use crate::diagnosis::{
+    Confidence, Diagnosis, Joined, JoinedEffect, Kind, ParameterOut, for_people,
+};
 use crate::report::diagnosis as sheet;
 
 pub fn view<M: FittedModel>(
@@ -216,6 +218,7 @@ fn severity(severity: &crate::diagnosis::Severity) -> sheet::Severity {
     sheet::Severity {
         effect: severity.effect.clone(),
         line: severity.in_words(),
+        weak: severity.confidence == Confidence::Weak,
         rivals: rivals.map(|r| (r.in_words(), r.probability)).collect(),
     }
 }

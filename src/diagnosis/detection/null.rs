@@ -206,17 +206,27 @@ pub(in crate::diagnosis) fn rows_of(
     let misfits: Vec<f64> = left.column_iter().map(|c| c.norm_squared()).collect();
     let adjoint = seen(dictionary, space, left);
     let mut rows: Vec<Vec<f64>> = vec![vec![0.0; dictionary.families.len()]; BATCH];
-    for (place, family) in dictionary.families.iter().enumerate() {
-        for (order, most) in statistics(dictionary, family, &adjoint) {
-            for (row, t) in rows.iter_mut().zip(most) {
-                row[place] = row[place].max(surprise(t, order));
-            }
-        }
+    for family in 0..dictionary.families.len() {
+        add_surprises(dictionary, family, &adjoint, &mut rows);
     }
     for (row, misfit) in rows.iter_mut().zip(misfits) {
         row.push(misfit);
     }
     rows
+}
+
+/// Sets the surprise of one family in the row of each residual.
+pub(in crate::diagnosis) fn add_surprises(
+    dictionary: &Dictionary,
+    family: usize,
+    adjoint: &Sums<f32, BATCH>,
+    rows: &mut [Vec<f64>],
+) {
+    for (order, most) in statistics(dictionary, &dictionary.families[family], adjoint) {
+        for (row, t) in rows.iter_mut().zip(most) {
+            row[family] = row[family].max(surprise(t, order));
+        }
+    }
 }
 
 /// Residuals as signatures see them. Single precision: this is for laws found by drawing, and

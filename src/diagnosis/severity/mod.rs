@@ -5,6 +5,8 @@
 //! the noise, and named as the diagnosis names (`stage.rs`). One minus the greatest of the
 //! probabilities, over the families, of coming to the same name is the severity.
 
+#[cfg(test)]
+mod named_alike;
 pub(super) mod rivals;
 pub(super) mod stage;
 

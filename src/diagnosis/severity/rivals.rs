@@ -68,6 +68,8 @@ impl Family {
 pub(in crate::diagnosis) struct Drawn {
     pub readings: DMatrix<f64>,
     pub count: usize,
+    /// The family of the dictionary that they were drawn from.
+    pub family: Option<usize>,
 }
 
 impl Drawn {
@@ -113,7 +115,15 @@ impl Drawn {
                 break;
             }
         }
-        Self { readings, count }
+        let family = match family {
+            Family::Effect(k) => context.family_of(k),
+            _ => None,
+        };
+        Self {
+            readings,
+            count,
+            family,
+        }
     }
 }
 

@@ -5,12 +5,14 @@
 //! refined and judged. State and noise stay those of the diagnosis, which makes both anew.
 
 use errsep_models::model::FittedModel;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::confidence::{Answer, possible};
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
-use crate::diagnosis::detection::null::rows_of;
+use crate::diagnosis::detection::dictionary::Dictionary;
+use crate::diagnosis::detection::folding::Sums;
+use crate::diagnosis::detection::null::{BATCH, add_surprises, seen};
 use crate::diagnosis::levels::{EARNED, REFINED, UNSEARCHED};
 use crate::diagnosis::severity::rivals::Drawn;
 
@@ -59,64 +61,132 @@ impl Name {
 
     /// For each rival whether it would have been given this name, and no other beside it.
     pub fn given<M: FittedModel>(&self, context: &Context<'_, M>, rivals: &Drawn) -> Vec<bool> {
-        let (left, _) = context.space.forward(rivals.readings.clone());
-        let rows = rows_of(&context.dictionary, &context.space, left);
-        let families = context.dictionary.families.len();
+        let leading = self.leading(context, rivals);
         (0..rivals.count)
             .into_par_iter()
-            .map(|k| {
-                let row = &rows[k];
-                let alarmed =
-                    context.null.detection(&row[..families], row[families]) <= self.false_alarm;
-                alarmed && self.may_lead(context, row) && {
-                    self.is_found(context, &rivals.readings.column(k).clone_owned())
-                }
-            })
+            .map(|k| leading[k] && self.is_found(context, &rivals.readings.column(k).clone_owned()))
             .collect()
     }
 
-    /// Whether one of the group is the most surprising effect, or may become it by refining.
-    fn may_lead<M: FittedModel>(&self, context: &Context<'_, M>, row: &[f64]) -> bool {
-        let greatest = |member: bool| {
-            (0..context.catalogue.len())
-                .filter(|k| self.members.contains(k) == member)
-                .filter_map(|k| context.family_of(k))
-                .map(|family| row[family])
-                .fold(0.0, f64::max)
+    /// The rivals in which a gap is detected and one of the group is the most surprising effect, or may
+    /// become it by refining. Families are scored only as long as one of the batch may still be such: the
+    /// group first, then what the rivals were drawn from, which mostly leads.
+    fn leading<M: FittedModel>(&self, context: &Context<'_, M>, rivals: &Drawn) -> Vec<bool> {
+        let (left, _) = context.space.forward(rivals.readings.clone());
+        let mut scores = Scores::of(context, left);
+        let members = self.members.iter().filter_map(|k| context.family_of(*k));
+        let members: Vec<usize> = members.collect();
+        let others = (0..context.catalogue.len()).filter_map(|k| context.family_of(k));
+        let others = others.filter(|family| !members.contains(family));
+        let mut others: Vec<usize> = others.collect();
+        others.sort_by_key(|family| rivals.family != Some(*family));
+        let mut own = [0.0f64; BATCH];
+        for &family in &members {
+            scores.add(family);
+            for (own, row) in own.iter_mut().zip(&scores.rows) {
+                *own = own.max(row[family]);
+            }
+        }
+        let mut may: Vec<bool> = (0..rivals.count).map(|k| own[k] > 0.0).collect();
+        for family in others {
+            if !may.contains(&true) {
+                return may;
+            }
+            scores.add(family);
+            for k in 0..may.len() {
+                may[k] &= own[k] >= (1.0 - UNSEARCHED) * scores.rows[k][family];
+            }
+        }
+        // What has been scored may be enough to detect the gap: more of it makes none less probable.
+        let is_detected = |scores: &Scores<'_>, k: usize| {
+            context.null.detection(&scores.rows[k], scores.misfits[k]) <= self.false_alarm
         };
-        let own = greatest(true);
-        own > 0.0 && own >= (1.0 - UNSEARCHED) * greatest(false)
+        if (0..may.len()).any(|k| may[k] && !is_detected(&scores, k)) {
+            (0..context.dictionary.families.len()).for_each(|family| scores.add(family));
+        }
+        (0..may.len())
+            .map(|k| may[k] && is_detected(&scores, k))
+            .collect()
     }
 
     /// Whether refining leaves one of the group first, nothing stands out beside it, and no other
-    /// effect passes in its place.
+    /// effect passes in its place. The others are searched only where one of the group passes.
     fn is_found<M: FittedModel>(&self, context: &Context<'_, M>, readings: &DVector<f64>) -> bool {
         let first = context.remainder(readings, &[]);
-        let refined = refined(context, readings, &first);
-        let Some((best, _)) = refined.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {
-            return false;
-        };
         let passes = |cause: &Cause| {
             let alone = std::slice::from_ref(cause);
             context.adequate(alone, &context.judged(readings, alone))
         };
-        let others = refined
+        let refined = |effect: usize| refined(context, readings, &first, effect);
+        let mut group: Vec<(usize, Cause, f64)> = self
+            .members
             .iter()
-            .filter(|(cause, _)| !self.members.contains(&cause.effect));
-        self.members.contains(&best.effect)
-            && passes(best)
-            && !others.into_iter().any(|(cause, _)| passes(cause))
+            .filter(|effect| stands_out(context, &first, **effect))
+            .filter_map(|&effect| refined(effect).map(|(cause, t)| (effect, cause, t)))
+            .collect();
+        group.sort_by(|a, b| b.2.total_cmp(&a.2));
+        // Which effects are tried is known from all their scores, which need not be found where the only
+        // one of the group does not pass.
+        let is_tried = |effect: usize| ranked(context, &first).contains(&effect);
+        let mut tried = group.iter();
+        let best = tried.find(|(effect, ..)| group.len() == 1 || is_tried(*effect));
+        let Some((effect, cause, most)) = best else {
+            return false;
+        };
+        if !passes(cause) || !is_tried(*effect) {
+            return false;
+        }
+        let ranked = ranked(context, &first);
+        let mut others = Vec::new();
+        for effect in ranked.into_iter().filter(|k| !self.members.contains(k)) {
+            match refined(effect) {
+                Some((_, t)) if t > *most => return false,
+                Some((cause, _)) => others.push(cause),
+                None => {}
+            }
+        }
+        !others.iter().any(passes)
     }
 }
 
-/// The effects that stand out, refined, as far as their sizes are possible.
-fn refined<M: FittedModel>(
-    context: &Context<'_, M>,
-    readings: &DVector<f64>,
-    first: &Remainder,
-) -> Vec<(Cause, f64)> {
+/// Greatest scores of families in the rivals of a batch, found as they are asked for.
+struct Scores<'a> {
+    dictionary: &'a Dictionary,
+    adjoint: Sums<f32, BATCH>,
+    /// Squares of what the fit leaves.
+    misfits: Vec<f64>,
+    /// For each rival the surprise of each family, zero until it is found.
+    rows: Vec<Vec<f64>>,
+    known: Vec<bool>,
+}
+
+impl<'a> Scores<'a> {
+    fn of<M: FittedModel>(context: &'a Context<'_, M>, left: DMatrix<f64>) -> Self {
+        let families = context.dictionary.families.len();
+        Self {
+            dictionary: &context.dictionary,
+            misfits: left.column_iter().map(|c| c.norm_squared()).collect(),
+            adjoint: seen(&context.dictionary, &context.space, left),
+            rows: vec![vec![0.0; families]; BATCH],
+            known: vec![false; families],
+        }
+    }
+
+    fn add(&mut self, family: usize) {
+        if !std::mem::replace(&mut self.known[family], true) {
+            add_surprises(self.dictionary, family, &self.adjoint, &mut self.rows);
+        }
+    }
+}
+
+fn stands_out<M: FittedModel>(context: &Context<'_, M>, first: &Remainder, effect: usize) -> bool {
+    context.p_value(first, effect) < EARNED
+}
+
+/// The effects that stand out most.
+fn ranked<M: FittedModel>(context: &Context<'_, M>, first: &Remainder) -> Vec<usize> {
     let mut ranked: Vec<(f64, usize)> = (0..context.catalogue.len())
-        .filter(|effect| context.p_value(first, *effect) < EARNED)
+        .filter(|effect| stands_out(context, first, *effect))
         .filter_map(|effect| {
             let family = context.family_of(effect)?;
             Some((context.best(first, family).0, effect))
@@ -124,12 +194,17 @@ fn refined<M: FittedModel>(
         .collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     ranked.truncate(REFINED);
-    ranked
-        .into_iter()
-        .filter_map(|(_, effect)| {
-            let start = context.start(first, effect)?;
-            let (cause, t) = context.refine(context.model, readings, effect, start, &[]);
-            possible(context, readings, &[], &cause).then_some((cause, t))
-        })
-        .collect()
+    ranked.into_iter().map(|(_, effect)| effect).collect()
+}
+
+/// An effect refined, where its size is possible.
+fn refined<M: FittedModel>(
+    context: &Context<'_, M>,
+    readings: &DVector<f64>,
+    first: &Remainder,
+    effect: usize,
+) -> Option<(Cause, f64)> {
+    let start = context.start(first, effect)?;
+    let (cause, t) = context.refine(context.model, readings, effect, start, &[]);
+    possible(context, readings, &[], &cause).then_some((cause, t))
 }

@@ -103,6 +103,7 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
         })
         .collect();
     let said = said.join(" and ");
+    let weak = weakness(verdict);
     let doubt = if open {
         format!(
             "These readings cannot tell {} apart. To tell them apart: {}.",
@@ -119,25 +120,25 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
             .filter(|c| verdict.effects.contains(&c.effect))
             .map(|c| c.confirm.as_str())
             .collect();
-        let weak = verdict
-            .severity
-            .iter()
-            .any(|s| s.confidence == Confidence::Weak);
-        let purpose = if weak {
-            "To tell them apart"
-        } else {
+        let purpose = if weak.is_empty() {
             "To confirm"
+        } else {
+            "To tell them apart"
         };
         format!("{purpose}: {}.", confirm.join("; "))
     };
-    let weak = weak_names(verdict);
     let missed = gap.before.in_words(gap.unit);
-    let beginning = if gap.before.rms > 0.0 && !weak.is_empty() {
-        format!("The model misses {missed}, which is consistent with {said}")
-    } else if gap.before.rms > 0.0 {
-        format!("The model misses {missed} because of {said}")
-    } else {
-        format!("The model misses {missed}, but what stands out of the noise is {said}")
+    let beginning = match (gap.before.rms > 0.0, weak.is_empty()) {
+        (true, true) => format!("The model misses {missed} because of {said}"),
+        (true, false) => {
+            format!("The model misses {missed}, which is consistent ({weak}) with {said}")
+        }
+        (false, true) => {
+            format!("The model misses {missed}, but what stands out of the noise is {said}")
+        }
+        (false, false) => format!(
+            "The model misses {missed}, but what stands out of the noise is consistent ({weak}) with {said}"
+        ),
     };
     let with = if open {
         verdict.effects.join(" and ")
@@ -152,37 +153,43 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
         ""
     };
     format!(
-        "{beginning}; with {with} {} remain{more}. {weak}{doubt}",
+        "{beginning}; with {with} {} remain{more}. {doubt}",
         gap.after.in_words(gap.unit)
     )
 }
 
-/// Of each name that is weak, what else would have looked the same.
-fn weak_names(verdict: &Verdict) -> String {
+/// Of each weak name what else would be given it; nothing where all are strong.
+fn weakness(verdict: &Verdict) -> String {
+    let alone = verdict.effects.len() == 1;
     let weak = verdict
         .severity
         .iter()
         .filter(|s| s.confidence == Confidence::Weak);
-    weak.filter_map(|severity| {
-        let worst = severity.rivals.first()?;
-        let whose = if verdict.effects.len() > 1 {
-            format!("as {}", severity.effect)
-        } else {
-            "the same".to_owned()
-        };
-        Some(if worst.probability > 0.0 {
-            format!(
-                "Of {} of this size {} would have looked {whose}. ",
-                worst.in_words(),
-                percent(worst.probability)
-            )
-        } else {
-            format!("Too few rivals were drawn to say what else would have looked {whose}. ")
+    let each: Vec<String> = weak
+        .map(|severity| {
+            let name = match (alone, verdict.indistinguishable.is_empty()) {
+                (true, true) => "this name".to_owned(),
+                (true, false) => "one of these names".to_owned(),
+                (false, _) => format!("the name {}", severity.effect),
+            };
+            match severity.rivals.first() {
+                Some(worst) if worst.probability > 0.0 => format!(
+                    "{} of this size would be given {name} in {} of cases",
+                    worst.in_words(),
+                    percent(worst.probability)
+                ),
+                _ => format!("too few rivals were drawn to say what else would be given {name}"),
+            }
         })
-    })
-    .collect()
+        .collect();
+    if each.is_empty() {
+        String::new()
+    } else {
+        format!("weak: {}", each.join("; "))
+    }
 }
 
+/// Variant and sizes, and the others that are as likely.
 fn describe(candidate: &Candidate) -> String {
     let own = detail(candidate.variant.as_deref(), &candidate.parameters);
     if own.is_empty() {

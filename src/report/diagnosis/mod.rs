@@ -1,6 +1,7 @@
 //! The page of a diagnosis: the verdict, how far the gap shrinks, where it lies, what causes it,
 //! what it had done to the answer, and what these data cannot show.
 
+mod severity;
 mod view;
 
 pub use view::{
@@ -15,6 +16,7 @@ use super::{Cell, Figure, KeyFigure, Order, Page, Section, Standing, Table, numb
 pub fn page(view: &View) -> Page {
     let standing = match view.finding {
         Finding::None => Standing::Good,
+        Finding::Effect if view.severities.iter().any(|s| s.weak) => Standing::Caution,
         Finding::Effect => Standing::Neutral,
         Finding::Unknown => Standing::Caution,
     };
@@ -23,7 +25,7 @@ pub fn page(view: &View) -> Page {
         .section(gap(view))
         .section(residuals(view))
         .section(causes(view))
-        .section(severities(view))
+        .section(severity::section(view))
         .section(places(view))
         .section(shifts(view))
         .section(hidden(view))
@@ -236,24 +238,6 @@ fn causes(view: &View) -> Section {
             .rows(rows)
             .sorted_by(1, Order::Descending),
         )
-}
-
-/// Worst rivals of a name that the page shows.
-const WORST: usize = 6;
-
-fn severities(view: &View) -> Section {
-    let mut section = Section::new("What else would have looked the same");
-    for severity in &view.severities {
-        let rows = severity.rivals.iter().take(WORST);
-        section = section.paragraph(severity.line.clone()).table(
-            Table::new(
-                format!("Rivals of {}", severity.effect),
-                ["gap of the same size made by", "named the same"],
-            )
-            .rows(rows.map(|(name, share)| [name.clone().into(), Cell::Share(*share)])),
-        );
-    }
-    section
 }
 
 fn places(view: &View) -> Section {

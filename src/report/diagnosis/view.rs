@@ -58,6 +58,8 @@ pub struct Severity {
     pub effect: String,
     /// The severity in a line.
     pub line: String,
+    /// Whether something else may well have been given the name.
+    pub weak: bool,
     /// Rivals and the probability of each, the greatest first.
     pub rivals: Vec<(String, f64)>,
 }

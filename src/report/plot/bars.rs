@@ -59,7 +59,11 @@ pub struct Bars {
     axis: Axis,
     bars: Vec<Bar>,
     rules: Vec<(f64, String)>,
+    width: f64,
 }
+
+/// Width of a small chart: on a telephone its text is hardly smaller than that of the page.
+const SMALL: f64 = 420.0;
 
 impl Bars {
     /// An empty chart of a quantity.
@@ -68,7 +72,15 @@ impl Bars {
             axis,
             bars: Vec::new(),
             rules: Vec::new(),
+            width: Frame::WIDE.width,
         }
+    }
+
+    /// A chart that is read at a glance, on a telephone without being moved.
+    #[must_use]
+    pub const fn small(mut self) -> Self {
+        self.width = SMALL;
+        self
     }
 
     /// Adds a bar.
@@ -93,7 +105,7 @@ impl Bars {
     }
 
     pub(super) fn drawing(&self) -> Drawing {
-        let width = Frame::WIDE.width;
+        let width = self.width;
         let domain = self
             .bars
             .iter()
@@ -129,6 +141,7 @@ impl Bars {
         let ticks = x.ticks((area.width / 70.0) as usize, false);
         let title = ticks.title(&self.axis.quantity, &self.axis.unit);
         let zero = x.at(0.0);
+        let row = |k: usize| area.top + (k as f64 + 0.5) * ROW;
         let body = html! {
             g class="axes" {
                 @for (value, label) in &ticks.marks {
@@ -141,7 +154,7 @@ impl Bars {
                     y=(c(area.bottom() + 38.0)) { (title) }
             }
             @for (k, bar) in self.bars.iter().enumerate() {
-                (draw(bar, area.top + (k as f64 + 0.5) * ROW, zero, &x, &area))
+                (draw(bar, row(k), zero, &x))
             }
             @for (value, label) in &self.rules {
                 @if drawable(*value, false) {
@@ -149,6 +162,10 @@ impl Bars {
                     path class="rule" d={ "M" (c(at)) " " (c(area.top)) "V" (c(area.bottom())) } {}
                     text class="label middle" x=(c(at)) y="16" { (label) }
                 }
+            }
+            // Over the rules, so that none runs through a number.
+            @for (k, bar) in self.bars.iter().enumerate() {
+                (words(bar, row(k), zero, &x, &area))
             }
         };
         let told: Vec<String> = self
@@ -174,7 +191,8 @@ fn caption(bar: &Bar) -> String {
     }
 }
 
-fn draw(bar: &Bar, y: f64, zero: f64, x: &Scale, area: &Area) -> Markup {
+/// Where a bar ends, and its whiskers.
+fn reach(bar: &Bar, zero: f64, x: &Scale) -> (f64, Option<(f64, f64)>) {
     let end = if drawable(bar.value, false) {
         x.at(bar.value)
     } else {
@@ -184,14 +202,25 @@ fn draw(bar: &Bar, y: f64, zero: f64, x: &Scale, area: &Area) -> Markup {
         .interval
         .filter(|(a, b)| drawable(*a, false) && drawable(*b, false))
         .map(|(a, b)| (x.at(a), x.at(b)));
-    let far = whiskers.map_or(end, |(_, b)| end.max(b)).max(zero);
+    (end, whiskers)
+}
+
+fn draw(bar: &Bar, y: f64, zero: f64, x: &Scale) -> Markup {
+    let (end, whiskers) = reach(bar, zero, x);
     html! {
-        text class="bar-name end" x=(c(area.left - 8.0)) y=(c(y + 4.5)) { (fitted(&bar.name, NAMES)) }
         rect class=(if bar.strong { "bar" } else { "bar faint" }) x=(c(zero.min(end))) y=(c(y - 8.0))
             width=(c((end - zero).abs())) height="16" {}
         @if let Some((a, b)) = whiskers {
             path class="whisker" d={ "M" (c(a)) " " (c(y - 4.0)) "v8m0 -4H" (c(b)) "m0 -4v8" } {}
         }
+    }
+}
+
+fn words(bar: &Bar, y: f64, zero: f64, x: &Scale, area: &Area) -> Markup {
+    let (end, whiskers) = reach(bar, zero, x);
+    let far = whiskers.map_or(end, |(_, b)| end.max(b)).max(zero);
+    html! {
+        text class="bar-name end" x=(c(area.left - 8.0)) y=(c(y + 4.5)) { (fitted(&bar.name, NAMES)) }
         text class="label" x=(c(far + 6.0)) y=(c(y + 4.5)) { (caption(bar)) }
     }
 }

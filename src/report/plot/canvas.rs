@@ -78,6 +78,13 @@ pub(crate) struct Drawing {
     pub(crate) thinned: Option<Thinned>,
 }
 
+impl Drawing {
+    /// Whether its text can be read on a telephone without moving it.
+    pub(in crate::report) fn is_small(&self) -> bool {
+        self.size.0 <= Frame::PANEL.width
+    }
+}
+
 /// How a drawing holds less than the data it was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Thinned {

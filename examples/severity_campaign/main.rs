@@ -1,0 +1,272 @@
+//! What a named effect is worth: `cargo run --release --example severity_campaign -- CASES SEED MODEL`. For each
+//! effect at four times the size that is seen with 80 %: how often it is named, and strong; with it withheld
+//! at 1.5 to 4 times: how often another is named, and strong, and how often that is one which these data
+//! could have told from the withheld one at its size. Then how often score stage and whole diagnosis agree
+//! on rivals.
+
+mod makers;
+#[path = "../../tests/other_models/mod.rs"]
+mod other_models;
+
+use std::collections::BTreeMap;
+
+use errsep::diagnosis::{
+    Agreement, Confidence, Diagnosability, Diagnosis, NoiseLaw, NoiseSource, Options, agreement,
+    certificate, diagnose,
+};
+use errsep_models::model::FittedModel;
+use makers::Put;
+use other_models::{calibration_line_made, fourier_made, judged};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+/// Rivals of each family that are named in both ways, for one measurement.
+const EACH: usize = 8;
+/// Quantile of the normal law: two effects are told apart with 99 %.
+const TELL: f64 = 2.326;
+
+/// Whether an effect in place of another, at a multiple of the latter's smallest size seen, can be told
+/// from it.
+type Told = Box<dyn Fn(&str, &str, f64) -> bool + Sync>;
+
+/// A model, its makers and what its data show.
+struct Model {
+    name: &'static str,
+    effects: &'static [&'static str],
+    diagnosed: fn(Put<'_>, u64, &Options) -> Diagnosis,
+    agreed: fn(Put<'_>, u64, &Options) -> Vec<Agreement>,
+    told: fn() -> Told,
+}
+
+macro_rules! model {
+    ($name:literal, $effects:expr, $made:expr, $noise:expr) => {
+        Model {
+            name: $name,
+            effects: &$effects,
+            diagnosed: |put, seed, options| diagnose(&$made(put, seed), options),
+            agreed: |put, seed, options| agreement(&$made(put, seed), options, EACH),
+            told: || told_by(&$made(&[], 1), $noise),
+        }
+    };
+}
+
+const MODELS: [Model; 5] = [
+    model!(
+        "calibration-line",
+        [
+            "cubic",
+            "drift",
+            "logarithmic",
+            "quadratic",
+            "saturation",
+            "set-offset",
+            "square-root"
+        ],
+        |put: Put<'_>, seed| calibration_line_made(put, seed, 1.0),
+        1e-3
+    ),
+    model!(
+        "fourier",
+        ["height-difference", "probe-spacing", "yaw"],
+        |put: Put<'_>, seed| fourier_made(put, seed, 1.0),
+        1.0
+    ),
+    model!(
+        "circle",
+        ["lobes", "outlier", "ovality", "scale-mismatch"],
+        makers::circle,
+        makers::CIRCLE_NOISE
+    ),
+    model!(
+        "four-sensor",
+        ["drift", "gain", "sensor-position"],
+        makers::four_sensor,
+        makers::SENSOR_NOISE
+    ),
+    model!(
+        "step-diagonal",
+        ["angular-error", "drift", "mirror-misalignment"],
+        makers::step_diagonal,
+        makers::LASER_NOISE
+    ),
+];
+
+fn options(without: &[&str], severity: usize) -> Options {
+    Options {
+        draws: 400,
+        without: without.iter().map(|s| (*s).to_owned()).collect(),
+        severity,
+        ..Options::default()
+    }
+}
+
+/// What the certificate of a measurement says of two effects: with the visible length |Ê| in units of the
+/// noise they are told apart with 99 % from |Ê| sin θ/2 = 2.33 on, θ the angle between them. An effect that
+/// could only imitate the other at a size that is not plausible is told from it.
+fn told_by<M: FittedModel>(model: &M, noise: f64) -> Told {
+    let law = NoiseLaw::white(noise, f64::INFINITY, NoiseSource::Stated);
+    let rows = certificate(model, &model.effects(), &law, &options(&[], 0));
+    let readings = model.places().len() as f64;
+    let cosine = move |of: &Diagnosability, other: &str| {
+        let rival = of.rivals.iter().find(|(name, _)| name == other);
+        rival.map_or(0.0, |(_, cosine)| *cosine)
+    };
+    Box::new(move |withheld, other, times| {
+        let row = |name: &str| rows.iter().find(|row| row.effect == name);
+        let (Some(own), Some(rival)) = (row(withheld), row(other)) else {
+            return true;
+        };
+        let length = own.visible_rms.unwrap_or(0.0) * readings.sqrt() / noise * times;
+        // Each at the middle of its shapes against all shapes of the other: the nearer of both.
+        let nearest = cosine(own, other).max(cosine(rival, withheld));
+        length * (0.5 * nearest.acos()).sin() >= TELL
+    })
+}
+
+/// What came of one case.
+struct Outcome {
+    /// Named alone, or in its group; strong of these; another named with it withheld, strong, and the same
+    /// where these data could have told that one from the withheld.
+    counts: [bool; 7],
+    /// Of a right name that is weak the worst rival, of a wrong name the name.
+    said: Vec<String>,
+}
+
+fn strong(diagnosis: &Diagnosis) -> bool {
+    let all = &diagnosis.verdict.severity;
+    !all.is_empty() && all.iter().all(|s| s.confidence == Confidence::Strong)
+}
+
+/// The smallest size of an effect that is seen with 80 %.
+fn seen_from(model: &Model, effect: &str) -> f64 {
+    let bare = (model.diagnosed)(&[], 1, &options(&[], 0));
+    let mut hidden = bare.hidden.iter();
+    let own = hidden.find(|h| h.effect == effect);
+    own.and_then(|h| h.detectable)
+        .unwrap_or_else(|| panic!("{} does not show {effect}", model.name))
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let number = |k: usize, usual: u64| {
+        let given = arguments.get(k).and_then(|a| a.parse().ok());
+        given.unwrap_or(usual)
+    };
+    let (cases, first) = (number(0, 8), number(1, 1));
+    println!("{cases} cases an effect, seed {first}");
+    let chosen = |model: &&Model| arguments.get(2).is_none_or(|name| name == model.name);
+    for model in MODELS.iter().filter(chosen) {
+        table(model, cases, first);
+        agreed(model, cases, first);
+    }
+}
+
+fn outcome(model: &Model, effect: &str, smallest: f64, told: &Told, seed: u64) -> Outcome {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let times = 1.5 + 2.5 * random.random::<f64>();
+    let seed = random.random_range(2..1_000_000);
+    let known = (model.diagnosed)(&[(effect, 4.0 * smallest)], seed, &options(&[], 256));
+    let hidden = (model.diagnosed)(
+        &[(effect, times * smallest)],
+        seed,
+        &options(&[effect], 256),
+    );
+    let judgement = judged(&known, Some(effect));
+    let (alone, grouped) = (judgement == "named alone", judgement == "in its group");
+    let right = alone || grouped;
+    let wrong = judged(&hidden, Some(effect)) == "another named";
+    let mut causes = hidden.verdict.causes().into_iter();
+    let separable = causes.any(|group| group.iter().all(|other| told(effect, other, times)));
+    let mut said = Vec::new();
+    for severity in known.verdict.severity.iter().filter(|_| right) {
+        if severity.confidence == Confidence::Weak {
+            let worst = &severity.rivals[0];
+            let rival = format!("{} {:.3}", worst.name, worst.probability);
+            said.push(format!(
+                "{effect} weak by {rival}, lower {:.3}",
+                severity.lower
+            ));
+        }
+    }
+    if wrong {
+        let word = if strong(&hidden) { "strong" } else { "weak" };
+        said.push(format!(
+            "{effect} taken for {}, {word}",
+            hidden.verdict.effects.join(" and ")
+        ));
+    }
+    Outcome {
+        counts: [
+            alone,
+            grouped,
+            right && strong(&known),
+            wrong,
+            wrong && strong(&hidden),
+            wrong && separable,
+            wrong && separable && strong(&hidden),
+        ],
+        said,
+    }
+}
+
+fn table(model: &Model, cases: u64, first: u64) {
+    println!("\n### {}\n", model.name);
+    println!(
+        "| effect | at four times: alone | in its group | of both strong | withheld: another named | strong \
+         | another that could be told from it | strong |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    let told = (model.told)();
+    let mut sums = [0; 7];
+    let mut said: BTreeMap<String, usize> = BTreeMap::new();
+    for effect in model.effects {
+        let smallest = seen_from(model, effect);
+        let outcomes: Vec<Outcome> = (0..cases)
+            .into_par_iter()
+            .map(|case| outcome(model, effect, smallest, &told, first * 10_000 + case))
+            .collect();
+        let counts: [usize; 7] =
+            std::array::from_fn(|k| outcomes.iter().filter(|o| o.counts[k]).count());
+        for (sum, count) in sums.iter_mut().zip(counts) {
+            *sum += count;
+        }
+        for what in outcomes.into_iter().flat_map(|outcome| outcome.said) {
+            *said.entry(what).or_default() += 1;
+        }
+        println!(
+            "| {effect} | {} |",
+            counts.map(|n| n.to_string()).join(" | ")
+        );
+    }
+    let all = cases * model.effects.len() as u64;
+    println!(
+        "| of {all} | {} |\n",
+        sums.map(|n| n.to_string()).join(" | ")
+    );
+    for (what, count) in said {
+        println!("{count} {what}");
+    }
+}
+
+/// Score stage and whole diagnoses, on rivals of names near the limit of detection and well above.
+fn agreed(model: &Model, cases: u64, first: u64) {
+    let mut sum = Agreement::default();
+    for effect in model.effects {
+        let smallest = seen_from(model, effect);
+        for case in 0..cases.div_ceil(4) {
+            let put = [(*effect, smallest * if case % 2 == 0 { 1.5 } else { 4.0 })];
+            let seed = first * 40_000 + case;
+            for own in (model.agreed)(&put, seed, &options(&[], 0)) {
+                sum.cases += own.cases;
+                sum.scored += own.scored;
+                sum.whole += own.whole;
+                sum.both += own.both;
+            }
+        }
+    }
+    println!(
+        "\nRivals named alike: {} by the score stage, {} by whole diagnoses, {} by both, of {}.",
+        sum.scored, sum.whole, sum.both, sum.cases
+    );
+}

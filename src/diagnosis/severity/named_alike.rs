@@ -1,0 +1,136 @@
+//! What the score stage spares changes nothing: beside it stands the same judgement without any order or
+//! early end.
+
+use errsep_models::calibration_line::CalibrationLine;
+use errsep_models::calibration_line::simulate::{CalibrationSimulation, Disturbance, simulate};
+use errsep_models::model::FittedModel;
+
+use crate::diagnosis::attribution::confidence::possible;
+use crate::diagnosis::attribution::context::{Cause, Context};
+use crate::diagnosis::attribution::examined::examined;
+use crate::diagnosis::detection::estimate::estimate;
+use crate::diagnosis::detection::null::rows_of;
+use crate::diagnosis::levels::{EARNED, REFINED, UNSEARCHED};
+use crate::diagnosis::severity::rivals::{Drawn, Family};
+use crate::diagnosis::severity::stage::Name;
+
+/// Four sets of twenty loads, noise of 1.
+fn line(disturbance: Disturbance, seed: u64) -> CalibrationLine {
+    let what = CalibrationSimulation {
+        line: [0.5, 2.0],
+        full_scale: 1000.0,
+        loads: 20,
+        sets: 4,
+        noise: 1.0,
+        disturbances: vec![disturbance],
+    };
+    CalibrationLine::new(&simulate(&what, seed).unwrap(), None).unwrap()
+}
+
+/// For each rival whether it is named alike: all families scored, all effects that stand out refined.
+fn given_plainly<M: FittedModel>(
+    context: &Context<'_, M>,
+    name: &Name,
+    rivals: &Drawn,
+) -> Vec<bool> {
+    let (left, _) = context.space.forward(rivals.readings.clone());
+    let rows = rows_of(&context.dictionary, &context.space, left);
+    let count = context.dictionary.families.len();
+    let greatest = |row: &[f64], member: bool| {
+        (0..context.catalogue.len())
+            .filter(|k| name.members.contains(k) == member)
+            .filter_map(|k| context.family_of(k))
+            .map(|family| row[family])
+            .fold(0.0, f64::max)
+    };
+    (0..rivals.count)
+        .map(|k| {
+            let row = &rows[k];
+            let own = greatest(row, true);
+            context.null.detection(&row[..count], row[count]) <= name.false_alarm
+                && own > 0.0
+                && own >= (1.0 - UNSEARCHED) * greatest(row, false)
+                && is_first(context, name, rivals, k)
+        })
+        .collect()
+}
+
+fn is_first<M: FittedModel>(
+    context: &Context<'_, M>,
+    name: &Name,
+    rivals: &Drawn,
+    rival: usize,
+) -> bool {
+    let readings = rivals.readings.column(rival).clone_owned();
+    let first = context.remainder(&readings, &[]);
+    let mut ranked: Vec<(f64, usize)> = (0..context.catalogue.len())
+        .filter(|effect| context.p_value(&first, *effect) < EARNED)
+        .filter_map(|effect| Some((context.best(&first, context.family_of(effect)?).0, effect)))
+        .collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranked.truncate(REFINED);
+    let refined: Vec<(Cause, f64)> = ranked
+        .into_iter()
+        .filter_map(|(_, effect)| {
+            let start = context.start(&first, effect)?;
+            let (cause, t) = context.refine(context.model, &readings, effect, start, &[]);
+            possible(context, &readings, &[], &cause).then_some((cause, t))
+        })
+        .collect();
+    let passes = |cause: &Cause| {
+        let alone = std::slice::from_ref(cause);
+        context.adequate(alone, &context.judged(&readings, alone))
+    };
+    let of_group = |cause: &Cause| name.members.contains(&cause.effect);
+    let others: Vec<bool> = refined
+        .iter()
+        .filter(|(cause, _)| !of_group(cause))
+        .map(|(cause, _)| passes(cause))
+        .collect();
+    let best = refined.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    best.is_some_and(|(cause, _)| of_group(cause) && passes(cause)) && !others.contains(&true)
+}
+
+/// A drift near the limit of detection, of which smooth errors are often named alike, and a bend, of which
+/// several effects are a group.
+#[test]
+fn nothing_is_lost_by_the_order_of_the_score_stage() {
+    let (drift, quadratic) = (
+        Disturbance::Drift {
+            drift: 4.0,
+            constant: 0.3,
+        },
+        Disturbance::Quadratic(6.0),
+    );
+    for (disturbance, seed) in [(drift, 2), (quadratic, 1)] {
+        let model = line(disturbance, seed);
+        let catalogue = model.effects();
+        let readings = model.linearised();
+        let law = estimate(&model, &readings);
+        let context = Context::new(&model, &catalogue, law, 200, 1);
+        examined(&context, &readings, 0.01, |found| {
+            let answer = found.found.expect("a gap this large is explained");
+            let context = found.context;
+            let mut alike = 0;
+            for name in Name::all(context, found.readings, &answer, 0.01) {
+                for family in Family::beside(context, &name.members) {
+                    let rivals = Drawn::of(context, &name, family, (1, 0), 32);
+                    let given = name.given(context, &rivals);
+                    // Exact limit: the same questions, asked in another order.
+                    assert_eq!(
+                        given,
+                        given_plainly(context, &name, &rivals),
+                        "{} by {}",
+                        name.effect,
+                        family.name(context)
+                    );
+                    alike += given.iter().filter(|g| **g).count();
+                }
+            }
+            assert!(
+                alike >= 5,
+                "{alike} named alike: there is little to compare"
+            );
+        });
+    }
+}

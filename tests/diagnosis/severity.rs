@@ -1,0 +1,99 @@
+//! What a name is worth, on calibration lines: names far above and near the limit of detection, by whole
+//! diagnoses, and by any number of threads.
+
+use errsep::diagnosis::{Confidence, Diagnosis, Options, agreement, diagnose};
+
+use crate::other_models::{MAKERS, Maker, calibration_line_made, seen_from};
+
+fn options(severity: usize) -> Options {
+    Options {
+        draws: 200,
+        severity,
+        ..Options::default()
+    }
+}
+
+fn calibration_line() -> &'static Maker {
+    let mut makers = MAKERS.iter();
+    makers.find(|m| m.model == "calibration-line").unwrap()
+}
+
+/// Four sets with a drift of a number of times the smallest that is seen.
+fn drifting(times: f64) -> [(&'static str, f64); 1] {
+    let smallest = seen_from(calibration_line(), "drift", &options(0));
+    [("drift", times * smallest)]
+}
+
+fn only(diagnosis: &Diagnosis) -> &errsep::diagnosis::Severity {
+    match &diagnosis.verdict.severity[..] {
+        [only] => only,
+        several => panic!("{several:?}: {}", diagnosis.verdict.statement),
+    }
+}
+
+#[test]
+fn a_drift_far_above_the_noise_is_strong() {
+    let diagnosis = (calibration_line().diagnosed)(&drifting(4.0), 7, &options(256));
+    let severity = only(&diagnosis);
+    assert_eq!(severity.effect, "drift");
+    // Quantile: the lower limit of 95 % of which a name is strong.
+    assert!(severity.lower >= 0.95, "{severity:?}");
+    assert_eq!(severity.confidence, Confidence::Strong);
+    let said = &diagnosis.verdict.statement;
+    assert!(
+        said.contains("because of drift") && !said.contains("weak"),
+        "{said}"
+    );
+}
+
+/// Near the limit of detection a smooth function of the time is taken for a drift: the name is weak, its
+/// first sentence says so, and whole diagnoses of the rivals say it as often as the score stage.
+#[test]
+fn a_drift_that_any_smooth_function_of_time_imitates_is_weak() {
+    let put = drifting(1.3);
+    // Near the limit not every measurement is given a name: the first that is.
+    let made = (2..12).map(|seed| calibration_line_made(&put, seed, 1.0));
+    let named = made.map(|line| (diagnose(&line, &options(0)), line));
+    let mut alone = named.filter(|(d, _)| d.verdict.causes() == [["drift"]]);
+    let (_, line) = alone.next().expect("one of ten drifts is named alone");
+    let diagnosis = diagnose(&line, &options(256));
+    let severity = only(&diagnosis);
+    assert_eq!(severity.effect, "drift");
+    assert_eq!(severity.confidence, Confidence::Weak);
+    assert_eq!(severity.rivals[0].name, "smooth in time");
+    let said = &diagnosis.verdict.statement;
+    let weak = "weak: smooth errors in time of this size would be given this name in ";
+    assert!(
+        said.contains(weak) && said.find(weak) < said.find(". "),
+        "{said}"
+    );
+
+    let rows = agreement(&line, &options(0), 40);
+    let time = rows
+        .iter()
+        .find(|row| row.family == "smooth in time")
+        .unwrap();
+    assert!(time.cases == 40 && time.scored >= 4, "{time:?}");
+    // k·u: where one of two judgements of the same rivals says so and the other does not, either way is
+    // as probable (McNemar); three standard deviations of the difference.
+    let (once, other) = (time.scored - time.both, time.whole - time.both);
+    let apart = once.abs_diff(other) as f64;
+    assert!(apart <= 3.0 * ((once + other) as f64).sqrt(), "{time:?}");
+    // Nor do they differ in more than a quarter of the rivals.
+    assert!(4 * (once + other) <= time.cases, "{time:?}");
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_severity() {
+    let line = calibration_line_made(&drifting(1.5), 3, 1.0);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let pool = pool.build().unwrap();
+        pool.install(|| only(&diagnose(&line, &options(256))).clone())
+    };
+    let (one, two) = (on(1), on(2));
+    assert!(one.rivals.iter().any(|rival| rival.probability > 0.0));
+    // Exact limit: the same bits.
+    assert_eq!(format!("{one:?}"), format!("{two:?}"));
+    assert_eq!(one, two);
+}

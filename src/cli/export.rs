@@ -1,4 +1,4 @@
-//! `errsep export`: a result as the compensation file of a controller.
+//! `errsep export`: a result as the compensation file of a controller, or as a calibration certificate.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -7,18 +7,19 @@ use clap::ValueEnum;
 use serde_json::json;
 
 use super::{Answer, CommonArgs, Format};
-use crate::export::{self, Exported, FORMATS, Grid, Request, Unit};
-use crate::io::message::{list, nearest};
+use crate::export::{self, Admin, Exported, FORMATS, Grid, Kind, Request, Unit};
+use crate::io::message::nearest;
 use crate::io::provenance::Provenance;
 use crate::io::source::begin_record;
 use crate::io::{Message, OutFile, Status, printable};
 use crate::report::{Page, Section};
 
-/// The compensation file of a controller from a result, with what it says in a side file.
+/// The compensation file of a controller, or a calibration certificate, from a result, with what it says in a
+/// side file.
 #[derive(Debug, clap::Args)]
 #[command(after_help = formats_help(), after_long_help = formats_help())]
 pub struct Args {
-    /// Format of the controller (below).
+    /// Format (below).
     #[arg(value_name = "FORMAT")]
     format_name: String,
     /// The result (result.json, or what --format json printed); a machine (TOML) for the 21 errors.
@@ -46,6 +47,9 @@ pub struct Args {
     /// Travel of an axis whose errors are polynomials, such as X=0:500, mm; may be given several times.
     #[arg(long, value_name = "AXIS=FROM:TO", value_parser = parse_travel)]
     travel: Vec<(char, f64, f64)>,
+    /// Laboratory, person, item, customer and dates of a certificate (TOML).
+    #[arg(long, value_name = "ADMIN.toml")]
+    admin: Option<PathBuf>,
     /// Replace the two files if they are there.
     #[arg(long)]
     force: bool,
@@ -67,7 +71,8 @@ fn formats_help() -> String {
     for format in FORMATS {
         text += &format!("  {:15} {}\n", format.name, format.meaning);
     }
-    text + "\nExample: errsep export linuxcnc positioning/result.json --out x.comp"
+    text + "\nExamples: errsep export linuxcnc positioning/result.json --out x.comp\n          \
+            errsep export dcc reversal/result.json --admin admin.toml --out certificate.xml"
 }
 
 fn parse_travel(text: &str) -> Result<(char, f64, f64), String> {
@@ -116,19 +121,30 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         );
     }
     let about_path = about_path(&args.out);
-    let place = |path: &Path| reserve(path, &args.result, args.force);
+    if args.admin.is_some() && format.takes != Kind::Numbers {
+        return Err(
+            Message::bad_input(format!("{} has no use for --admin", format.name))
+                .remedy("leave it out"),
+        );
+    }
+    let inputs: Vec<PathBuf> = [Some(&args.result), args.admin.as_ref()]
+        .into_iter()
+        .flatten()
+        .cloned()
+        .collect();
+    let place = |path: &Path| reserve(path, &inputs, args.force);
     let (file, about_file) = (place(&args.out)?, place(&about_path)?);
     // The side file names the result by its digest, however the answer is printed.
     begin_record(true);
-    let (content, schema) = export::read(&args.result)?;
-    if !format.takes.is_in(&content) {
-        return Err(not_taken(format, &schema, &content, &args.result));
-    }
-    let exported = (format.write)(&content, &request(args))?;
+    let loaded = export::read(&args.result)?;
+    let content = loaded
+        .content(format)
+        .map_err(|message| message.in_file(&args.result))?;
+    let exported = (format.write)(content, &request(args)?)?;
     let mut about = exported.about(format.name);
-    let provenance = Provenance::of(&[], [args.result.as_path()], None)?;
+    let provenance = Provenance::of(&[], inputs.iter().map(PathBuf::as_path), None)?;
     let provenance = serde_json::to_value(&provenance).map_err(|e| unwritable(&e))?;
-    about["result"] = json!({"schema": schema, "sha256": provenance["inputs"][0]["sha256"]});
+    about["result"] = json!({"schema": loaded.schema, "sha256": provenance["inputs"][0]["sha256"]});
     let pretty = serde_json::to_string_pretty(&about).map_err(|e| unwritable(&e))?;
     about_file.write((printable::json(&pretty) + "\n").as_bytes())?;
     if let Err(message) = file.write(exported.text.as_bytes()) {
@@ -144,7 +160,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         json: about,
         tables: Vec::new(),
         setup: None,
-        inputs: vec![args.result.clone()],
+        inputs,
         seed: None,
         status: Status::Done,
     })
@@ -154,8 +170,8 @@ fn unwritable(error: &serde_json::Error) -> Message {
     Message::bad_input(format!("the side file cannot be written: {error}"))
 }
 
-fn request(args: &Args) -> Request {
-    Request {
+fn request(args: &Args) -> Result<Request, Message> {
+    Ok(Request {
         axis: args.axis.clone(),
         unit: args.unit.map(|unit| match unit {
             UnitName::Mm => Unit::Mm,
@@ -168,7 +184,8 @@ fn request(args: &Args) -> Request {
             (None, None) => None,
         },
         travel: args.travel.clone(),
-    }
+        admin: args.admin.as_deref().map(Admin::read).transpose()?,
+    })
 }
 
 /// `FILE.about.json`.
@@ -178,7 +195,7 @@ fn about_path(file: &Path) -> PathBuf {
     name.into()
 }
 
-fn reserve(path: &Path, result: &Path, force: bool) -> Result<OutFile, Message> {
+fn reserve(path: &Path, inputs: &[PathBuf], force: bool) -> Result<OutFile, Message> {
     if !force {
         return OutFile::reserve(path);
     }
@@ -186,8 +203,12 @@ fn reserve(path: &Path, result: &Path, force: bool) -> Result<OutFile, Message> 
         (Ok(a), Ok(b)) => a == b,
         _ => false,
     };
-    if same(path, result) {
-        return Err(Message::bad_input("is the result that is to be exported")
+    if let Some(place) = inputs.iter().position(|input| same(path, input)) {
+        let what = [
+            "is the result that is to be exported",
+            "is the file of --admin",
+        ][place.min(1)];
+        return Err(Message::bad_input(what)
             .in_file(path)
             .remedy("give another name as --out"));
     }
@@ -202,26 +223,6 @@ fn unknown(name: &str) -> Message {
             None => format!("there are {}", known.join(", ")),
         },
     )
-}
-
-fn not_taken(
-    format: &export::Format,
-    schema: &str,
-    content: &export::Content,
-    path: &Path,
-) -> Message {
-    let others: Vec<&str> = FORMATS
-        .iter()
-        .filter(|f| f.takes.is_in(content))
-        .map(|f| f.name)
-        .collect();
-    Message::bad_input(format!(
-        "{} takes {}; this is {schema}",
-        format.name,
-        format.takes.results()
-    ))
-    .in_file(path)
-    .remedy(format!("{schema} is taken by {}", list(&others)))
 }
 
 fn in_words(args: &Args, format: &str, exported: &Exported, about: &Path) -> String {

@@ -1,15 +1,18 @@
-//! Results as the compensation files that controllers read.
+//! Results as the compensation files that controllers read, and as a calibration certificate.
 //!
 //! One file a format, one line in [`FORMATS`]. A format turns the [`Content`] of a result into the text
 //! of its file and says with what sign, what was left out and how far rounding moved a value.
 
+mod certificate;
 mod csv;
 mod etalon;
+pub mod exact;
 mod grid;
 mod isg_leadscrew;
 mod isg_volumetric;
 mod klipper;
 mod linuxcnc;
+mod loaded;
 mod marlin;
 mod reprapfirmware;
 mod siemens_cec;
@@ -20,12 +23,14 @@ mod volumetric;
 
 use serde_json::{Value, json};
 
+pub use certificate::{Admin, Entry, Group, Numbers, Uncertainty};
 pub use grid::{AxisTable, Grid};
+pub use loaded::Loaded;
 pub use source::{AxisErrors, Content, MachineErrors, StraightnessProfile, read};
 
 use crate::io::Message;
 
-/// A format of a controller.
+/// A format of a controller, or of a certificate.
 pub struct Format {
     /// Its name on the command line.
     pub name: &'static str,
@@ -38,7 +43,7 @@ pub struct Format {
 }
 
 /// Every format.
-pub const FORMATS: [&Format; 10] = [
+pub const FORMATS: [&Format; 11] = [
     &linuxcnc::FORMAT,
     &isg_leadscrew::FORMAT,
     &siemens_eec::FORMAT,
@@ -49,6 +54,7 @@ pub const FORMATS: [&Format; 10] = [
     &klipper::FORMAT,
     &marlin::FORMAT,
     &reprapfirmware::FORMAT,
+    &certificate::FORMAT,
 ];
 
 /// What a result holds that a format can take.
@@ -62,6 +68,8 @@ pub enum Kind {
     Machine,
     /// Squareness of the axes.
     Squareness,
+    /// Numbers with their uncertainties.
+    Numbers,
 }
 
 impl Kind {
@@ -75,6 +83,9 @@ impl Kind {
             Self::Machine | Self::Squareness => {
                 "a result of errsep step-diagonal or machine, or a machine (TOML)"
             }
+            Self::Numbers => {
+                "a result of errsep reversal, circle, positioning, straightness, four-sensor, step-diagonal or machine"
+            }
         }
     }
 
@@ -85,6 +96,7 @@ impl Kind {
             (Self::Positioning, Content::Positioning(_))
                 | (Self::Straightness, Content::Straightness(_))
                 | (Self::Machine | Self::Squareness, Content::Machine(_))
+                | (Self::Numbers, Content::Numbers(_))
         )
     }
 }
@@ -129,6 +141,8 @@ pub struct Request {
     pub grid: Option<Grid>,
     /// Travels of axes whose errors have no positions of their own: axis letter, from, to, mm.
     pub travel: Vec<(char, f64, f64)>,
+    /// What a certificate says beside the numbers.
+    pub admin: Option<Admin>,
 }
 
 impl Request {

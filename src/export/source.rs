@@ -1,4 +1,4 @@
-//! What a result holds for a controller.
+//! What a result holds for a controller or a certificate.
 
 use std::io::Read;
 use std::path::Path;
@@ -6,6 +6,8 @@ use std::path::Path;
 use errsep_models::machine::{COMPONENTS, Component, ErrorFunction, Kind as ComponentKind, Side};
 use serde_json::Value;
 
+use super::certificate::Numbers;
+use super::loaded::Loaded;
 use crate::io::machine::read_filed;
 use crate::io::units::{ARCSEC_PER_DEG, UM_PER_MM, mm_from_um};
 use crate::io::{Message, source::Source};
@@ -13,7 +15,7 @@ use crate::io::{Message, source::Source};
 /// A longer file is no result, bytes.
 const LONGEST: u64 = 1 << 28;
 
-/// A result, as far as a controller can use it.
+/// A result, as far as a format can use it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Content {
     /// Of one axis along itself.
@@ -22,6 +24,8 @@ pub enum Content {
     Straightness(StraightnessProfile),
     /// The component errors of a machine.
     Machine(MachineErrors),
+    /// Numbers with their uncertainties.
+    Numbers(Numbers),
 }
 
 /// Deviations of one axis by direction of approach: mm, of a rotary axis degrees.
@@ -68,9 +72,9 @@ pub struct MachineErrors {
 /// Reads a result (JSON), or a machine (TOML).
 ///
 /// # Errors
-/// The file cannot be read, is neither, or is a result that holds nothing for a controller; such a message
+/// The file cannot be read, is neither, or is a result that holds nothing for any format; such a message
 /// names what does.
-pub fn read(path: &Path) -> Result<(Content, String), Message> {
+pub fn read(path: &Path) -> Result<Loaded, Message> {
     let unreadable = |e: std::io::Error| {
         Message::bad_input(format!("the result cannot be read: {e}"))
             .in_file(path)
@@ -92,22 +96,26 @@ pub fn read(path: &Path) -> Result<(Content, String), Message> {
         .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
     {
         let filed = read_filed(path, None)?;
-        return Ok((
-            Content::Machine(machine(&filed.machine)),
-            "a machine".to_owned(),
-        ));
+        return Ok(Loaded::machine(machine(&filed.machine)));
     }
     let start = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
-    let result: Value = serde_json::from_slice(start).map_err(|e| {
+    let text = std::str::from_utf8(start).map_err(|e| e.to_string());
+    let result = text.and_then(|text| super::exact::json(text).map_err(|e| e.to_string()));
+    let result = result.map_err(|e| {
         Message::bad_input(format!("this is no JSON: {e}"))
             .in_file(path)
             .remedy(
                 "give result.json of a report, what --format json printed, or a machine as .toml",
             )
     })?;
-    let schema = result["schema"].as_str().unwrap_or_default().to_owned();
-    let content = match schema.as_str() {
-        "errsep.positioning/1" => positioning(&result).map(Content::Positioning),
+    Loaded::of(&result).map_err(|message| message.in_file(path))
+}
+
+/// What a controller can use of a result; nothing for a schema that no controller takes, or where the result
+/// lacks what its schema says.
+pub(super) fn for_controller(schema: &str, result: &Value) -> Option<Option<Content>> {
+    Some(match schema {
+        "errsep.positioning/1" => positioning(result).map(Content::Positioning),
         "errsep.straightness/1" => {
             straightness("straightness", &result["profile"], "x", "least_squares")
         }
@@ -124,31 +132,10 @@ pub fn read(path: &Path) -> Result<(Content, String), Message> {
             "x",
             "slide",
         ),
-        "errsep.step-diagonal/1" => step_diagonal(&result).map(Content::Machine),
-        "errsep.machine/1" => machine_result(&result).map(Content::Machine),
-        "" => {
-            return Err(
-                Message::bad_input("this JSON is no result of errsep: it has no `schema`")
-                    .in_file(path)
-                    .remedy("give result.json of a report, or what --format json printed"),
-            );
-        }
-        other => {
-            return Err(
-                Message::bad_input(format!("no format takes a result {other}"))
-                    .in_file(path)
-                    .remedy(format!("{}: give one of these", all_formats())),
-            );
-        }
-    };
-    match content {
-        Some(content) => Ok((content, schema)),
-        None => Err(Message::bad_input(format!(
-            "the result {schema} lacks what a controller needs"
-        ))
-        .in_file(path)
-        .remedy("run the command again with this version of errsep")),
-    }
+        "errsep.step-diagonal/1" => step_diagonal(result).map(Content::Machine),
+        "errsep.machine/1" => machine_result(result).map(Content::Machine),
+        _ => return None,
+    })
 }
 
 /// Every format with what it takes.

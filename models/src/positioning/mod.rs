@@ -16,7 +16,7 @@ pub use drift::Drift;
 pub use figures::{Figure, FigureValues, Profile};
 pub use readings::{Deviations, Direction, PositioningError, Reading, Targets};
 pub use simulate::{PositioningSimulation, Truth, simulate};
-pub use uncertainty::{COVERAGE, Influences, NoUncertainty};
+pub use uncertainty::{COVERAGE, FigureUncertainty, Influences, NoUncertainty};
 
 /// What one test of an axis tells.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,8 +27,8 @@ pub struct Positioning {
     pub profile: Profile,
     /// The figures of both standards.
     pub values: FigureValues,
-    /// The expanded uncertainty of each figure ([`COVERAGE`]), or why there is none.
-    pub expanded: Vec<(Figure, Result<f64, NoUncertainty>)>,
+    /// The uncertainty of each figure, or why there is none.
+    pub uncertainties: Vec<(Figure, Result<FigureUncertainty, NoUncertainty>)>,
     /// Scatter of one reading, and whether readings are alike; absent with one run.
     pub scatter: Option<Scatter>,
     /// Drift common to all targets; absent without times, or where they do not tell it.
@@ -45,8 +45,16 @@ impl Positioning {
     /// Expanded uncertainty of a figure, or why there is none. Absent where the figure itself is.
     #[must_use]
     pub fn uncertainty(&self, figure: Figure) -> Option<Result<f64, NoUncertainty>> {
-        let found = self.expanded.iter().find(|(f, _)| *f == figure)?;
-        Some(found.1)
+        let found = self.uncertainties.iter().find(|(f, _)| *f == figure)?;
+        Some(found.1.map(|uncertainty| uncertainty.expanded))
+    }
+
+    /// Standard uncertainty of a figure: root mean square of the errors of simulated tests (GUM Supplement 1, 7.6).
+    /// Absent where there is none.
+    #[must_use]
+    pub fn standard_uncertainty(&self, figure: Figure) -> Option<f64> {
+        let found = self.uncertainties.iter().find(|(f, _)| *f == figure)?;
+        found.1.ok().map(|uncertainty| uncertainty.standard)
     }
 }
 
@@ -69,13 +77,13 @@ pub fn analyse(
     let scatter = Scatter::of(&deviations);
     let drift = Drift::of(readings);
     let dependence = (scatter.as_ref(), drift.as_ref());
-    let expanded = uncertainty::expanded(&deviations, &profile, dependence, influences, seed);
+    let uncertainties = uncertainty::expanded(&deviations, &profile, dependence, influences, seed);
     Ok(Positioning {
         drift,
         deviations,
         profile,
         values,
-        expanded,
+        uncertainties,
         scatter,
     })
 }

@@ -55,6 +55,15 @@ impl Influences {
     }
 }
 
+/// The uncertainty of a figure, from the magnitudes of the errors of simulated tests; unit of the figure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FigureUncertainty {
+    /// Root mean square of the errors.
+    pub standard: f64,
+    /// The share [`COVERAGE`] of them is not greater.
+    pub expanded: f64,
+}
+
 /// Why a figure has no uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NoUncertainty {
@@ -89,7 +98,7 @@ pub(super) fn expanded(
     (scatter, drift): (Option<&Scatter>, Option<&Drift>),
     influences: &Influences,
     seed: u64,
-) -> Vec<(Figure, Result<f64, NoUncertainty>)> {
+) -> Vec<(Figure, Result<FigureUncertainty, NoUncertainty>)> {
     let told: Vec<Figure> = FigureValues::of(profile).iter().map(|(f, _)| f).collect();
     let none = |why| told.iter().map(|f| (*f, Err(why))).collect();
     let Some(scatter) = scatter else {
@@ -217,8 +226,8 @@ impl Test {
         }
     }
 
-    /// The share [`COVERAGE`] of all errors of each figure is not greater.
-    fn expanded(&self, seed: u64) -> Vec<(Figure, f64)> {
+    /// The errors of each figure, as their root mean square and as what the share [`COVERAGE`] does not exceed.
+    fn expanded(&self, seed: u64) -> Vec<(Figure, FigureUncertainty)> {
         let count = (MOST_MEANS / (2 * self.along.len())).clamp(FEWEST, TRIALS);
         let targets = self.along.len();
         let room = || {
@@ -256,7 +265,12 @@ impl Test {
         let place = (COVERAGE * count as f64).ceil() as usize - 1;
         let found = self.worlds.iter().enumerate().filter_map(|(k, world)| {
             let errors = trials.output(k)?;
-            Some((world.figure, *errors.sorted().get(place)?))
+            let sum: f64 = errors.sorted().iter().map(|e| e * e).sum();
+            let uncertainty = FigureUncertainty {
+                standard: (sum / count as f64).sqrt(),
+                expanded: *errors.sorted().get(place)?,
+            };
+            Some((world.figure, uncertainty))
         });
         found.collect()
     }

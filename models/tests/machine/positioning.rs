@@ -280,7 +280,7 @@ impl NoneOrOk for Result<f64, NoUncertainty> {
 fn reasons(readings: &[Reading]) -> Vec<(Figure, NoUncertainty)> {
     let found = analyse(readings, &Influences::default(), 1).unwrap();
     let withheld = found
-        .expanded
+        .uncertainties
         .iter()
         .filter_map(|(f, u)| Some((*f, u.err()?)));
     withheld.collect()

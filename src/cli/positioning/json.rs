@@ -54,14 +54,15 @@ pub(super) fn as_json(found: &Found) -> Result<Value, Message> {
     }))
 }
 
-/// Value and expanded uncertainty of each figure; null where the readings do not tell it.
+/// Value, expanded and standard uncertainty of each figure; null where the readings do not tell it.
 fn figures(found: &Found, which: &[Figure]) -> Map<String, Value> {
     which
         .iter()
         .map(|figure| {
             let expanded = found.result.uncertainty(*figure).and_then(Result::ok);
             let value = found.result.value(*figure);
-            let told = value.map(|value| json!({"value": value, "U": expanded}));
+            let std = found.result.standard_uncertainty(*figure);
+            let told = value.map(|value| json!({"value": value, "U": expanded, "std": std}));
             (figure.key().to_owned(), told.unwrap_or(Value::Null))
         })
         .collect()

@@ -116,7 +116,7 @@ pub(super) fn contents(found: &Found) -> String {
 /// Which figures have no uncertainty, and why.
 pub(super) fn withheld(result: &Positioning) -> Vec<String> {
     let mut reasons: Vec<(NoUncertainty, Vec<&str>)> = Vec::new();
-    for (figure, expanded) in &result.expanded {
+    for (figure, expanded) in &result.uncertainties {
         if let Err(why) = expanded {
             let name = figure.in_words().0;
             match reasons.iter_mut().find(|(w, _)| w == why) {

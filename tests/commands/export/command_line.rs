@@ -149,25 +149,38 @@ fn a_result_of_the_wrong_kind_names_what_takes_it() {
             "linuxcnc straightness.json",
             &[
                 "linuxcnc takes a result of errsep positioning; this is errsep.straightness/1",
-                "is taken by siemens-cec",
+                "is taken by siemens-cec or dcc",
             ][..],
         ),
         (
             "klipper positioning.json",
-            &["is taken by linuxcnc, isg-leadscrew or siemens-eec"],
+            &["is taken by linuxcnc, isg-leadscrew, siemens-eec or dcc"],
         ),
         (
             "siemens-cec steps.json",
-            &["is taken by isg-volumetric, etalon, csv, klipper, marlin or reprapfirmware"],
+            &["is taken by isg-volumetric, etalon, csv, klipper, marlin, reprapfirmware or dcc"],
         ),
         (
             "linuxcnc circle.json",
             &[
-                "no format takes a result errsep.circle/1",
                 "linuxcnc takes a result of errsep positioning",
+                "errsep.circle/1 is taken by dcc",
+            ],
+        ),
+        (
+            "linuxcnc anova.json",
+            &[
+                "no format takes a result errsep.anova/1",
+                "dcc takes a result of errsep reversal",
             ],
         ),
         ("linuxcnc machine.toml", &["this is a machine"]),
+        ("dcc machine.toml", &["dcc takes", "this is a machine"]),
+        ("dcc circle.json", &["needs --admin", "admin.toml"]),
+        (
+            "linuxcnc positioning.json --admin a.toml",
+            &["no use for --admin"],
+        ),
         (
             "lixuncnc positioning.json",
             &["no format `lixuncnc`", "did you mean `linuxcnc`"],
@@ -179,6 +192,14 @@ fn a_result_of_the_wrong_kind_names_what_takes_it() {
             &["profile.csv", "no JSON", "a machine as .toml"],
         ),
         ("linuxcnc other.json", &["no result of errsep"]),
+        (
+            "siemens-cec formless.json --axis X:Z",
+            &["errsep.reversal/1 lacks what a controller needs"],
+        ),
+        (
+            "dcc numberless.json",
+            &["errsep.machine/1 lacks the numbers that a certificate states"],
+        ),
         ("linuxcnc empty.json", &["lacks what a controller needs"]),
         ("siemens-cec straightness.json", &["--axis X:Z"]),
         (
@@ -195,6 +216,12 @@ fn a_result_of_the_wrong_kind_names_what_takes_it() {
     ] {
         folder.write("broken.json", "{\"schema\":");
         folder.write("other.json", "{\"a\": 1}");
+        let formless = r#"{"schema": "errsep.reversal/1", "tilts": {}, "forms": {"x": [0, 1], "M": null, "S_A": [1, 2]}}"#;
+        folder.write("formless.json", formless);
+        let numberless =
+            r#"{"schema": "errsep.machine/1", "action": "parts", "chain": "XYFZ", "errors": []}"#;
+        folder.write("numberless.json", numberless);
+        folder.write("anova.json", "{\"schema\": \"errsep.anova/1\"}");
         folder.write("empty.json", "{\"schema\": \"errsep.positioning/1\"}");
         let words = format!("export {arguments} --out out");
         bad_input(&folder, &words.split(' ').collect::<Vec<_>>(), expected);

@@ -1,6 +1,7 @@
 //! Every format read back by a reader written from the controller's own rules, and the command.
 
 mod axis;
+mod certificate;
 mod command_line;
 mod machine;
 mod skew;

@@ -33,7 +33,11 @@ enum Bound {
 }
 
 /// Models of which the whole catalogue is sought through; of the others all of it is withheld, for its time.
-const QUICK: [&str; 3] = ["calibration line", "circle", "machine against measured parts"];
+const QUICK: [&str; 3] = [
+    "calibration line",
+    "circle",
+    "machine against measured parts",
+];
 
 /// Smooth ones, and what no smooth curve resolves.
 const SMOOTH: [Bound; 4] = [

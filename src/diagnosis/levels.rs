@@ -170,7 +170,7 @@ pub(in crate::diagnosis) const TURN_APART: f64 = 5.0;
 
 // Learning.
 
-/// *Quantile*, 1 % of normal noise over the eight ways to bind a gap: standard deviations by which a learnt
+/// *Quantile*, 1 % of normal noise over the seven ways to bind a gap: standard deviations by which a learnt
 /// curve must make the held-out residual smaller.
 pub(in crate::diagnosis) const CONFIRMED: f64 = 3.0;
 /// *Quantile*, one standard error: a way to bind a gap by fewer curves is no worse than the best.

@@ -37,7 +37,10 @@ impl Ground {
             // A reading's zero and slope are other ones in another campaign.
             for along in [Along::Position, Along::Time, Along::Reading] {
                 for by_direction in [false, true] {
-                    let told = !by_direction || (both && along == Along::Position);
+                    // Within a channel the reading follows the position: the parts of a curve that
+                    // the model absorbs there are other ones where tilts or forms are.
+                    let told = (!by_direction || (both && along == Along::Position))
+                        && !(by_channel && along == Along::Reading);
                     if told && (!by_channel || channels > 1) {
                         grounds.extend(Self::new(model, along, by_direction, by_channel));
                     }

@@ -77,7 +77,7 @@ impl<M: FittedModel> Case<M> {
             &own_effects(args, &self.model)?,
             &options,
         );
-        self.delivered(args, diagnosis, trials.as_ref(), (learnt, tests))
+        self.delivered(args, diagnosis, trials.as_ref(), learnt, tests)
     }
 
     fn delivered(
@@ -85,7 +85,8 @@ impl<M: FittedModel> Case<M> {
         args: &Args,
         mut diagnosis: Diagnosis,
         trials: Option<&Trials>,
-        (learnt, (tests, remarks)): (Option<(String, Value)>, (Vec<Tested>, Vec<String>)),
+        learnt: Option<Said>,
+        (tests, remarks): (Vec<Tested>, Vec<String>),
     ) -> Result<Answer, Message> {
         diagnosis.notes.extend(self.notes);
         diagnosis.notes.extend(remarks);
@@ -140,12 +141,15 @@ impl<M: FittedModel> Case<M> {
     }
 }
 
+/// What is said of an effect that was learnt, in words and as JSON.
+type Said = (String, Value);
+
 /// Adds to text, JSON and notes of the page how learnt effects fare here, and what was learnt here.
 fn tell_learnt(
     (text, json, notes): (&mut String, &mut Value, &mut Vec<String>),
     unit: &str,
     tests: &[Tested],
-    learnt: Option<(String, Value)>,
+    learnt: Option<Said>,
 ) {
     for test in tests {
         let said = tested_in_words(test, unit);

@@ -12,6 +12,7 @@ use crate::diagnosis::detection::space::Space;
 use crate::diagnosis::learning::ground::Ground;
 use crate::diagnosis::learning::smooth::Smooth;
 use crate::diagnosis::learning::weighed::{HeldOutAlong, Weighed, seen_with_prior, weighed};
+use crate::diagnosis::levels::ADEQUATE;
 use crate::diagnosis::noise::law::NoiseLaw;
 use crate::diagnosis::noise::spikes::calmed;
 use crate::diagnosis::options::Options;
@@ -217,8 +218,10 @@ fn left_beside<M: FittedModel>(
     let context = Context::new(model, &catalogue, law, options.draws, options.seed);
     let causes = [context.cause(model, 0, Shape::only())];
     let left = context.judged(readings, &causes);
-    let p_value = context.global(&left);
-    if context.adequate(&causes, &left) {
+    // Cycles near the spacing of the readings show in no signature that is looked for, but in the misfit as a
+    // whole.
+    let p_value = context.detection(&left);
+    if context.adequate(&causes, &left) && p_value > ADEQUATE[0] {
         return (p_value, None);
     }
     let families = &context.dictionary.families;

@@ -12,7 +12,7 @@ const ORDER: [&[&str]; 9] = [
     &["severity"],
     &["verdict", "catalogue"],
     &["diagnose"],
-    &["joined", "agreement"],
+    &["joined", "agreement", "learning"],
 ];
 
 fn level(room: &str) -> Option<usize> {

@@ -1,15 +1,13 @@
 //! How often the score stage and a whole diagnosis say the same of a rival.
 
 use errsep_models::model::FittedModel;
-use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::attribution::examined::examined;
 use crate::diagnosis::detection::estimate::estimate;
-use crate::diagnosis::detection::space::Space;
+use crate::diagnosis::detection::fitted::without_misfit;
 use crate::diagnosis::diagnose::diagnose;
-use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
 use crate::diagnosis::options::Options;
 use crate::diagnosis::severity::rivals::{Drawn, Family};
 use crate::diagnosis::severity::stage::Name;
@@ -86,13 +84,4 @@ fn compared<M: FittedModel>(
         whole: count(&|k| whole[k]),
         both: count(&|k| scored[k] && whole[k]),
     }
-}
-
-/// Readings that a model fits without a residual.
-fn without_misfit<M: FittedModel>(model: &M) -> DVector<f64> {
-    model.smooth().unwrap_or_else(|| {
-        let unit = NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated);
-        let left = Space::new(model, &unit).forward_vector(&model.linearised());
-        model.observed() - left
-    })
 }

@@ -169,3 +169,11 @@ pub(in crate::diagnosis) const TURN_LEFT: f64 = 0.2;
 /// *Quantile.* Evidence (natural logarithm) by which two explanations, or the two signs of γ across, must
 /// differ to be told apart: odds of 150 to 1.
 pub(in crate::diagnosis) const TURN_APART: f64 = 5.0;
+
+// Learning.
+
+/// *Quantile*, 1 % of normal noise over the seven ways to bind a gap: standard deviations by which a learnt
+/// curve must make the held-out residual smaller.
+pub(in crate::diagnosis) const CONFIRMED: f64 = 3.0;
+/// *Quantile*, one standard error: a way to bind a gap by fewer curves is no worse than the best.
+pub(in crate::diagnosis) const NO_WORSE: f64 = 1.0;

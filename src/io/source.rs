@@ -59,6 +59,15 @@ pub fn begin_record_with(hashing: bool, in_memory: Vec<InMemory>) {
     });
 }
 
+/// Digests are wanted of what this thread reads from now on, whatever its record began with.
+pub fn want_digests() {
+    RECORD.with_borrow_mut(|record| {
+        if let Some(record) = record {
+            record.hashing = true;
+        }
+    });
+}
+
 impl Record {
     /// What is held in memory under this name, or has been read of this pipe.
     fn find(&self, path: &Path) -> Option<Bytes> {

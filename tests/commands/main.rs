@@ -14,6 +14,7 @@ mod export;
 mod faulty_machine;
 mod four_sensor;
 mod fourier;
+mod learn;
 mod machine;
 mod measured_reversals;
 mod parts_of_nistir;

@@ -4,10 +4,15 @@ use std::path::PathBuf;
 
 use errsep_models::model::{Effect, FittedModel, Place};
 
+use serde_json::{Value, json};
+
+use super::learnt::{all_tested, learnt, tested_in_words};
 use super::{Args, page, within_reach_of, words};
 use crate::cli::{Answer, progress};
-use crate::diagnosis::{Diagnosis, Options, TabulatedEffects, Trials, diagnose_with, prove};
-use crate::io::{CsvTable, Message, SetupFile, Status};
+use crate::diagnosis::{
+    Diagnosis, Options, Tabulated, TabulatedEffects, Tested, Trials, diagnose_with, prove,
+};
+use crate::io::{CsvTable, Message, OutFile, SetupFile, Status};
 use crate::report::diagnosis as sheet;
 
 /// A fitted model and what people should know of it.
@@ -29,6 +34,9 @@ impl<M: FittedModel> Case<M> {
         if !args.with.is_empty() {
             return Ok(self.with_effects(args)?.0);
         }
+        let place = args.learn.as_deref();
+        let file = place.map(|p| OutFile::reserve(p).map(|file| (p, file)));
+        let file = file.transpose()?;
         let catalogue = catalogue(args, &self.model)?;
         let known: Vec<String> = catalogue.iter().map(|e| e.name().to_owned()).collect();
         if let Some(name) = args.without.iter().find(|n| !known.contains(n)) {
@@ -46,6 +54,8 @@ impl<M: FittedModel> Case<M> {
         let diagnosis = diagnose_with(&self.model, catalogue, &options);
         bar.finish_and_clear();
         let own = self::catalogue(args, &self.model)?;
+        let learnt = file.map(|file| learnt(&self.model, args, file, &diagnosis, &options));
+        let learnt = learnt.transpose()?;
         let trials = args.prove.map(|count| {
             let bar = progress("proving", None);
             // The trials are made on readings without what was found in them.
@@ -61,7 +71,13 @@ impl<M: FittedModel> Case<M> {
             bar.finish_and_clear();
             trials
         });
-        self.delivered(args, diagnosis, trials.as_ref())
+        let tests = all_tested(
+            &self.model,
+            args,
+            &own_effects(args, &self.model)?,
+            &options,
+        );
+        self.delivered(args, diagnosis, trials.as_ref(), learnt, tests)
     }
 
     fn delivered(
@@ -69,8 +85,11 @@ impl<M: FittedModel> Case<M> {
         args: &Args,
         mut diagnosis: Diagnosis,
         trials: Option<&Trials>,
+        learnt: Option<Said>,
+        (tests, remarks): (Vec<Tested>, Vec<String>),
     ) -> Result<Answer, Message> {
         diagnosis.notes.extend(self.notes);
+        diagnosis.notes.extend(remarks);
         let mut json = serde_json::to_value(&diagnosis).map_err(|e| {
             Message::bad_input(format!("the diagnosis cannot be written as JSON: {e}"))
         })?;
@@ -93,10 +112,12 @@ impl<M: FittedModel> Case<M> {
                 answers: trials.answers.clone(),
                 counts: trials.counts.clone(),
             });
-            if let serde_json::Value::Object(object) = &mut json {
-                object.insert("proof".to_owned(), serde_json::json!(trials));
+            if let Value::Object(object) = &mut json {
+                object.insert("proof".to_owned(), json!(trials));
             }
         }
+        let told = (&mut text, &mut json, &mut view.notes);
+        tell_learnt(told, self.model.reading_unit(), &tests, learnt);
         let mut inputs = vec![args.data.clone()];
         inputs.extend(args.setup.clone());
         inputs.extend(args.effects.clone());
@@ -120,26 +141,64 @@ impl<M: FittedModel> Case<M> {
     }
 }
 
+/// What is said of an effect that was learnt, in words and as JSON.
+type Said = (String, Value);
+
+/// Adds to text, JSON and notes of the page how learnt effects fare here, and what was learnt here.
+fn tell_learnt(
+    (text, json, notes): (&mut String, &mut Value, &mut Vec<String>),
+    unit: &str,
+    tests: &[Tested],
+    learnt: Option<Said>,
+) {
+    for test in tests {
+        let said = tested_in_words(test, unit);
+        *text += &format!("\n{said}\n");
+        notes.push(said);
+    }
+    let Value::Object(object) = json else { return };
+    if !tests.is_empty() {
+        object.insert("tested".to_owned(), json!(tests));
+    }
+    if let Some((said, learnt)) = learnt {
+        *text += &said;
+        object.insert("learnt".to_owned(), learnt);
+    }
+}
+
 /// The model's effects and the user's own.
 pub(super) fn catalogue<M: FittedModel>(
     args: &Args,
     model: &M,
 ) -> Result<Vec<Box<dyn Effect<M>>>, Message> {
     let mut catalogue = model.effects();
+    for effect in own_effects(args, model)? {
+        catalogue.push(Box::new(effect));
+    }
+    Ok(catalogue)
+}
+
+/// The user's own effects.
+fn own_effects<M: FittedModel>(args: &Args, model: &M) -> Result<Vec<Tabulated>, Message> {
     let Some(path) = &args.effects else {
-        return Ok(catalogue);
+        return Ok(Vec::new());
     };
     let file = SetupFile::read(path)?;
-    let own: TabulatedEffects = file.parse()?;
-    let channels = model.channel_names();
-    for effect in own.effect {
+    let read: TabulatedEffects = file.parse()?;
+    let mut names: Vec<String> = model
+        .effects()
+        .iter()
+        .map(|e| e.name().to_owned())
+        .collect();
+    let mut own = Vec::new();
+    for effect in read.effect {
         let place = effect.span();
         let effect = effect.into_inner();
-        let known = catalogue.iter().any(|e| e.name() == effect.name);
+        let known = names.contains(&effect.name);
         let fault = if known {
             Some(format!("`{}` is in the catalogue already", effect.name))
         } else {
-            effect.fault(&channels, model.places())
+            effect.fault(model)
         };
         if let Some(what) = fault {
             return Err(file.bad(
@@ -148,9 +207,10 @@ pub(super) fn catalogue<M: FittedModel>(
                 "give every effect a new name, growing positions or a formula, and known channels with finite weights",
             ));
         }
-        catalogue.push(Box::new(effect));
+        names.push(effect.name.clone());
+        own.push(effect);
     }
-    Ok(catalogue)
+    Ok(own)
 }
 
 /// What the fit leaves of every reading, without and with the effects.

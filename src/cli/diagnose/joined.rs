@@ -141,6 +141,7 @@ impl Given<'_> {
             without: Vec::new(),
             with: given.with.to_vec(),
             effects: None,
+            learn: None,
             severity: 0,
             false_alarm: Options::default().false_alarm,
             prove: None,

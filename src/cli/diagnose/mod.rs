@@ -9,6 +9,7 @@ mod circle;
 mod four_sensor;
 mod fourier;
 pub(in crate::cli) mod joined;
+mod learnt;
 mod machine;
 pub(super) mod page;
 mod recognise;
@@ -24,6 +25,7 @@ use errsep_models::model::{FittedModel, Place};
 use super::{Answer, CommonArgs};
 use crate::io::Message;
 use crate::io::reversal::ColumnMap;
+use crate::io::source::want_digests;
 
 /// Where does the gap between model and machine lie, which effect causes it, how far does it
 /// shrink?
@@ -44,7 +46,12 @@ A file for --effects has one table an effect:
 
     [[effect]]
     name = \"warm-up\"
-    formula = \"1 - exp(-time / 600)\"   # of x, time, direction, repeat, channel")]
+    formula = \"1 - exp(-time / 600)\"   # of x, time, direction, repeat, channel
+
+What no effect explains is learnt from one campaign and tested on another:
+
+    errsep diagnose monday.csv --learn coolant.toml
+    errsep diagnose friday.csv --effects coolant.toml")]
 pub struct Args {
     /// The readings.
     #[arg(value_name = "DATA.csv")]
@@ -72,9 +79,12 @@ pub struct Args {
         conflicts_with_all = ["without", "prove", "false_alarm"]
     )]
     with: Vec<String>,
-    /// Add the effects of this file (tables of signatures, formulas) to the catalogue.
+    /// Add the effects of this file (tables of signatures, formulas, what was learnt) to the catalogue.
     #[arg(long, value_name = "EFFECTS.toml")]
     effects: Option<PathBuf>,
+    /// Where no effect explains the gap, write what is left as an effect of its own, for --effects.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "with")]
+    learn: Option<PathBuf>,
     /// Probability of naming anything where nothing is there.
     #[arg(long, value_name = "P", default_value_t = 0.01)]
     false_alarm: f64,
@@ -137,6 +147,10 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         .remedy(format!(
             "give the number of rivals of a family, such as --severity {RIVALS}, at most {MOST_RIVALS}; 0 draws none"
         )));
+    }
+    if args.learn.is_some() || args.effects.is_some() {
+        // A learnt effect names the readings that it was learnt from by their digest.
+        want_digests();
     }
     let model = recognise::model(args)?;
     if args.points.is_some() && model.name != "machine" {

@@ -1,16 +1,17 @@
-//! Effects of the user's own: a signature in a table or a formula.
+//! Effects of the user's own: a signature in a table, a formula, or curves with a band.
 
 use std::collections::BTreeMap;
 
 use errsep_models::model::{About, Column, Effect, FittedModel, Parameter, Place, Shape};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use crate::diagnosis::catalogue::curve::{Along, Curve, Way, curves_of};
 use crate::diagnosis::catalogue::formula::{Circumstances, Formula};
 
 /// An effect given by its change of the readings, times a weight for each channel: over the
-/// positions, straight between them and zero outside, or by a formula.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+/// positions, straight between them and zero outside; by a formula; or by curves with a band.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tabulated {
     /// Name in the verdict.
@@ -21,6 +22,15 @@ pub struct Tabulated {
     /// The change of the reading in x, time, direction, repeat and channel.
     #[serde(default)]
     pub formula: Option<Formula>,
+    /// What its curves are functions of; absent: the position.
+    #[serde(default)]
+    pub along: Option<Along>,
+    /// Its curves; a reading that none of them speaks of is not changed.
+    #[serde(default)]
+    pub curve: Vec<Curve>,
+    /// Where it was seen.
+    #[serde(default)]
+    pub seen: Option<Seen>,
     /// Weight of each channel by its name; absent: 1 for all.
     #[serde(default)]
     pub channels: BTreeMap<String, f64>,
@@ -30,6 +40,27 @@ pub struct Tabulated {
     /// The only repeats in which it is there; absent: all.
     #[serde(default)]
     pub repeats: Vec<u32>,
+}
+
+/// The curve of a reading, and where on it the reading is.
+type On<'c> = Option<(&'c Curve, f64)>;
+
+/// Where an effect was learnt.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Seen {
+    /// The model.
+    pub model: String,
+    /// The file of its readings.
+    pub file: String,
+    /// SHA-256 of that file, in hexadecimal digits.
+    pub sha256: String,
+    /// The channels that were read.
+    pub channels: Vec<String>,
+    /// The repeats.
+    pub repeats: Vec<u32>,
+    /// The day on which it was learnt, year-month-day.
+    pub date: String,
 }
 
 /// The effects of a file.
@@ -60,8 +91,32 @@ impl Tabulated {
             .collect()
     }
 
-    /// The change of one reading, with the weights of the channels.
-    fn change(&self, place: &Place, weights: &[f64]) -> f64 {
+    /// The changes of readings.
+    fn changes<M: FittedModel>(&self, model: &M) -> Vec<f64> {
+        let channels = model.channel_names();
+        let weights = self.weights(&channels);
+        let of = |(place, change): (&Place, f64)| self.weight(&weights, place) * change;
+        if self.curve.is_empty() {
+            let pairs = model.places().iter().map(|place| (place, self.at(place)));
+            return pairs.map(of).collect();
+        }
+        let pairs = model.places().iter().zip(self.on_curves(model));
+        let at = |(place, on): (_, On<'_>)| of((place, on.map_or(0.0, |(c, value)| c.at(value))));
+        pairs.map(at).collect()
+    }
+
+    /// The curve of each reading, and where on it the reading is.
+    fn on_curves<M: FittedModel>(&self, model: &M) -> Vec<On<'_>> {
+        let curves = curves_of(&self.curve, &model.channel_names());
+        let values = self.along.unwrap_or(Along::Position).values(model);
+        let places = model.places().iter().zip(values);
+        places
+            .map(|(place, value)| Some((self.curve_of(&curves, place)?, value)))
+            .collect()
+    }
+
+    /// Sign and weight of the change of a reading.
+    fn weight(&self, weights: &[f64], place: &Place) -> f64 {
         let here = self.repeats.is_empty() || self.repeats.contains(&place.repeat);
         let sign = if self.turns_with_direction {
             place.direction
@@ -69,7 +124,22 @@ impl Tabulated {
             1.0
         };
         let weight = weights.get(place.channel).copied().unwrap_or(0.0);
-        f64::from(u8::from(here)) * sign * weight * self.at(place)
+        f64::from(u8::from(here)) * sign * weight
+    }
+
+    fn curve_of(&self, curves: &[[Option<usize>; 2]], place: &Place) -> Option<&Curve> {
+        let both = curves.get(place.channel)?;
+        self.curve
+            .get(both[usize::from(Way::of(place) == Way::Backward)]?)
+    }
+
+    /// Part of the readings at which its curves were not seen.
+    pub fn outside<M: FittedModel>(&self, model: &M) -> f64 {
+        let all = self.on_curves(model);
+        let unseen = all
+            .iter()
+            .filter(|on| !on.is_some_and(|(curve, value)| curve.holds(value)));
+        unseen.count() as f64 / all.len().max(1) as f64
     }
 
     fn at(&self, place: &Place) -> f64 {
@@ -88,16 +158,36 @@ impl Tabulated {
         }
     }
 
-    /// What is wrong with the effect for some readings, if anything.
-    pub fn fault(&self, channels: &[String], places: &[Place]) -> Option<String> {
+    /// What is wrong with its name and with what it is given by, whatever the readings.
+    fn fault_of_form(&self, channels: &[String]) -> Option<String> {
         if self.name.trim().is_empty() {
             return Some("an effect has no name".to_owned());
         }
-        if self.formula.is_some() != self.signature.is_empty() {
+        let given = [
+            self.formula.is_some(),
+            !self.signature.is_empty(),
+            !self.curve.is_empty(),
+        ];
+        if given.iter().filter(|given| **given).count() != 1 {
             return Some(format!(
-                "`{}` needs either a signature or a formula",
+                "`{}` needs either a signature or a formula, or curves",
                 self.name
             ));
+        }
+        if let Some(what) = self.curve.iter().find_map(|c| c.fault(channels)) {
+            return Some(format!("`{}` {what}", self.name));
+        }
+        if self.along.is_some() && self.curve.is_empty() {
+            return Some(format!("`{}` says along what, but has no curve", self.name));
+        }
+        None
+    }
+
+    /// What is wrong with the effect for some readings, if anything.
+    pub fn fault<M: FittedModel>(&self, model: &M) -> Option<String> {
+        let (channels, places) = (model.channel_names(), model.places());
+        if let Some(what) = self.fault_of_form(&channels) {
+            return Some(what);
         }
         let undefined = |f: &Formula| places.iter().find(|p| !f.at(&circumstances(p)).is_finite());
         if let Some(place) = self.formula.as_ref().and_then(undefined) {
@@ -106,7 +196,7 @@ impl Tabulated {
                 self.name, place.x, place.time
             ));
         }
-        if self.formula.is_none() && self.signature.len() < 2
+        if !self.signature.is_empty() && self.signature.len() < 2
             || self.signature.windows(2).any(|w| w[1][0] <= w[0][0])
         {
             return Some(format!(
@@ -136,17 +226,17 @@ impl Tabulated {
                 self.name
             ));
         }
-        let weights = self.weights(channels);
-        let endless = |place: &&Place| !self.change(place, &weights).is_finite();
-        if let Some(place) = places.iter().find(endless) {
+        let changes = self.changes(model);
+        let endless = |(_, change): &(&Place, &f64)| !change.is_finite();
+        if let Some((place, _)) = places.iter().zip(&changes).find(endless) {
             return Some(format!(
                 "`{}` changes the reading at {} by no finite number",
                 self.name, place.x
             ));
         }
-        places
+        changes
             .iter()
-            .all(|place| self.change(place, &weights) == 0.0)
+            .all(|change| *change == 0.0)
             .then(|| format!("`{}` changes no reading", self.name))
     }
 }
@@ -160,7 +250,7 @@ impl<M: FittedModel> Effect<M> for Tabulated {
         About {
             physics: "an effect of the user's own",
             confirm: "repeat the measurement without its cause",
-            source: "a table of its signature, or a formula",
+            source: "a table of its signature, a formula, or curves that were learnt",
         }
     }
 
@@ -169,9 +259,23 @@ impl<M: FittedModel> Effect<M> for Tabulated {
     }
 
     fn columns(&self, model: &M, _shape: &Shape) -> Vec<Column> {
+        let changes = self.changes(model);
+        vec![Column::from_places(model.places(), |k, _| changes[k])]
+    }
+
+    fn open(&self, model: &M, _shape: &Shape) -> Vec<Column> {
+        let count = self.curve.iter().map(|c| c.open.len()).max().unwrap_or(0);
+        if count == 0 {
+            return Vec::new();
+        }
         let weights = self.weights(&model.channel_names());
-        vec![Column::from_places(model.places(), |_, place| {
-            self.change(place, &weights)
-        })]
+        let all = self.on_curves(model);
+        let column = |which: usize| {
+            Column::from_places(model.places(), |k, place| {
+                let change = all[k].map_or(0.0, |(curve, value)| curve.open_at(which, value));
+                self.weight(&weights, place) * change
+            })
+        };
+        (0..count).map(column).collect()
     }
 }

@@ -4,6 +4,7 @@
 
 pub(super) mod dictionary;
 pub(super) mod estimate;
+pub(super) mod fitted;
 pub(super) mod folding;
 pub(super) mod localise;
 pub(super) mod null;

@@ -58,6 +58,16 @@ impl Space {
         Self::made(model, law, chosen, &[])
     }
 
+    /// The same with the scatter that the model expects.
+    pub fn of_traces_expecting<M: FittedModel>(
+        model: &M,
+        law: &NoiseLaw,
+        chosen: &[usize],
+    ) -> Self {
+        Self::made(model, law, chosen, model.expected_scatter())
+    }
+
+    /// `scatter`: by the rows of all readings.
     fn made<M: FittedModel>(
         model: &M,
         law: &NoiseLaw,
@@ -104,10 +114,11 @@ impl Space {
         };
         if !scatter.is_empty() {
             let whitened = scatter.iter().map(|column| {
-                let mut dense = DMatrix::zeros(start, 1);
+                let mut all = DVector::<f64>::zeros(model.places().len());
                 for (&row, &value) in column.rows.iter().zip(&column.values) {
-                    dense[row] += value;
+                    all[row] += value;
                 }
+                let mut dense = DMatrix::from_fn(start, 1, |k, _| all[rows[k]]);
                 space.whiten(&mut dense);
                 dense.column(0).clone_owned()
             });

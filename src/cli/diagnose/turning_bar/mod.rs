@@ -66,6 +66,7 @@ fn refuse_options(args: &Args) -> Result<(), Message> {
     let options = [
         (!args.with.is_empty(), "--with"),
         (args.effects.is_some(), "--effects"),
+        (args.learn.is_some(), "--learn"),
         (args.prove.is_some(), "--prove"),
     ];
     if let Some((_, option)) = options.iter().find(|o| o.0) {

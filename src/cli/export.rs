@@ -69,7 +69,7 @@ enum UnitName {
 fn formats_help() -> String {
     let mut text = "Formats:\n".to_owned();
     for format in FORMATS {
-        text += &format!("  {:15} {}\n", format.name, format.meaning);
+        text += &format!("  {:23} {}\n", format.name, format.meaning);
     }
     text + "\nExamples: errsep export linuxcnc positioning/result.json --out x.comp\n          \
             errsep export dcc reversal/result.json --admin admin.toml --out certificate.xml"

@@ -13,6 +13,7 @@ mod isg_volumetric;
 mod klipper;
 mod linuxcnc;
 mod loaded;
+mod lost_motion;
 mod marlin;
 mod reprapfirmware;
 mod siemens_cec;
@@ -43,7 +44,7 @@ pub struct Format {
 }
 
 /// Every format.
-pub const FORMATS: [&Format; 11] = [
+pub const FORMATS: [&Format; 13] = [
     &linuxcnc::FORMAT,
     &isg_leadscrew::FORMAT,
     &siemens_eec::FORMAT,
@@ -54,6 +55,8 @@ pub const FORMATS: [&Format; 11] = [
     &klipper::FORMAT,
     &marlin::FORMAT,
     &reprapfirmware::FORMAT,
+    &lost_motion::MARLIN,
+    &lost_motion::REPRAPFIRMWARE,
     &certificate::FORMAT,
 ];
 

@@ -104,6 +104,14 @@ fn results_become_files() {
             "reprapfirmware machine.toml --out l",
             "M556 S100 X-0.0033667",
         ),
+        (
+            "marlin-backlash positioning.json --axis X --out p",
+            "M425 X0.0",
+        ),
+        (
+            "reprapfirmware-backlash positioning.json --axis X --out q",
+            "M425 X0.0",
+        ),
     ] {
         let told = done(&folder, &format!("export {arguments}"));
         let name = &arguments[arguments.len() - 1..];
@@ -154,7 +162,10 @@ fn a_result_of_the_wrong_kind_names_what_takes_it() {
         ),
         (
             "klipper positioning.json",
-            &["is taken by linuxcnc, isg-leadscrew, siemens-eec or dcc"],
+            &[
+                "is taken by linuxcnc, isg-leadscrew, siemens-eec, marlin-backlash, \
+               reprapfirmware-backlash or dcc",
+            ],
         ),
         (
             "siemens-cec steps.json",

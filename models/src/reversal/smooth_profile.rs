@@ -60,16 +60,26 @@ pub struct Spot {
     of: [f64; 4],
 }
 
+/// Positions that are tried one by one before halving.
+const NEARBY: usize = 6;
+
 impl Spot {
-    /// The spot of a position, sought from a neighbour on.
+    /// The spot of a position, sought from a neighbour on, by halving where it is far from there.
     pub fn new(positions: &[f64], near: usize, x: f64) -> Self {
         let n = positions.len();
         let mut right = near.min(n);
-        while right < n && positions[right] < x {
-            right += 1;
-        }
-        while right > 0 && positions[right - 1] >= x {
-            right -= 1;
+        for step in 0.. {
+            if step == NEARBY {
+                right = positions.partition_point(|p| *p < x);
+                break;
+            }
+            if right < n && positions[right] < x {
+                right += 1;
+            } else if right > 0 && positions[right - 1] >= x {
+                right -= 1;
+            } else {
+                break;
+            }
         }
         if right == 0 || right >= n {
             let end = if right == 0 { 0 } else { n - 1 };

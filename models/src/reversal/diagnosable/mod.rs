@@ -9,6 +9,7 @@
 
 mod arrangement;
 mod between;
+mod chords;
 mod fitted;
 mod further;
 mod gathering;
@@ -472,62 +473,6 @@ impl FirstOrder {
     /// Slope of the artefact's form under a channel, µm/mm.
     pub fn side_slope(&self, place: &Place) -> f64 {
         self.side(place.channel).slopes[self.at(place)]
-    }
-
-    /// Change of the artefact's form under a channel when the probed point moves along it by
-    /// `shift` mm, per mm.
-    pub fn side_chord(&self, place: &Place, shift: f64) -> f64 {
-        if shift.abs() < 1e-9 * self.travel() {
-            return self.side_slope(place);
-        }
-        let side = self.side(place.channel);
-        let k = self.at(place);
-        let spot = Spot::new(&self.positions, k, place.x + shift);
-        (side.at(&spot) - side.values[k]) / shift
-    }
-
-    /// Change of the smooth value of a reading when the slide stands `shift` mm further, per mm.
-    pub fn reading_chord(&self, reading: usize, shift: f64) -> f64 {
-        let place = &self.record.places[reading];
-        let shift = self.chord_length(shift);
-        let (channel, k) = (place.channel, self.at(place));
-        let spot = Spot::new(&self.positions, k, place.x + shift);
-        let moved = |form: &SmoothProfile| (form.at(&spot) - form.values[k]) / shift;
-        self.lines[channel].slope
-            + self.slide_sum(channel, moved)
-            + moved(self.side(channel))
-            + self.beneath_chord(reading, shift)
-    }
-
-    /// Change of a reading when the probed point moves `shift` mm along the artefact, per mm.
-    pub fn probed_chord(&self, reading: usize, shift: f64) -> f64 {
-        let shift = self.chord_length(shift);
-        self.side_chord(&self.record.places[reading], shift) + self.beneath_chord(reading, shift)
-    }
-
-    /// A slope is a chord too short to matter.
-    fn chord_length(&self, shift: f64) -> f64 {
-        let short = 1e-6 * self.travel();
-        if shift.abs() < short { short } else { shift }
-    }
-
-    /// The same of what effects add beneath, by the parabola through three neighbours.
-    fn beneath_chord(&self, reading: usize, shift: f64) -> f64 {
-        let Some(beneath) = &self.beneath else {
-            return 0.0;
-        };
-        let n = self.positions.len();
-        let k = self.at(&self.record.places[reading]);
-        let start = reading - k;
-        let x = self.positions[k] + shift;
-        let nearest = self.positions.partition_point(|p| *p < x);
-        let from = nearest.saturating_sub(1).min(n - 3);
-        let [a, b, c] = [from, from + 1, from + 2].map(|j| self.positions[j]);
-        let [p, q, r] = [from, from + 1, from + 2].map(|j| beneath[start + j]);
-        let there = p * (x - b) * (x - c) / ((a - b) * (a - c))
-            + q * (x - a) * (x - c) / ((b - a) * (b - c))
-            + r * (x - a) * (x - b) / ((c - a) * (c - b));
-        (there - beneath[reading]) / shift
     }
 
     /// The tilt of a place's channel, mm/mm.

@@ -17,7 +17,7 @@ use errsep_models::reversal::designs::simulate::{
 use errsep_models::reversal::designs::{
     Analysis, Design, DesignObservations, DesignReading, Zero, form_analysis, slope_analysis,
 };
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -312,12 +312,12 @@ fn taken_up(analysis: &Analysis, columns: &DMatrix<f64>) -> DMatrix<f64> {
     &base * (base.transpose() * columns)
 }
 
-fn model(readings: &DesignObservations) -> Option<FirstOrder> {
+fn model(readings: &DesignObservations) -> Option<Linearised> {
     let assumptions = Assumptions {
         thickness: Some(THICKNESS_MM),
         ..Assumptions::default()
     };
-    FirstOrder::of_design(readings, Zero::Reset, None, assumptions).ok()
+    Linearised::of_design(readings, Zero::Reset, None, assumptions).ok()
 }
 
 fn diagnosed(readings: &DesignObservations, false_alarm: f64, seed: u64) -> Option<Diagnosis> {

@@ -2,7 +2,7 @@
 //! gap shrinks, and what could still hide.
 
 use errsep::diagnosis::{Options, diagnose};
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::exact_readings::{Injection, Scene, SceneNoise};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     machine.effects.push(Injection::AxisBacklash(1.0));
     let observations = machine.measured(1);
 
-    let model = FirstOrder::new(&observations, Assumptions::default())?;
+    let model = Linearised::new(&observations, Assumptions::default())?;
     let diagnosis = diagnose(&model, &Options::default());
     println!("{}", diagnosis.verdict.statement);
     println!(

@@ -11,7 +11,7 @@ mod scene;
 
 use errsep::diagnosis::{Kind, Options, Seen, Tabulated, diagnose_with, learn, tested};
 use errsep_models::model::{FittedModel, Place};
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use nalgebra::DVector;
 use other_models::{
     calibration_line_made, circle_made, four_sensor_made, fourier_made, machine_made,
@@ -310,7 +310,7 @@ fn table<M: FittedModel>(
 
 /// A reversal of one machine, set up anew for every campaign: tilts a twentieth of themselves away, offsets a
 /// tenth.
-fn reversal(seed: u64, campaign: u64) -> FirstOrder {
+fn reversal(seed: u64, campaign: u64) -> Linearised {
     let mut scene = scene::scene(seed, 20e-6);
     let other = scene::scene(seed * 31 + campaign, 20e-6);
     for k in 0..3 {
@@ -320,7 +320,7 @@ fn reversal(seed: u64, campaign: u64) -> FirstOrder {
         scene.offsets[k] += 0.1 * other.offsets[k];
     }
     let observations = scene.measured(seed * 1000 + campaign);
-    FirstOrder::new(&observations, Assumptions::default()).unwrap()
+    Linearised::new(&observations, Assumptions::default()).unwrap()
 }
 
 fn main() {

@@ -7,7 +7,7 @@
 use std::time::Instant;
 
 use errsep::diagnosis::{Options, diagnose};
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use rayon::prelude::*;
 
 #[path = "../tests/realisations/mod.rs"]
@@ -55,7 +55,7 @@ fn main() {
             } else {
                 measured(effect, way, visible, seed, POSITIONS)?
             };
-            let model = FirstOrder::new(&readings, Assumptions::default()).ok()?;
+            let model = Linearised::new(&readings, Assumptions::default()).ok()?;
             let start = Instant::now();
             let without = if has("--withheld") { vec![effect.to_owned()] } else { Vec::new() };
             let told = diagnose(&model, &Options { seed, without, ..Options::default() });

@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use errsep::diagnosis::{Diagnosis, Kind, Options, diagnose};
 use errsep_models::reversal::Observations;
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use rayon::prelude::*;
 
 use maker::{Made, Noise, make, seal, size};
@@ -173,7 +173,7 @@ fn tried(set: &str, job: &Job) -> Option<Outcome> {
 
 /// The solver: it sees readings only.
 fn solve(observations: &Observations, without: &[&str], seed: u64) -> Option<Diagnosis> {
-    let model = FirstOrder::new(observations, Assumptions::default()).ok()?;
+    let model = Linearised::new(observations, Assumptions::default()).ok()?;
     let options = Options {
         seed,
         without: without.iter().map(|s| (*s).to_owned()).collect(),

@@ -10,7 +10,7 @@ mod scene;
 use errsep::diagnosis::{Diagnosis, Kind, Options, Size, diagnose};
 use errsep_models::model::FittedModel;
 use errsep_models::reversal::Channel;
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::exact_readings::Injection;
 use nalgebra::{DMatrix, DVector};
 use other_models::{MAKERS, Put, within};
@@ -274,7 +274,7 @@ fn left<M: FittedModel>(model: &M, absorbed: &DMatrix<f64>) -> f64 {
 }
 
 /// Sixty positions, four repeats, both directions.
-fn reversal(put: Put<'_>, seed: u64, noise: f64) -> FirstOrder {
+fn reversal(put: Put<'_>, seed: u64, noise: f64) -> Linearised {
     let mut truth = scene::scene(seed, 3e-5);
     for (name, size) in put {
         truth.effects.push(match *name {
@@ -293,6 +293,6 @@ fn reversal(put: Put<'_>, seed: u64, noise: f64) -> FirstOrder {
     } else {
         truth.exact()
     };
-    FirstOrder::new(&observations, Assumptions::default())
+    Linearised::new(&observations, Assumptions::default())
         .unwrap_or_else(|e| unreachable!("a complete reversal: {e}"))
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 use errsep::diagnosis::{NoiseLaw, NoiseSource, Options, certificate, diagnose};
 use errsep_models::model::FittedModel;
 use errsep_models::reversal::Observations;
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use serde_json::Value;
 
 /// What a diagnosis says, from its JSON.
@@ -61,12 +61,12 @@ impl Said {
 }
 
 /// The model that is diagnosed.
-fn model(readings: &Observations, thickness: Option<f64>) -> Result<FirstOrder, String> {
+fn model(readings: &Observations, thickness: Option<f64>) -> Result<Linearised, String> {
     let assumptions = Assumptions {
         thickness,
         ..Assumptions::default()
     };
-    FirstOrder::new(readings, assumptions).map_err(|e| e.to_string())
+    Linearised::new(readings, assumptions).map_err(|e| e.to_string())
 }
 
 /// Diagnoses readings with a catalogue from which some effects are left out.

@@ -88,9 +88,9 @@ pub(in crate::diagnosis) const NEAR: f64 = 0.7;
 /// *Tuned.* A size counts from this many of its standard uncertainties on: that of the only cause, and
 /// those of several, which may imitate what another leaves.
 pub(in crate::diagnosis) const STANDS: [f64; 2] = [1.0, 2.0];
-/// *Tuned*, odds of 1 to 22 000. An effect that was given more amplitudes than its usual form has,
-/// and has more unknowns than that of greatest evidence, stands in its place by its freedom alone where its
-/// log-evidence is less by this.
+/// *Tuned*, odds of 1 to 22 000. An effect with more unknowns than that of greatest evidence stands in its
+/// place by its freedom alone where its log-evidence is less by this, and it was given more amplitudes than its
+/// usual form has or explains no more than chance by them.
 pub(in crate::diagnosis) const OUTDONE: f64 = 10.0;
 /// *Limit.* A signature of which less than this part, squared, is left beside another is held by it: what is
 /// left of them at states that differ by their noise.

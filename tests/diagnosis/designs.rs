@@ -4,7 +4,7 @@
 use errsep::diagnosis::{Diagnosis, Kind, Options, diagnose};
 use errsep_models::model::FittedModel;
 use errsep_models::reversal::designs::{Design, DesignObservations, DesignReading, Zero};
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder, NotDiagnosable};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised, NotDiagnosable};
 use errsep_models::reversal::{Channel, Convention, Direction, Observations, Reading};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -151,8 +151,8 @@ impl Put {
     }
 }
 
-fn model(readings: &DesignObservations) -> FirstOrder {
-    FirstOrder::of_design(readings, Zero::Reset, None, Assumptions::default()).unwrap()
+fn model(readings: &DesignObservations) -> Linearised {
+    Linearised::of_design(readings, Zero::Reset, None, Assumptions::default()).unwrap()
 }
 
 fn diagnosed(readings: &DesignObservations) -> Diagnosis {
@@ -468,7 +468,7 @@ fn four_channels_told_by_their_angles() {
             draws: 200,
             ..Options::default()
         };
-        let of_four = diagnose(&FirstOrder::new(&four, rigid).unwrap(), &options);
+        let of_four = diagnose(&Linearised::new(&four, rigid).unwrap(), &options);
         let of_design = diagnosed(&readings);
         assert_eq!(of_four.verdict.effects, of_design.verdict.effects, "{what}");
         // ε·κ: the same fit by other sums, 1e-9 of the gap.
@@ -505,6 +505,6 @@ fn what_leaves_nothing_over_is_refused() {
     readings
         .readings
         .retain(|r| r.direction == Direction::Forward);
-    let refused = FirstOrder::of_design(&readings, Zero::Reset, None, Assumptions::default());
+    let refused = Linearised::of_design(&readings, Zero::Reset, None, Assumptions::default());
     assert!(matches!(refused, Err(NotDiagnosable::NothingLeft { .. })));
 }

@@ -12,7 +12,7 @@ use errsep_models::machine::{
     Chain, Machine, MeasuredParts, PartDisturbance, Position, Sense, simulate_parts_disturbed,
 };
 use errsep_models::model::{FittedModel, Shape};
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
@@ -261,7 +261,7 @@ fn machine() {
 fn readings_are_counted_from_mid_travel() {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let scene = Scene::random(151, 2, 3e-5, 2.0, SceneNoise::default(), &mut random);
-    let model = FirstOrder::new(&scene.exact(), Assumptions::default()).unwrap();
+    let model = Linearised::new(&scene.exact(), Assumptions::default()).unwrap();
     let middle = scene.travel() / 2.0;
     let mut form: f64 = 0.0;
     for trace in model.traces() {
@@ -282,7 +282,7 @@ fn readings_are_counted_from_mid_travel() {
 fn effects_told_relative_to_the_state_are_carried() {
     let mut random = ChaCha8Rng::seed_from_u64(6);
     let scene = Scene::random(61, 2, 3e-5, 2.0, SceneNoise::default(), &mut random);
-    let model = FirstOrder::new(&scene.exact(), Assumptions::default()).unwrap();
+    let model = Linearised::new(&scene.exact(), Assumptions::default()).unwrap();
     let further = model.further();
     let (_, tilted) = further
         .iter()

@@ -3,7 +3,7 @@
 
 use errsep::diagnosis::{Diagnosis, Kind, Options, Tabulated, diagnose_with};
 use errsep_models::model::{Effect, FittedModel, Freedom, Record};
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
@@ -13,13 +13,13 @@ use rand_chacha::ChaCha8Rng;
 /// readings in some unit.
 #[derive(Clone)]
 struct Lines {
-    reversal: FirstOrder,
+    reversal: Linearised,
     record: Record,
     freedom: DMatrix<f64>,
 }
 
 impl Lines {
-    fn new(reversal: &FirstOrder) -> Self {
+    fn new(reversal: &Linearised) -> Self {
         let places = reversal.places();
         let freedom = DMatrix::from_fn(places.len(), 8, |k, column| {
             let here = f64::from(u8::from(places[k].channel == column / 2));
@@ -80,7 +80,7 @@ fn readings(seed: u64) -> Lines {
         ..SceneNoise::default()
     };
     let scene = Scene::random(40, 4, 3e-5, 0.0, noise, &mut random);
-    let reversal = FirstOrder::new(&scene.measured(seed), Assumptions::default()).unwrap();
+    let reversal = Linearised::new(&scene.measured(seed), Assumptions::default()).unwrap();
     let mut lines = Lines::new(&reversal);
     let change = Effect::<Lines>::columns(
         &effect("early", 60.0),

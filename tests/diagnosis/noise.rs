@@ -8,7 +8,7 @@ use errsep_models::machine::{
     Spread, simulate_parts_disturbed,
 };
 use errsep_models::reversal::Channel;
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::exact_readings::{Injection, Scene, SceneNoise};
 use errsep_models::uncertainty::DegreesOfFreedom;
 
@@ -76,7 +76,7 @@ fn a_stated_noise_is_believed_and_compared() {
             noise: Some(noise),
             ..Assumptions::default()
         };
-        let model = FirstOrder::new(&scene.measured(5), assumptions).unwrap();
+        let model = Linearised::new(&scene.measured(5), assumptions).unwrap();
         diagnose(&model, &options())
     };
     let right = stated(0.02);

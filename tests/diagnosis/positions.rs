@@ -2,7 +2,7 @@
 //! of unequal length, and very long ones.
 
 use errsep::diagnosis::{Diagnosis, Kind, Options, diagnose};
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder, NotDiagnosable};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised, NotDiagnosable};
 use errsep_models::reversal::{Channel, Direction, Observations, Reading};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -124,7 +124,7 @@ fn campaign(design: Positions, put: Put, seed: u64) -> Observations {
 }
 
 fn diagnosed(observations: &Observations) -> Diagnosis {
-    let model = FirstOrder::new(observations, Assumptions::default()).unwrap();
+    let model = Linearised::new(observations, Assumptions::default()).unwrap();
     let options = Options {
         draws: 400,
         ..Options::default()
@@ -193,7 +193,7 @@ fn stated_noise_is_that_of_one_reading() {
         noise: Some(NOISE),
         ..Assumptions::default()
     };
-    let model = FirstOrder::new(&readings, stated).unwrap();
+    let model = Linearised::new(&readings, stated).unwrap();
     let each = model.gathered.as_ref().unwrap().readings_per_cell;
     assert!(each > 10.0, "{each}");
     let diagnosis = diagnose(&model, &Options::default());
@@ -219,7 +219,7 @@ fn traces_without_a_common_stretch_are_told() {
     short
         .readings
         .retain(|r| r.channel != Channel::C1A || r.repeat != 2 || r.x < 20.0);
-    let model = FirstOrder::new(&short, Assumptions::default()).unwrap();
+    let model = Linearised::new(&short, Assumptions::default()).unwrap();
     let used = model.gathered.as_ref().unwrap();
     assert!(used.cells > 50, "{}", used.cells);
     assert!(model.left_out < all / 20, "{} left out", model.left_out);
@@ -229,7 +229,7 @@ fn traces_without_a_common_stretch_are_told() {
         .readings
         .retain(|r| (r.channel == Channel::C1A) == (r.x < 100.0));
     assert!(matches!(
-        FirstOrder::new(&apart, Assumptions::default()),
+        Linearised::new(&apart, Assumptions::default()),
         Err(NotDiagnosable::RangesDiffer | NotDiagnosable::NoFit(_))
     ));
 }

@@ -5,13 +5,13 @@ use crate::realisations::{measured, nothing};
 use errsep::diagnosis::{Diagnosis, Kind, Options, diagnose};
 use errsep_models::model::FittedModel;
 use errsep_models::reversal::Observations;
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use rayon::prelude::*;
 
 const POSITIONS: usize = 60;
 
 fn diagnosed(readings: &Observations) -> Diagnosis {
-    let model = FirstOrder::new(readings, Assumptions::default()).unwrap();
+    let model = Linearised::new(readings, Assumptions::default()).unwrap();
     let options = Options {
         draws: 200,
         ..Options::default()
@@ -21,7 +21,7 @@ fn diagnosed(readings: &Observations) -> Diagnosis {
 
 /// Every cause that is named has a size beyond twice its standard uncertainty.
 fn stands(diagnosis: &Diagnosis) {
-    let model = FirstOrder::new(&nothing(1, 20), Assumptions::default()).unwrap();
+    let model = Linearised::new(&nothing(1, 20), Assumptions::default()).unwrap();
     let catalogue = model.effects();
     for name in &diagnosis.verdict.effects {
         let cause = diagnosis.candidates.iter().find(|c| c.effect == *name);

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::scene::{diagnosed, scene};
 use errsep::diagnosis::{Kind, Options, prove};
 use errsep_models::model::FittedModel;
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::exact_readings::{Injection, Scene, SceneNoise};
 use errsep_models::reversal::{Channel, Direction, Observations, Reading};
 use rand::SeedableRng;
@@ -57,7 +57,7 @@ fn injected(name: &str, scene: &Scene) -> Option<Injection> {
 /// the catalogue nothing else is blamed alone where it has no such company.
 #[test]
 fn every_effect_of_the_catalogue_is_found_blind() {
-    let bare = FirstOrder::new(&scene(1, 3e-5).exact(), Assumptions::default()).unwrap();
+    let bare = Linearised::new(&scene(1, 3e-5).exact(), Assumptions::default()).unwrap();
     let mut tried = 0;
     for effect in bare.effects() {
         let tilt = if effect.name() == "thickness-shift" {
@@ -262,7 +262,7 @@ fn a_place_is_told_only_where_there_is_one() {
 #[test]
 fn sealed_effects_are_found_again() {
     let readings = scene(12, 3e-5).measured(12);
-    let model = FirstOrder::new(&readings, Assumptions::default()).unwrap();
+    let model = Linearised::new(&readings, Assumptions::default()).unwrap();
     let options = Options {
         draws: 200,
         ..Options::default()

@@ -3,7 +3,7 @@
 
 use errsep::diagnosis::{Diagnosis, Options, diagnose};
 use errsep_models::reversal::Observations;
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -20,7 +20,7 @@ pub fn scene(seed: u64, tilt: f64) -> Scene {
 
 /// The diagnosis, with effects withheld.
 pub fn diagnosed(observations: &Observations, without: &[&str]) -> Diagnosis {
-    let model = FirstOrder::new(observations, Assumptions::default()).unwrap();
+    let model = Linearised::new(observations, Assumptions::default()).unwrap();
     let options = Options {
         draws: 200,
         without: without.iter().map(|s| (*s).to_owned()).collect(),

@@ -1,6 +1,7 @@
 //! The reversal, staged and simultaneous, against known truth.
 
 mod designs;
+mod diagnosable;
 #[path = "../faulty_machine/mod.rs"]
 mod faulty_machine;
 mod left_out;

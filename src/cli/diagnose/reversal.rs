@@ -6,7 +6,7 @@ use std::sync::Arc;
 use errsep_models::model::{FittedModel, Place};
 use errsep_models::reversal::Direction;
 use errsep_models::reversal::designs::DesignFit;
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder, NotDiagnosable};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised, NotDiagnosable};
 use errsep_models::reversal::effects::joins_the_fit;
 use serde_json::Value;
 
@@ -41,7 +41,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
             args.with.join(",")
         )));
     }
-    let model = FirstOrder::new(&data.observations, assumptions(&setup))
+    let model = Linearised::new(&data.observations, assumptions(&setup))
         .map_err(|why| refusal(&why).in_file(&args.data))?;
     let notes = notes(&model);
     let mut answer = Case {
@@ -93,13 +93,13 @@ fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<An
 /// The fitted model of a design, with the fit of its readings where there is one.
 ///
 /// # Errors
-/// As [`FirstOrder::of_design`].
+/// As [`Linearised::of_design`].
 pub fn design_model(
     setup: &ReversalSetup,
     data: &DesignData,
     fit: Option<&DesignFit>,
-) -> Result<FirstOrder, NotDiagnosable> {
-    FirstOrder::of_design(&data.observations, setup.zero, fit, assumptions(setup))
+) -> Result<Linearised, NotDiagnosable> {
+    Linearised::of_design(&data.observations, setup.zero, fit, assumptions(setup))
 }
 
 /// A design's answer with the fit that effects have joined behind it, and what they change in each
@@ -208,7 +208,7 @@ fn with_command(args: &Args, diagnosis: &Value) -> Option<String> {
 }
 
 /// What people should know of readings as they are diagnosed.
-pub fn notes(model: &FirstOrder) -> Vec<String> {
+pub fn notes(model: &Linearised) -> Vec<String> {
     let mut notes = Vec::new();
     if !model.timed {
         notes.push("No times are given: the readings are taken to follow each other evenly, first spindle position first, each repeat forward and then backward.".to_owned());
@@ -245,7 +245,7 @@ pub fn notes(model: &FirstOrder) -> Vec<String> {
 }
 
 /// What people should know of a design as it is diagnosed.
-fn notes_on_design(model: &FirstOrder) -> Vec<String> {
+fn notes_on_design(model: &Linearised) -> Vec<String> {
     let determined = model.arrangement().determined();
     let (forms, slopes) = (&determined.forms, &determined.slopes);
     match (forms.to_spare(), slopes.to_spare()) {

@@ -7,7 +7,7 @@ use errsep_models::reversal::designs::simulate::{DesignPlan, simulate};
 use errsep_models::reversal::designs::{
     Design, DesignFit, DesignObservations, DesignOptions, DesignReading, Determined, Zero, fit,
 };
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::simultaneous::Noise;
 use serde::Serialize;
 
@@ -188,7 +188,7 @@ fn effects(
         noise: Some(plan.noise),
         ..Assumptions::default()
     };
-    let model = FirstOrder::of_design(observations, plan.zero, None, assumptions)
+    let model = Linearised::of_design(observations, plan.zero, None, assumptions)
         .map_err(|why| why.to_string())?;
     let law = NoiseLaw::white(plan.noise, f64::INFINITY, NoiseSource::Stated);
     let options = Options {

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use errsep_models::model::FittedModel;
 use errsep_models::reversal::Convention;
-use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::simulate::{Plan, TrueForm, simulate};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -210,7 +210,7 @@ fn certified(planned: &Planned, seed: u64) -> Result<Vec<Diagnosability>, Messag
         thickness: None,
         noise: Some(planned.noise),
     };
-    let model = FirstOrder::new(&observations, assumptions)
+    let model = Linearised::new(&observations, assumptions)
         .map_err(|e| Message::bad_input(e.to_string()).remedy("plan more positions or repeats"))?;
     let law = NoiseLaw::white(planned.noise, f64::INFINITY, NoiseSource::Stated);
     let options = Options {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use errsep_models::reversal::designs::DesignFit;
-use errsep_models::reversal::diagnosable::FirstOrder;
+use errsep_models::reversal::diagnosable::Linearised;
 use errsep_models::reversal::simultaneous::Simultaneous;
 use serde_json::Value;
 
@@ -19,7 +19,7 @@ const HEADING: &str = "Where and why model and readings disagree";
 
 /// A diagnosis with the model that it is of.
 pub struct Diagnosed {
-    model: FirstOrder,
+    model: Linearised,
     diagnosis: Diagnosis,
     data: String,
 }
@@ -33,7 +33,7 @@ impl Diagnosed {
         fit: &Simultaneous,
         seed: u64,
     ) -> Result<Self, Message> {
-        let model = FirstOrder::of_fit(&data.observations, fit, reversal::assumptions(setup))
+        let model = Linearised::of_fit(&data.observations, fit, reversal::assumptions(setup))
             .map_err(|why| reversal::refusal(&why).in_file(file))?;
         Self::made(file, model, seed)
     }
@@ -51,7 +51,7 @@ impl Diagnosed {
         Self::made(file, model, seed)
     }
 
-    fn made(file: &Path, model: FirstOrder, seed: u64) -> Result<Self, Message> {
+    fn made(file: &Path, model: Linearised, seed: u64) -> Result<Self, Message> {
         within_reach_of(&model, reversal::ALONG, file)?;
         let options = Options {
             seed,

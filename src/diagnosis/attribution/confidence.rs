@@ -247,19 +247,8 @@ fn alternatives<M: FittedModel>(
     };
     let effects = (0..context.catalogue.len()).into_par_iter();
     let mut members: Vec<Member> = effects.filter_map(best_of).collect();
-    let known = |m: &Member| (m.evidence, m.causes[k].unknowns());
-    let leader = members.iter().map(known);
-    if let Some((most, fewest)) = leader.max_by(|a, b| a.0.total_cmp(&b.0)) {
-        // What a search of relatives has freed beyond the dictionary must pay for it.
-        let freed = |m: &Member| {
-            let order = context
-                .family_of(m.causes[k].effect)
-                .map(|f| context.order_of(f));
-            order.is_some_and(|order| m.causes[k].columns.len() > order)
-        };
-        members.retain(|m| known(m).1 <= fewest || !freed(m) || m.evidence > most - OUTDONE);
-        drop_holders(context, &mut members, k);
-    }
+    drop_outdone(context, &mut members, k);
+    drop_holders(context, &mut members, k);
     let least = members
         .iter()
         .map(|m| m.misfit)
@@ -276,6 +265,29 @@ fn alternatives<M: FittedModel>(
         })
     });
     members
+}
+
+/// Drops what stands in the place of the member of greatest evidence by its freedom alone: what a search of
+/// relatives has freed beyond the dictionary must pay for it, and so must unknowns by which it explains no
+/// more than chance.
+fn drop_outdone<M: FittedModel>(context: &Context<'_, M>, members: &mut Vec<Member>, k: usize) {
+    let known = |m: &Member| (m.evidence, m.causes[k].unknowns(), m.misfit);
+    let leader = members.iter().map(known);
+    let Some((most, fewest, misfit)) = leader.max_by(|a, b| a.0.total_cmp(&b.0)) else {
+        return;
+    };
+    members.retain(|m| {
+        let more = m.causes[k].unknowns().saturating_sub(fewest);
+        if more == 0 || m.evidence > most - OUTDONE {
+            return true;
+        }
+        let order = context
+            .family_of(m.causes[k].effect)
+            .map(|f| context.order_of(f));
+        let freed = order.is_some_and(|order| m.causes[k].columns.len() > order);
+        let earned = misfit - m.misfit > chi_squared_quantile(0.99, more);
+        earned && !freed
+    });
 }
 
 /// Drops what holds the signature of the member of greatest evidence among others of its own that explain no

@@ -288,14 +288,14 @@ pub(in crate::diagnosis) fn median(values: &mut [f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+    use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
     use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
     use rand_distr::StandardNormal;
 
-    fn model() -> FirstOrder {
+    fn model() -> Linearised {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let scene = Scene::random(100, 4, 1e-5, 2.0, SceneNoise::default(), &mut random);
-        FirstOrder::new(&scene.exact(), Assumptions::default()).unwrap()
+        Linearised::new(&scene.exact(), Assumptions::default()).unwrap()
     }
 
     /// Student's noise with three degrees of freedom is taken for 2.5 to 4, with 3200 readings, and

@@ -159,12 +159,12 @@ fn middle(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use errsep_models::reversal::diagnosable::{Assumptions, FirstOrder};
+    use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
     use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    fn readings(repeats: u32, correlated: f64, seed: u64) -> FirstOrder {
+    fn readings(repeats: u32, correlated: f64, seed: u64) -> Linearised {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let noise = SceneNoise {
             white: 0.1,
@@ -173,7 +173,7 @@ mod tests {
             shift: correlated,
         };
         let scene = Scene::random(80, repeats, 1e-5, 2.0, noise, &mut random);
-        FirstOrder::new(&scene.measured(seed), Assumptions::default()).unwrap()
+        Linearised::new(&scene.measured(seed), Assumptions::default()).unwrap()
     }
 
     /// k·u: two medians of eight differences from another repeat know a step to

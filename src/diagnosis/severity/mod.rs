@@ -183,7 +183,8 @@ fn severity<M: FittedModel>(context: &Context<'_, M>, name: &Name, options: &Opt
     }
 }
 
-/// Draws rivals of a family until it is settled on which side of the limit they are.
+/// Draws rivals of a family until it is settled on which side of the limit they are. A family that can
+/// hardly make a gap of this size is no rival: none are counted.
 fn drawn<M: FittedModel>(
     context: &Context<'_, M>,
     name: &Name,
@@ -201,10 +202,11 @@ fn drawn<M: FittedModel>(
         count.drawn += rivals.count;
         count.alike += alike.iter().filter(|alike| **alike).count();
         if count.settled() || count.drawn >= options.severity {
-            break;
+            return count;
         }
     }
-    count
+    let told = count.drawn >= BATCH.min(options.severity);
+    if told { count } else { Count::default() }
 }
 
 #[cfg(test)]

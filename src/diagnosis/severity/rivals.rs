@@ -19,8 +19,11 @@ use crate::diagnosis::severity::stage::Name;
 const COSINES: usize = 24;
 /// Points a length at which it is reckoned, straight between them.
 const FINENESS: f64 = 8.0;
-/// Rounds of drawing until a batch is full: fewer rivals are taken where most are like the effect.
+/// Rounds of drawing smooth functions until a batch is full: fewer rivals are taken where most are like
+/// the effect.
 const ROUNDS: usize = 6;
+/// Effects tried for each that is wanted: few of a family may be possible at the size of the gap.
+const TRIES: usize = 64;
 
 /// A family of rivals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,39 +84,22 @@ impl Drawn {
         (seed, batch): (u64, usize),
         most: usize,
     ) -> Self {
-        let n = context.space.readings();
         let mut random = ChaCha8Rng::seed_from_u64(seed ^ family.stream(context));
         random.set_stream(batch as u64 + 1);
+        let most = most.min(BATCH);
+        let gaps = match family {
+            Family::Effect(k) => effects(context, name, k, most, &mut random),
+            _ => smooth(context, name, family, most, &mut random),
+        };
         let spikes = Spikes::new(context.model);
-        let mut readings = DMatrix::zeros(n, BATCH);
-        let mut count = 0;
-        let ground = Ground::of(context, family);
-        for _ in 0..ROUNDS {
-            let (raw, effects) = many(context, family, ground.as_ref(), &mut random);
-            let (left, whole) = context.space.forward(raw.clone());
-            let sizes: Vec<f64> = left.column_iter().map(|c| c.norm()).collect();
-            let alike = cosines(context, name, family, left);
-            for k in 0..BATCH {
-                let visible = sizes[k] * sizes[k] > INVISIBLE * whole[k] * whole[k];
-                if count >= most || !visible || alike[k] >= SAME {
-                    continue;
-                }
-                let scale = name.size / sizes[k];
-                if !plausible(context, family, effects.get(k), scale) {
-                    continue;
-                }
-                let draw = batch * BATCH + count;
-                let noise = context
-                    .law
-                    .draw_possible(context.model, &spikes, draw, &mut random)
-                    + draw_scatter(context.model, &mut random);
-                let sum = raw.column(k) * scale + noise;
-                readings.column_mut(count).copy_from(&sum);
-                count += 1;
-            }
-            if count >= most {
-                break;
-            }
+        let mut readings = DMatrix::zeros(context.space.readings(), BATCH);
+        for (k, gap) in gaps.iter().enumerate() {
+            let draw = batch * BATCH + k;
+            let noise = context
+                .law
+                .draw_possible(context.model, &spikes, draw, &mut random)
+                + draw_scatter(context.model, &mut random);
+            readings.column_mut(k).copy_from(&(gap + noise));
         }
         let family = match family {
             Family::Effect(k) => context.family_of(k),
@@ -121,47 +107,82 @@ impl Drawn {
         };
         Self {
             readings,
-            count,
+            count: gaps.len(),
             family,
         }
     }
 }
 
-/// The entry of the dictionary that an effect was drawn at, and its amplitudes.
-type At = (usize, DVector<f64>);
-
-/// `BATCH` rivals of any size, without noise.
-fn many<M: FittedModel>(
+/// Gaps that an effect makes at sizes that it could have, without noise.
+fn effects<M: FittedModel>(
     context: &Context<'_, M>,
-    family: Family,
-    ground: Option<&Ground>,
+    name: &Name,
+    effect: usize,
+    most: usize,
     random: &mut ChaCha8Rng,
-) -> (DMatrix<f64>, Vec<At>) {
-    let mut raw = DMatrix::zeros(context.space.readings(), BATCH);
-    let mut effects = Vec::new();
-    let entries = match family {
-        Family::Effect(k) => context
-            .family_of(k)
-            .map_or(0..0, |f| context.dictionary.families[f].entries.clone()),
-        _ => 0..0,
+) -> Vec<DVector<f64>> {
+    let families = &context.dictionary.families;
+    let Some(entries) = context.family_of(effect).map(|f| &families[f].entries) else {
+        return Vec::new();
     };
-    for mut column in raw.column_iter_mut() {
-        if let Some(ground) = ground {
-            column.copy_from(&ground.smooth(context, random));
-        } else if !entries.is_empty() {
-            let at = random.random_range(entries.clone());
-            let entry = &context.dictionary.entries[at];
-            let amplitudes = amplitudes(entry, random);
-            let columns = context.dictionary.columns(entry);
-            for (signature, amplitude) in columns.iter().zip(amplitudes.iter()) {
-                for (&row, value) in signature.rows.iter().zip(&signature.values) {
-                    column[row] += amplitude * value;
-                }
-            }
-            effects.push((at, amplitudes));
+    if entries.is_empty() {
+        return Vec::new();
+    }
+    let mut possible = Vec::new();
+    for _ in 0..TRIES * most {
+        let entry = &context.dictionary.entries[random.random_range(entries.clone())];
+        let mut sizes = amplitudes(entry, random);
+        sizes *= name.size / sizes.dot(&(&entry.gram * &sizes)).sqrt();
+        if could_be(context, effect, entry, &sizes) {
+            possible.push((entry, sizes));
+        }
+        if possible.len() == most {
+            break;
         }
     }
-    (raw, effects)
+    let gap = |(entry, sizes): (&Entry, DVector<f64>)| {
+        let mut sum = DVector::zeros(context.space.readings());
+        let columns = context.dictionary.columns(entry);
+        for (signature, size) in columns.iter().zip(sizes.iter()) {
+            for (&row, value) in signature.rows.iter().zip(&signature.values) {
+                sum[row] += size * value;
+            }
+        }
+        sum
+    };
+    possible.into_iter().map(gap).collect()
+}
+
+/// Smooth gaps that are none of the effects of a group, without noise.
+fn smooth<M: FittedModel>(
+    context: &Context<'_, M>,
+    name: &Name,
+    family: Family,
+    most: usize,
+    random: &mut ChaCha8Rng,
+) -> Vec<DVector<f64>> {
+    let mut gaps = Vec::new();
+    let Some(ground) = Ground::of(context, family) else {
+        return gaps;
+    };
+    for _ in 0..ROUNDS {
+        let mut raw = DMatrix::zeros(context.space.readings(), BATCH);
+        for mut column in raw.column_iter_mut() {
+            column.copy_from(&ground.smooth(context, random));
+        }
+        let (left, whole) = context.space.forward(raw.clone());
+        let sizes: Vec<f64> = left.column_iter().map(|c| c.norm()).collect();
+        let alike = cosines(context, name, left);
+        let usable = (0..BATCH)
+            .filter(|k| sizes[*k] * sizes[*k] > INVISIBLE * whole[*k] * whole[*k])
+            .filter(|k| alike[*k] < SAME);
+        gaps.extend(usable.map(|k| raw.column(k) * (name.size / sizes[k])));
+        if gaps.len() >= most {
+            break;
+        }
+    }
+    gaps.truncate(most);
+    gaps
 }
 
 /// Amplitudes of which all visible directions are as probable.
@@ -178,35 +199,22 @@ fn amplitudes(entry: &Entry, random: &mut ChaCha8Rng) -> DVector<f64> {
         .unwrap_or(normal)
 }
 
-/// Whether an effect could be of the size that makes such a gap.
-fn plausible<M: FittedModel>(
+/// Whether an effect could be of these sizes.
+fn could_be<M: FittedModel>(
     context: &Context<'_, M>,
-    family: Family,
-    at: Option<&At>,
-    scale: f64,
+    effect: usize,
+    entry: &Entry,
+    sizes: &DVector<f64>,
 ) -> bool {
-    let (Family::Effect(effect), Some((entry, amplitudes))) = (family, at) else {
-        return !matches!(family, Family::Effect(_));
-    };
-    let Meaning::Effect(shape) = &context.dictionary.entries[*entry].meaning else {
+    let Meaning::Effect(shape) = &entry.meaning else {
         return false;
     };
-    let sizes = amplitudes * scale;
     let known = vec![0.0; sizes.len()];
     context.plausible(effect, shape, sizes.as_slice(), &known)
 }
 
-/// Cosine of each smooth rival to the nearest member of the group; effects are rivals whatever they are
-/// like.
-fn cosines<M: FittedModel>(
-    context: &Context<'_, M>,
-    name: &Name,
-    family: Family,
-    left: DMatrix<f64>,
-) -> Vec<f64> {
-    if matches!(family, Family::Effect(_)) {
-        return vec![0.0; BATCH];
-    }
+/// Cosine of each smooth rival to the nearest member of the group.
+fn cosines<M: FittedModel>(context: &Context<'_, M>, name: &Name, left: DMatrix<f64>) -> Vec<f64> {
     let squares: Vec<f64> = left.column_iter().map(|c| c.norm_squared()).collect();
     let adjoint = seen(&context.dictionary, &context.space, left);
     let mut greatest = vec![0.0f64; BATCH];

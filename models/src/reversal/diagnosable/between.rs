@@ -13,7 +13,7 @@
 use nalgebra::DVector;
 
 use super::super::smooth_profile::Spot;
-use super::FirstOrder;
+use super::Linearised;
 use crate::model::{Column, Place};
 
 /// Positions over which errors are averaged, to either side.
@@ -33,7 +33,7 @@ const MOST_VALUES: usize = 20_000_000;
 /// Squared displacements, in the unit of the reading, below which a form between positions is known.
 const PLACES_ALIKE: f64 = 1e-6;
 
-impl FirstOrder {
+impl Linearised {
     /// Changes of the readings, of one standard deviation each, by what the forms may be where an effect has them
     /// touched: `shifts` gives for a reading, by its number and place, how far from its position, mm, the forms of the slide and that of
     /// the artefact are seen. What all readings at a position have in common is form.
@@ -269,7 +269,7 @@ mod tests {
     const COUNT: usize = 60;
 
     /// Two repeats of four channels: the slide straight, side A as given, side B straight.
-    fn model(noise: f64, side: impl Fn(f64) -> f64) -> FirstOrder {
+    fn model(noise: f64, side: impl Fn(f64) -> f64) -> Linearised {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut readings = Vec::new();
         for channel in Channel::ALL {
@@ -289,11 +289,11 @@ mod tests {
                 }));
             }
         }
-        FirstOrder::new(&Observations { readings }, Assumptions::default()).unwrap()
+        Linearised::new(&Observations { readings }, Assumptions::default()).unwrap()
     }
 
     /// The places of the columns' rows.
-    fn places(model: &FirstOrder, columns: &[Column]) -> Vec<f64> {
+    fn places(model: &Linearised, columns: &[Column]) -> Vec<f64> {
         let rows = columns.iter().flat_map(|c| c.rows.iter());
         rows.map(|k| model.record.places[*k].x).collect()
     }

@@ -1,10 +1,28 @@
-//! How a reading changes when the slide or the probed point stands elsewhere: chords of the smooth forms, per mm.
+//! How a reading changes when the slide or the probed point stands elsewhere: chords of the smooth forms, per mm,
+//! and what the exact geometry adds to a reading by the point that is touched.
 
 use super::super::smooth_profile::{SmoothProfile, Spot};
-use super::FirstOrder;
+use super::Linearised;
 use crate::model::Place;
 
-impl FirstOrder {
+impl Linearised {
+    /// What the exact geometry makes of a channel's reading at its k-th position beyond its first order
+    /// (ψ·x and the form at x), µm: a channel tilted by ψ climbs tan ψ per length, and the point that it
+    /// touches lies elsewhere along the artefact, x = u·cos ψ − (h + S(u))·sin ψ, half a thickness h off
+    /// the axis.
+    pub(super) fn beyond_first_order(&self, channel: usize, k: usize) -> f64 {
+        let tilt = (self.lines[channel].slope * 1e-3).atan();
+        let (sin, cos) = tilt.sin_cos();
+        let half = self.assumptions.thickness.map_or(0.0, |d| d / 2.0);
+        let (side, x) = (self.side(channel), self.positions[k]);
+        let touched = |height: f64| (x + (half + 1e-3 * height) * sin) / cos;
+        let form = |u: f64| side.at(&Spot::new(&self.positions, k, u));
+        // The form's slope times the tilt is what one step leaves of the point: 1e-8 of the way.
+        let u = touched(form(touched(side.values[k])));
+        let versed = 2.0 * (tilt / 2.0).sin().powi(2);
+        1e3 * (u * sin - half * versed - tilt * x) + form(u) * cos - side.values[k]
+    }
+
     /// Change of the artefact's form under a channel when the probed point moves along it by
     /// `shift` mm, per mm.
     pub fn side_chord(&self, place: &Place, shift: f64) -> f64 {

@@ -3,12 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::arrangement::Seat;
-use super::{FirstOrder, Gauge, Smoothing};
+use super::{Gauge, Linearised, Smoothing};
 use crate::model::{Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record};
 use crate::reversal::designs::{Determined, SLOPES, Zero};
 use crate::reversal::effects;
 
-impl FittedModel for FirstOrder {
+impl FittedModel for Linearised {
     fn name(&self) -> &'static str {
         "reversal"
     }
@@ -60,21 +60,14 @@ impl FittedModel for FirstOrder {
     }
 
     fn linearised(&self) -> DVector<f64> {
-        let half = self.assumptions.thickness.map_or(0.0, |d| d / 2.0);
-        DVector::from_iterator(
-            self.record.places.len(),
-            self.record
-                .places
-                .iter()
-                .zip(self.record.observed.iter())
-                .map(|(place, value)| {
-                    let slope = self.tilt(place);
-                    // A channel tilted by ψ climbs tan ψ per length, and its probe point lies h·ψ
-                    // further along the artefact.
-                    let climb = (slope - slope.atan()) * 1e3 * place.x;
-                    value - climb - self.side_slope(place) * half * slope
-                }),
-        )
+        let n = self.positions.len();
+        let cells = 0..n * self.present().len();
+        let beyond: Vec<f64> = cells
+            .map(|cell| self.beyond_first_order(cell / n, cell % n))
+            .collect();
+        let places = self.record.places.iter().zip(self.record.observed.iter());
+        let linear = places.map(|(place, value)| value - beyond[place.cell]);
+        DVector::from_iterator(self.record.places.len(), linear)
     }
 
     fn channel_names(&self) -> Vec<String> {
@@ -212,7 +205,7 @@ impl FittedModel for FirstOrder {
     }
 }
 
-impl FirstOrder {
+impl Linearised {
     /// A slope as a linear function of the readings, by the weights of the channels on it.
     fn slope_quantity(&self, name: &str, slope: &[f64], weight: impl Fn(usize) -> f64) -> Quantity {
         let traces = |channel: usize| {

@@ -1,13 +1,13 @@
 //! Measurements that could be made beside the present one.
 
-use super::{FirstOrder, Gathered};
+use super::{Gathered, Linearised};
 use crate::reversal::Direction;
 use crate::reversal::designs::{DesignObservations, DesignReading};
 
 /// Further tilt of the artefact, µm/mm.
 const TILT: f64 = 1.0;
 
-impl FirstOrder {
+impl Linearised {
     /// The fitted model of a measurement like this one with something changed, as the smooth state
     /// predicts it; nothing where that cannot be fitted.
     fn predicted(&self, change: impl Fn(usize, &mut Vec<DesignReading>)) -> Option<Self> {

@@ -1,6 +1,8 @@
-//! The first-order reversal model, fitted and laid open to the diagnosis.
+//! The reversal of the simultaneous fit about its solution, laid open to the diagnosis.
 //!
-//! Of the four channels I = i·M(x) + `S_side(x)` + (iα + pβ + ipγ)·x + b; of another design
+//! What the exact geometry makes of a reading beyond its first order is taken off it at the fitted tilts
+//! and forms (`chords.rs`). What is left is linear: of the four channels
+//! I = i·M(x) + `S_side(x)` + (iα + pβ + ipγ)·x + b, of another design
 //! M·n(φ) + S_ψ(x) + (α·n(φ) + γ·n(ψ) + τ + κ)·x + b. The forms are free at every position and hold
 //! no straight line, so nothing about their smoothness is assumed; what the fit leaves is the
 //! closure profiles (of four channels the pattern + + − − over 1A 1B 2A 2B, less its line), the slopes
@@ -82,9 +84,9 @@ struct ChannelLine {
     offset: f64,
 }
 
-/// The fitted first-order model.
+/// The fitted model, linear about its solution.
 #[derive(Debug, Clone)]
-pub struct FirstOrder {
+pub struct Linearised {
     assumptions: Assumptions,
     record: Record,
     arrangement: Arrangement,
@@ -114,7 +116,7 @@ pub struct FirstOrder {
     pub gathered: Option<Gathered>,
 }
 
-impl FirstOrder {
+impl Linearised {
     /// Sorts readings into traces and fits the model. Traces of their own positions, and very long
     /// ones, are gathered into common cells by the simultaneous fit.
     ///

@@ -6,7 +6,7 @@
 
 use nalgebra::DMatrix;
 
-use super::FirstOrder;
+use super::Linearised;
 use super::indicators::{ALL, Indicators};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Parameter, Shape};
 
@@ -19,7 +19,7 @@ const STRIDE: f64 = 0.3;
 /// Cycles by which two periods must differ to be told apart.
 const APART: f64 = 0.6;
 
-impl Effect<FirstOrder> for AmbientCycle {
+impl Effect<Linearised> for AmbientCycle {
     fn name(&self) -> &str {
         "ambient-cycle"
     }
@@ -44,7 +44,7 @@ impl Effect<FirstOrder> for AmbientCycle {
         vec![Parameter::between("cycles", "1", 0.5, 1e6)]
     }
 
-    fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, model: &Linearised) -> Vec<Shape> {
         let count = ((self.most(model) - 1.0) / STRIDE).floor() as usize;
         let at = |k: usize| Shape {
             variant: self.0.fullest(),
@@ -54,7 +54,7 @@ impl Effect<FirstOrder> for AmbientCycle {
         (0..=count).map(at).collect()
     }
 
-    fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, _model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let other = |variant| Shape {
             variant,
             ..shape.clone()
@@ -62,7 +62,7 @@ impl Effect<FirstOrder> for AmbientCycle {
         self.0.others(shape.variant).map(other).collect()
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let cycles = shape.values.first().copied().unwrap_or(1.0);
         let turn = std::f64::consts::TAU * cycles / model.duration();
         let wave = |function: fn(f64) -> f64| {
@@ -73,7 +73,7 @@ impl Effect<FirstOrder> for AmbientCycle {
         pairs.flat_map(|(cosine, sine)| [cosine, sine]).collect()
     }
 
-    fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
+    fn allowed(&self, model: &Linearised, shape: &Shape) -> bool {
         let reach = 0.9..=self.most(model);
         shape
             .values
@@ -81,7 +81,7 @@ impl Effect<FirstOrder> for AmbientCycle {
             .is_some_and(|cycles| reach.contains(cycles))
     }
 
-    fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, model: &Linearised, shape: &Shape) -> Option<String> {
         let cycles = shape.values.first()?;
         Some(format!("period {:.4} s", model.duration() / cycles))
     }
@@ -105,7 +105,7 @@ impl Effect<FirstOrder> for AmbientCycle {
 impl AmbientCycle {
     /// Most cycles: short of one in the time of two traces, where a sinusoid is the position that goes
     /// forward and back.
-    fn most(&self, model: &FirstOrder) -> f64 {
+    fn most(&self, model: &Linearised) -> f64 {
         let passes = model.traces().len() / self.0.count();
         (0.5 * passes as f64 - APART).max(1.0)
     }

@@ -3,7 +3,7 @@
 //! A screw that is worn at one end loses more there: the lost motion grows along the travel.
 //! Free: the lost motion at mid travel, and what is added to it at the end of a worn screw.
 
-use super::{FirstOrder, part_of_travel};
+use super::{Linearised, part_of_travel};
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Place, Shape};
 
 /// See the head of the file. Variants: the same all along, [`WORN`].
@@ -15,7 +15,7 @@ const WORN: usize = 1;
 /// That variant in words.
 pub(super) const GROWS: &str = "growing along the travel";
 
-impl Effect<FirstOrder> for AxisBacklash {
+impl Effect<Linearised> for AxisBacklash {
     fn name(&self) -> &str {
         "axis-backlash"
     }
@@ -47,11 +47,11 @@ impl Effect<FirstOrder> for AxisBacklash {
         }
     }
 
-    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, _model: &Linearised) -> Vec<Shape> {
         vec![at(0, &[0.0])]
     }
 
-    fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, _model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let lost = shape.values.first().copied().unwrap_or(0.0);
         vec![if shape.variant == WORN {
             at(0, &[lost])
@@ -64,7 +64,7 @@ impl Effect<FirstOrder> for AxisBacklash {
         true
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let lost = shape.values.first().copied().unwrap_or(0.0);
         let more = shape.values.get(1).copied().unwrap_or(0.0);
         let with = |along: &(dyn Fn(f64) -> f64 + Sync)| {
@@ -86,7 +86,7 @@ impl Effect<FirstOrder> for AxisBacklash {
         }
     }
 
-    fn open(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn open(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let lost = shape.values.first().copied().unwrap_or(0.0);
         let more = shape.values.get(1).copied().unwrap_or(0.0);
         model.between_positions(|_, place| {
@@ -99,7 +99,7 @@ impl Effect<FirstOrder> for AxisBacklash {
         (shape.values.len() == amplitudes.len()).then(|| at(shape.variant, amplitudes))
     }
 
-    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, _model: &Linearised, shape: &Shape) -> Option<String> {
         (shape.variant == WORN).then(|| GROWS.to_owned())
     }
 }

@@ -1,12 +1,12 @@
 //! Both indicators have the same wrong gain.
 
-use super::FirstOrder;
+use super::Linearised;
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file.
 pub(super) struct CommonGain;
 
-impl Effect<FirstOrder> for CommonGain {
+impl Effect<Linearised> for CommonGain {
     fn name(&self) -> &str {
         "common-gain"
     }
@@ -35,7 +35,7 @@ impl Effect<FirstOrder> for CommonGain {
         true
     }
 
-    fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, _shape: &Shape) -> Vec<Column> {
         vec![Column::from_places(model.places(), |k, place| {
             model.smooth_reading(k) - model.mid_reading(place)
         })]

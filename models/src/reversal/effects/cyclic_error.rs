@@ -10,7 +10,7 @@
 use nalgebra::DMatrix;
 
 use super::indicators::{ALL, Indicators};
-use super::{FirstOrder, part_of_travel};
+use super::{Linearised, part_of_travel};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Link, Parameter, Shape};
 use crate::reversal::designs::angle_name;
 use crate::reversal::diagnosable::Arrangement;
@@ -67,7 +67,7 @@ const STEEPEST: f64 = std::f64::consts::PI;
 /// Fewest cycles: less is a bend.
 const FEWEST: f64 = 3.0;
 
-impl Effect<FirstOrder> for CyclicError {
+impl Effect<Linearised> for CyclicError {
     fn name(&self) -> &str {
         "cyclic-error"
     }
@@ -101,7 +101,7 @@ impl Effect<FirstOrder> for CyclicError {
     }
 
     /// All indicators are found from either.
-    fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, model: &Linearised) -> Vec<Shape> {
         let alone = self.indicators.scopes().filter(|s| *s != ALL);
         let mut shapes = Vec::new();
         for variant in alone.chain(self.drives()) {
@@ -118,7 +118,7 @@ impl Effect<FirstOrder> for CyclicError {
         shapes
     }
 
-    fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, _model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let other = |variant: usize| Shape {
             variant,
             ..shape.clone()
@@ -135,7 +135,7 @@ impl Effect<FirstOrder> for CyclicError {
         self.indicators.others(shape.variant).map(other).collect()
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let Some(&cycles) = shape.values.first() else {
             return Vec::new();
         };
@@ -167,7 +167,7 @@ impl Effect<FirstOrder> for CyclicError {
         pairs.flat_map(|(cosine, sine)| [cosine, sine]).collect()
     }
 
-    fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
+    fn allowed(&self, model: &Linearised, shape: &Shape) -> bool {
         let reach = FEWEST - 0.5..highest(model) + 0.5;
         shape
             .values
@@ -175,7 +175,7 @@ impl Effect<FirstOrder> for CyclicError {
             .is_some_and(|cycles| reach.contains(cycles))
     }
 
-    fn possible(&self, model: &FirstOrder, shape: &Shape, amplitudes: &[f64]) -> bool {
+    fn possible(&self, model: &Linearised, shape: &Shape, amplitudes: &[f64]) -> bool {
         let Some(&cycles) = shape.values.first() else {
             return true;
         };
@@ -187,8 +187,8 @@ impl Effect<FirstOrder> for CyclicError {
     /// A period of the reading is told by its cycles over the span of the readings.
     fn carried(
         &self,
-        from: &FirstOrder,
-        to: &FirstOrder,
+        from: &Linearised,
+        to: &Linearised,
         shape: &Shape,
         amplitudes: &[f64],
     ) -> (Shape, Vec<f64>) {
@@ -200,7 +200,7 @@ impl Effect<FirstOrder> for CyclicError {
         (shape, amplitudes.to_vec())
     }
 
-    fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, model: &Linearised, shape: &Shape) -> Option<String> {
         let cycles = shape.values.first()?;
         if let Some(position) = self.drive(shape.variant) {
             let at = match self.positions.get(position) {
@@ -250,6 +250,6 @@ impl CyclicError {
 }
 
 /// Most cycles: two readings a period.
-fn highest(model: &FirstOrder) -> f64 {
+fn highest(model: &Linearised) -> f64 {
     0.5 * model.positions().len() as f64
 }

@@ -3,14 +3,14 @@
 //! Two: one amplitude, their difference. More: each but the first against the first, or one of them
 //! against all others. A gain common to all is `common-gain`.
 
-use super::FirstOrder;
+use super::Linearised;
 use super::indicators::{ALL, Indicators};
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file. Variants: all indicators, then one alone; two indicators have but one.
 pub(super) struct GainMismatch(pub Indicators);
 
-impl Effect<FirstOrder> for GainMismatch {
+impl Effect<Linearised> for GainMismatch {
     fn name(&self) -> &str {
         "gain-mismatch"
     }
@@ -40,7 +40,7 @@ impl Effect<FirstOrder> for GainMismatch {
         }
     }
 
-    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, _model: &Linearised) -> Vec<Shape> {
         match self.0.count() {
             0 | 1 => Vec::new(),
             2 => vec![Shape::only()],
@@ -48,7 +48,7 @@ impl Effect<FirstOrder> for GainMismatch {
         }
     }
 
-    fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, _model: &Linearised, shape: &Shape) -> Vec<Shape> {
         match self.0.count() {
             0..=2 => Vec::new(),
             _ => self.0.others(shape.variant).map(Shape::variant).collect(),
@@ -59,7 +59,7 @@ impl Effect<FirstOrder> for GainMismatch {
         true
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let two = self.0.count() == 2;
         let all = Column::from_places(model.places(), |k, place| {
             let share = match (two, model.seat(place).indicator) {
@@ -79,7 +79,7 @@ impl Effect<FirstOrder> for GainMismatch {
         own
     }
 
-    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, _model: &Linearised, shape: &Shape) -> Option<String> {
         match (self.0.count(), shape.variant) {
             (0..=2, _) => None,
             (_, ALL) => Some(format!("each against the {} indicator", self.0.name(0))),

@@ -1,12 +1,12 @@
 //! The artefact sags by its weight, in the same direction in both spindle positions.
 
-use super::FirstOrder;
+use super::Linearised;
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
 
 /// See the head of the file.
 pub(super) struct GravitySag;
 
-impl Effect<FirstOrder> for GravitySag {
+impl Effect<Linearised> for GravitySag {
     fn name(&self) -> &str {
         "gravity-sag"
     }
@@ -27,7 +27,7 @@ impl Effect<FirstOrder> for GravitySag {
         true
     }
 
-    fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, _shape: &Shape) -> Vec<Column> {
         let vertical = model.present().iter().any(|s| s.phi[1] != 0.0);
         vec![Column::from_places(model.places(), |_, place| {
             let u = place.x / model.travel();

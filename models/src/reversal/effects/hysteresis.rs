@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use nalgebra::DVector;
 
-use super::FirstOrder;
+use super::Linearised;
 use super::indicators::{ALL, Indicators};
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
@@ -19,7 +19,7 @@ pub(super) struct Hysteresis(pub Indicators);
 /// A pointer moves where its slope is at least this part of the other direction's.
 const MOVING: f64 = 0.5;
 
-impl Effect<FirstOrder> for Hysteresis {
+impl Effect<Linearised> for Hysteresis {
     fn name(&self) -> &str {
         "hysteresis"
     }
@@ -45,7 +45,7 @@ impl Effect<FirstOrder> for Hysteresis {
         self.0.sizes(shape.variant, &width, "width")
     }
 
-    fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, model: &Linearised) -> Vec<Shape> {
         let span = model.reading_span();
         let of = |scope: usize| {
             let parts = [1e-3, 1e-2, 3e-2, 1e-1].into_iter();
@@ -54,7 +54,7 @@ impl Effect<FirstOrder> for Hysteresis {
         self.0.scopes().flat_map(of).collect()
     }
 
-    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let count = self.0.of(shape.variant).len();
         let (widths, beginnings) = shape.values.split_at(count.min(shape.values.len()));
         let other = |variant: usize| {
@@ -76,12 +76,12 @@ impl Effect<FirstOrder> for Hysteresis {
         self.0.others(shape.variant).map(other).collect()
     }
 
-    fn allowed(&self, _model: &FirstOrder, shape: &Shape) -> bool {
+    fn allowed(&self, _model: &Linearised, shape: &Shape) -> bool {
         let beginnings = shape.values.iter().skip(self.0.of(shape.variant).len());
         beginnings.into_iter().all(|v| (-1.0..=1.0).contains(v))
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let own = self.0.of(shape.variant);
         if shape.values.len() < own.len() {
             return Vec::new();
@@ -91,7 +91,7 @@ impl Effect<FirstOrder> for Hysteresis {
         own.zip(&shape.values).map(of).collect()
     }
 
-    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, _model: &Linearised, shape: &Shape) -> Option<String> {
         Some(self.0.words(shape.variant))
     }
 
@@ -99,7 +99,7 @@ impl Effect<FirstOrder> for Hysteresis {
     /// it; the traces of the other direction, in which it moves, do.
     fn restored(
         &self,
-        model: &FirstOrder,
+        model: &Linearised,
         readings: &DVector<f64>,
         clean: &DVector<f64>,
     ) -> Option<DVector<f64>> {
@@ -154,7 +154,7 @@ impl Hysteresis {
     /// The start of a search: widths of the indicators that the variant has, then the beginnings. The play
     /// is taken up in the direction in which a trace begins, as the slide comes from before its first
     /// position; where the form is level there, the search finds the side.
-    fn started(&self, model: &FirstOrder, variant: usize, width: &dyn Fn(usize) -> f64) -> Shape {
+    fn started(&self, model: &Linearised, variant: usize, width: &dyn Fn(usize) -> f64) -> Shape {
         let own = self.0.of(variant);
         let mut values: Vec<f64> = own.clone().map(width).collect();
         let mut steps = vec![0.0; values.len()];
@@ -178,7 +178,7 @@ impl Hysteresis {
 
 /// How far the pointers of one indicator are behind, per unit of its play; `first`: where the
 /// beginnings stand in the shape.
-fn lag(model: &FirstOrder, shape: &Shape, first: usize, indicator: usize, width: f64) -> Column {
+fn lag(model: &Linearised, shape: &Shape, first: usize, indicator: usize, width: f64) -> Column {
     let half = 0.5 * width.max(1e-6 * model.reading_span());
     let places = model.places();
     let mut column = Column::default();
@@ -210,7 +210,7 @@ fn lag(model: &FirstOrder, shape: &Shape, first: usize, indicator: usize, width:
 }
 
 /// The reading with which a trace begins.
-fn first_of(model: &FirstOrder, trace: &Range<usize>) -> usize {
+fn first_of(model: &Linearised, trace: &Range<usize>) -> usize {
     if model.places()[trace.start].direction > 0.0 {
         trace.start
     } else {
@@ -219,7 +219,7 @@ fn first_of(model: &FirstOrder, trace: &Range<usize>) -> usize {
 }
 
 /// The place of a trace's beginning among the shape's: one for every channel and direction.
-fn beginning_of(model: &FirstOrder, trace: &Range<usize>) -> usize {
+fn beginning_of(model: &Linearised, trace: &Range<usize>) -> usize {
     let place = &model.places()[trace.start];
     2 * place.channel + usize::from(place.direction < 0.0)
 }

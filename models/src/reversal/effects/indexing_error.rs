@@ -5,7 +5,7 @@
 //! slide and artefact, so to first order it is absorbed, and half of it goes into α. Free: the products
 //! of tilt and error.
 
-use super::FirstOrder;
+use super::Linearised;
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
 use crate::reversal::designs::angle_name;
 use crate::reversal::diagnosable::Arrangement;
@@ -41,7 +41,7 @@ impl IndexingError {
     }
 }
 
-impl Effect<FirstOrder> for IndexingError {
+impl Effect<Linearised> for IndexingError {
     fn name(&self) -> &str {
         "indexing-error"
     }
@@ -64,14 +64,14 @@ impl Effect<FirstOrder> for IndexingError {
         self.axes.iter().map(tilt).collect()
     }
 
-    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, _model: &Linearised) -> Vec<Shape> {
         let others = self.positions.len().saturating_sub(1);
         (0..others.max(usize::from(self.four)))
             .map(Shape::variant)
             .collect()
     }
 
-    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let mut others = self.grid(model);
         others.retain(|other| other.variant != shape.variant);
         others
@@ -81,7 +81,7 @@ impl Effect<FirstOrder> for IndexingError {
         self.half_turn
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let position = self.position(shape);
         let of = |axis: &usize| {
             Column::from_places(model.places(), |_, place| {
@@ -93,7 +93,7 @@ impl Effect<FirstOrder> for IndexingError {
         self.axes.iter().map(of).collect()
     }
 
-    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, _model: &Linearised, shape: &Shape) -> Option<String> {
         let angle = self.positions.get(self.position(shape))?;
         (self.positions.len() > 2).then(|| format!("spindle at {}°", angle_name(*angle)))
     }

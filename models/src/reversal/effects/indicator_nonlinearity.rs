@@ -5,7 +5,7 @@
 //! One of the indicators is curved, or both, each by its own amount. A gain alone is `gain-mismatch`.
 //! Free: a deviation for each indicator and power.
 
-use super::FirstOrder;
+use super::Linearised;
 use super::indicators::Indicators;
 use crate::model::{About, Column, Effect, Link, Parameter, Shape};
 
@@ -19,7 +19,7 @@ const KINDS: [&[i32]; 3] = [&[2], &[3], &[2, 3]];
 /// The last of them in words.
 pub(super) const MIXED: &str = "quadratic and cubic";
 
-impl Effect<FirstOrder> for IndicatorNonlinearity {
+impl Effect<Linearised> for IndicatorNonlinearity {
     fn name(&self) -> &str {
         "indicator-nonlinearity"
     }
@@ -49,7 +49,7 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
         [of("deviation-of-square"), of("deviation-of-cube")].concat()
     }
 
-    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, _model: &Linearised) -> Vec<Shape> {
         let kinds = [0, self.0.scope_count()].into_iter();
         kinds
             .flat_map(|kind| {
@@ -59,7 +59,7 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
             .collect()
     }
 
-    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let kind = 2 * self.0.scope_count();
         let mixed = self.0.scopes().map(|s| Shape::variant(kind + s));
         let mut all = self.grid(model);
@@ -68,7 +68,7 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
         all
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let reach = model.reading_reach();
         let bend = |power: &i32| {
             let bend = model.of_reading(|reading| (reading / reach).powi(*power));
@@ -78,7 +78,7 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
     }
 
     /// The reading rises with what the indicator sees: 1 + Σ p aₚ qᵖ⁻¹/R > 0 for q from −1 to 1.
-    fn possible(&self, model: &FirstOrder, shape: &Shape, amplitudes: &[f64]) -> bool {
+    fn possible(&self, model: &Linearised, shape: &Shape, amplitudes: &[f64]) -> bool {
         let reach = model.reading_reach();
         let count = amplitudes.len() / self.powers(shape).len();
         (0..count).all(|own| {
@@ -104,8 +104,8 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
     /// The deviation is told at the greatest reading.
     fn carried(
         &self,
-        from: &FirstOrder,
-        to: &FirstOrder,
+        from: &Linearised,
+        to: &Linearised,
         shape: &Shape,
         amplitudes: &[f64],
     ) -> (Shape, Vec<f64>) {
@@ -122,7 +122,7 @@ impl Effect<FirstOrder> for IndicatorNonlinearity {
         (shape.clone(), carried.collect())
     }
 
-    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, _model: &Linearised, shape: &Shape) -> Option<String> {
         let kind = match self.powers(shape) {
             [2] => "quadratic",
             [3] => "cubic",

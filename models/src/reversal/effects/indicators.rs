@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::{FirstOrder, spread};
+use super::{Linearised, spread};
 use crate::model::{Column, Estimate, FittedModel, Parameter, Shape};
 use crate::reversal::diagnosable::Arrangement;
 
@@ -58,7 +58,7 @@ impl Indicators {
     }
 
     /// A signature in all readings, taken apart into one for each indicator that a variant is of.
-    pub fn apart(&self, model: &FirstOrder, variant: usize, whole: &Column) -> Vec<Column> {
+    pub fn apart(&self, model: &Linearised, variant: usize, whole: &Column) -> Vec<Column> {
         let of = |indicator: usize| {
             let (rows, values) = whole
                 .rows

@@ -11,7 +11,7 @@ use std::borrow::Cow;
 
 use nalgebra::DMatrix;
 
-use super::{FirstOrder, part_of_travel, spread};
+use super::{Linearised, part_of_travel, spread};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Link, Parameter, Shape, each};
 use crate::reversal::diagnosable::Arrangement;
 
@@ -64,7 +64,7 @@ pub(super) const OWN_FORMS: &str = "each direction with a form of its own";
 /// See [`OWN_FORMS`].
 pub(super) const LEANS: &str = "leaning over after it has turned round";
 
-impl Effect<FirstOrder> for LateralBacklash {
+impl Effect<Linearised> for LateralBacklash {
     fn name(&self) -> &str {
         "lateral-backlash"
     }
@@ -112,14 +112,14 @@ impl Effect<FirstOrder> for LateralBacklash {
     }
 
     /// Askew lines, and lines with a form of their own, which need not be askew at all.
-    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, _model: &Linearised) -> Vec<Shape> {
         let kinds = [0, FINE - 1].into_iter();
         kinds
             .flat_map(|kind| self.scopes().map(move |s| Shape::variant(KINDS * s + kind)))
             .collect()
     }
 
-    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let scope = shape.variant - shape.variant % KINDS;
         let plain = |variant: usize| Shape::variant(scope + variant);
         let leaning = |part: f64| Shape {
@@ -147,7 +147,7 @@ impl Effect<FirstOrder> for LateralBacklash {
         others
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let with = |axis: usize, along: &(dyn Fn(f64, f64) -> f64 + Sync)| {
             Column::from_places(model.places(), |_, place| {
                 let sign = model.seat(place).phi[axis] * place.direction;
@@ -168,7 +168,7 @@ impl Effect<FirstOrder> for LateralBacklash {
             .collect()
     }
 
-    fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
+    fn allowed(&self, model: &Linearised, shape: &Shape) -> bool {
         let part = |log_way: &f64| log_way.exp() / model.travel();
         shape.values.iter().all(|v| (0.01..1.0).contains(&part(v)))
     }
@@ -240,7 +240,7 @@ impl Effect<FirstOrder> for LateralBacklash {
         axes.iter().enumerate().flat_map(of).collect()
     }
 
-    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, _model: &Linearised, shape: &Shape) -> Option<String> {
         let kind = match shape.variant % KINDS {
             0 => None,
             LEANING => Some(LEANS),

@@ -9,7 +9,7 @@
 
 use std::ops::Range;
 
-use super::FirstOrder;
+use super::Linearised;
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 use crate::reversal::designs::angle_name;
 use crate::reversal::diagnosable::{Arrangement, Seat};
@@ -98,18 +98,18 @@ impl LocalContamination {
     }
 
     /// Number of groups and scopes in which a bump may lie.
-    fn places(&self, model: &FirstOrder) -> usize {
+    fn places(&self, model: &Linearised) -> usize {
         self.groups.len() * self.scopes(model)
     }
 
     /// Number of scopes of the group with the most traces.
-    fn scopes(&self, model: &FirstOrder) -> usize {
+    fn scopes(&self, model: &Linearised) -> usize {
         let traces = self.groups.iter().map(|g| g.traces(model).len());
         model.repeats().len() + traces.max().unwrap_or(1).max(1)
     }
 
     /// Section, group and scope of a variant.
-    fn told(&self, model: &FirstOrder, variant: usize) -> Option<(&Section, &Group, Scope)> {
+    fn told(&self, model: &Linearised, variant: usize) -> Option<(&Section, &Group, Scope)> {
         let scopes = self.scopes(model);
         let repeats = model.repeats();
         let scope = match variant % scopes {
@@ -124,7 +124,7 @@ impl LocalContamination {
 
 impl Group {
     /// The traces of its channels in the order of time.
-    fn traces(&self, model: &FirstOrder) -> Vec<Range<usize>> {
+    fn traces(&self, model: &Linearised) -> Vec<Range<usize>> {
         let place = |trace: &Range<usize>| &model.places()[trace.start];
         let own = model.traces().iter();
         let mut own: Vec<Range<usize>> = own
@@ -147,7 +147,7 @@ const SECTIONS: [Section; 4] = [
     (|away| (-0.5 * away.powi(20)).exp(), "steep-sided"),
 ];
 
-impl Effect<FirstOrder> for LocalContamination {
+impl Effect<Linearised> for LocalContamination {
     fn name(&self) -> &str {
         "local-contamination"
     }
@@ -176,7 +176,7 @@ impl Effect<FirstOrder> for LocalContamination {
     }
 
     /// The Gaussian bumps in all traces or in one repeat; the others are found from them.
-    fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, model: &Linearised) -> Vec<Shape> {
         let repeats = model.repeats();
         let x = model.positions();
         let first = x.first().copied().unwrap_or(0.0);
@@ -209,7 +209,7 @@ impl Effect<FirstOrder> for LocalContamination {
         shapes
     }
 
-    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let (places, scopes) = (self.places(model), self.scopes(model));
         let Some((_, group, _)) = self.told(model, shape.variant) else {
             return Vec::new();
@@ -246,7 +246,7 @@ impl Effect<FirstOrder> for LocalContamination {
         relatives
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let &[position, log_width, ..] = shape.values.as_slice() else {
             return Vec::new();
         };
@@ -276,7 +276,7 @@ impl Effect<FirstOrder> for LocalContamination {
         vec![column]
     }
 
-    fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
+    fn allowed(&self, model: &Linearised, shape: &Shape) -> bool {
         let (Some(first), Some(last)) = (model.positions().first(), model.positions().last())
         else {
             return false;
@@ -288,7 +288,7 @@ impl Effect<FirstOrder> for LocalContamination {
                 && log_width.exp() < 0.08 * model.travel())
     }
 
-    fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, model: &Linearised, shape: &Shape) -> Option<String> {
         let ((_, section), group, scope) = self.told(model, shape.variant)?;
         let name = &group.name;
         let all = group.traces(model).len();
@@ -304,6 +304,6 @@ impl Effect<FirstOrder> for LocalContamination {
     }
 }
 
-fn spacing(model: &FirstOrder) -> f64 {
+fn spacing(model: &Linearised) -> f64 {
     model.travel() / (model.positions().len() - 1) as f64
 }

@@ -28,15 +28,15 @@ mod zero_jump;
 
 use nalgebra::DMatrix;
 
-use super::diagnosable::{Arrangement, FirstOrder};
+use super::diagnosable::{Arrangement, Linearised};
 use super::simultaneous;
 use crate::model::{Effect, Shape};
 use indicators::Indicators;
 
 /// The catalogue for readings of these channels.
-pub fn all(channels: &Arrangement) -> Vec<Box<dyn Effect<FirstOrder>>> {
+pub fn all(channels: &Arrangement) -> Vec<Box<dyn Effect<Linearised>>> {
     let indicators = || Indicators::new(channels);
-    let mut effects: Vec<Box<dyn Effect<FirstOrder>>> = vec![
+    let mut effects: Vec<Box<dyn Effect<Linearised>>> = vec![
         Box::new(ambient_cycle::AmbientCycle(indicators())),
         Box::new(axis_backlash::AxisBacklash),
         Box::new(common_gain::CommonGain),
@@ -105,7 +105,7 @@ fn settled_at(shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
 }
 
 /// A position as a part of the travel, −1 to 1.
-fn part_of_travel(model: &FirstOrder, x: f64) -> f64 {
+fn part_of_travel(model: &Linearised, x: f64) -> f64 {
     let first = model.positions().first().copied().unwrap_or(0.0);
     2.0 * (x - first) / model.travel() - 1.0
 }

@@ -9,7 +9,7 @@
 //! stylus, slide and bar meet the crest elsewhere than at mid travel. Free: the loss by the square for each
 //! product of α and γ that channels see, and by the line.
 
-use super::{FirstOrder, part_of_travel};
+use super::{Linearised, part_of_travel};
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Place, Shape};
 use crate::reversal::diagnosable::{Arrangement, Seat};
 
@@ -41,7 +41,7 @@ fn across(seat: &Seat, [of_slide, of_bar]: [usize; 2]) -> f64 {
     t(seat.phi)[of_slide] * t(seat.psi)[of_bar]
 }
 
-impl Effect<FirstOrder> for OffCrest {
+impl Effect<Linearised> for OffCrest {
     fn name(&self) -> &str {
         "off-crest"
     }
@@ -76,11 +76,11 @@ impl Effect<FirstOrder> for OffCrest {
         all
     }
 
-    fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, _model: &Linearised, shape: &Shape) -> Vec<Shape> {
         vec![Shape::variant(BESIDE - shape.variant.min(BESIDE))]
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let of = |own: &[usize; 2], power: i32| {
             Column::from_places(model.places(), |_, place| {
                 -across(model.seat(place), *own) * part_of_travel(model, place.x).powi(power)
@@ -100,7 +100,7 @@ impl Effect<FirstOrder> for OffCrest {
         columns
     }
 
-    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, _model: &Linearised, shape: &Shape) -> Option<String> {
         (shape.variant == BESIDE).then(|| "beside the crest at mid travel too".to_owned())
     }
 }

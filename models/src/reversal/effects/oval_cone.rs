@@ -4,7 +4,7 @@
 //! where the design determines it, and absorbed then; elsewhere it shows as far as slopes do not take
 //! it up. Free: κ_c and κ_s, as far as sides see them.
 
-use super::FirstOrder;
+use super::Linearised;
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 use crate::reversal::diagnosable::Arrangement;
 
@@ -25,7 +25,7 @@ impl OvalCone {
     }
 }
 
-impl Effect<FirstOrder> for OvalCone {
+impl Effect<Linearised> for OvalCone {
     fn name(&self) -> &str {
         "oval-cone"
     }
@@ -47,7 +47,7 @@ impl Effect<FirstOrder> for OvalCone {
         self.seen.iter().map(of).collect()
     }
 
-    fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, _shape: &Shape) -> Vec<Column> {
         let of = |axis: &usize| {
             Column::from_places(model.places(), |_, place| {
                 model.seat(place).oval[*axis] * place.x * 1e3

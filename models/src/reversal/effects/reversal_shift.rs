@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use super::FirstOrder;
+use super::Linearised;
 use crate::model::{About, Column, Effect, Link, Parameter, Shape};
 use crate::reversal::designs::angle_name;
 use crate::reversal::diagnosable::Arrangement;
@@ -43,7 +43,7 @@ impl ReversalShift {
     }
 }
 
-impl Effect<FirstOrder> for ReversalShift {
+impl Effect<Linearised> for ReversalShift {
     fn name(&self) -> &str {
         "reversal-shift"
     }
@@ -77,14 +77,14 @@ impl Effect<FirstOrder> for ReversalShift {
         own.map(named).collect()
     }
 
-    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, _model: &Linearised) -> Vec<Shape> {
         match self.positions.len() {
             0..=2 => vec![self.start(EVERY)],
             count => (0..=count).map(|v| self.start(v)).collect(),
         }
     }
 
-    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let mut others = self.grid(model);
         others.retain(|other| other.variant != shape.variant);
         others
@@ -94,7 +94,7 @@ impl Effect<FirstOrder> for ReversalShift {
         true
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let of = |(k, position): (usize, usize)| {
             let shift = shape.values.get(k).copied().unwrap_or(0.0);
             model.of_cell(|_, place| {
@@ -108,7 +108,7 @@ impl Effect<FirstOrder> for ReversalShift {
         self.shifted(shape.variant).enumerate().map(of).collect()
     }
 
-    fn open(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn open(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let own = self.shifted(shape.variant);
         model.between_positions(|_, place| {
             let position = model.seat(place).position;
@@ -130,7 +130,7 @@ impl Effect<FirstOrder> for ReversalShift {
         })
     }
 
-    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, _model: &Linearised, shape: &Shape) -> Option<String> {
         match (self.positions.len(), shape.variant) {
             (0..=2, _) => None,
             (_, EVERY) => Some("each position against the first".to_owned()),

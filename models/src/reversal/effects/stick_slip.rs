@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::{FirstOrder, part_of_travel, spread};
+use super::{Linearised, part_of_travel, spread};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Link, Parameter, Place, Shape};
 use crate::reversal::diagnosable::Arrangement;
 
@@ -92,7 +92,7 @@ impl StickSlip {
     }
 }
 
-impl Effect<FirstOrder> for StickSlip {
+impl Effect<Linearised> for StickSlip {
     fn name(&self) -> &str {
         "stick-slip"
     }
@@ -134,7 +134,7 @@ impl Effect<FirstOrder> for StickSlip {
         vec![Parameter::between("slips", "1", 1.0, 1e6), state]
     }
 
-    fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, model: &Linearised) -> Vec<Shape> {
         let reach = (highest(model) - 2.0).max(0.0);
         let count = (reach / STRIDE) as usize;
         let lag = |k: usize| Shape {
@@ -169,7 +169,7 @@ impl Effect<FirstOrder> for StickSlip {
     }
 
     /// Across the travel a sawtooth may lean to either side; its first wave tells nothing of it.
-    fn relatives(&self, _model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, _model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let Kind::Sawtooth(Anew::Lean(_), sign) = self.kind(shape.variant) else {
             return Vec::new();
         };
@@ -187,7 +187,7 @@ impl Effect<FirstOrder> for StickSlip {
         vec![other]
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let Some(&slips) = shape.values.first() else {
             return Vec::new();
         };
@@ -269,7 +269,7 @@ impl Effect<FirstOrder> for StickSlip {
         Some(settled)
     }
 
-    fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
+    fn allowed(&self, model: &Linearised, shape: &Shape) -> bool {
         let reach = 1.5..highest(model) + STRIDE;
         let aside = |state: &f64| (ASIDE..=0.5 - ASIDE).contains(&state.rem_euclid(0.5));
         let within = shape.values.first().is_some_and(|s| reach.contains(s));
@@ -279,7 +279,7 @@ impl Effect<FirstOrder> for StickSlip {
 
     /// Where it begins anew the places differ from pass to pass; they are open beyond the ends of the travel
     /// alone.
-    fn open(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn open(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let kind = self.kind(shape.variant);
         let (&[slips, state, ..], Some(lag)) = (shape.values.as_slice(), shape.values.last())
         else {
@@ -310,7 +310,7 @@ impl Effect<FirstOrder> for StickSlip {
         })
     }
 
-    fn cycles(&self, _model: &FirstOrder, shape: &Shape) -> Vec<(usize, f64)> {
+    fn cycles(&self, _model: &Linearised, shape: &Shape) -> Vec<(usize, f64)> {
         match self.kind(shape.variant) {
             Kind::Sawtooth(..) => {
                 let states = (1..shape.values.len()).filter(|k| shape.steps.get(*k) != Some(&0.0));
@@ -320,7 +320,7 @@ impl Effect<FirstOrder> for StickSlip {
         }
     }
 
-    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, _model: &Linearised, shape: &Shape) -> Option<String> {
         let words = match self.kind(shape.variant) {
             Kind::Lag => return None,
             Kind::Waves(Anew::Lag) | Kind::Sawtooth(Anew::Lag, _) => LAG,
@@ -357,7 +357,7 @@ impl Effect<FirstOrder> for StickSlip {
 }
 
 /// First and last position.
-fn ends(model: &FirstOrder) -> (f64, f64) {
+fn ends(model: &Linearised) -> (f64, f64) {
     let positions = model.positions();
     let at = |k: usize| positions.get(k).copied().unwrap_or(0.0);
     (at(0), at(positions.len().saturating_sub(1)))
@@ -365,7 +365,7 @@ fn ends(model: &FirstOrder) -> (f64, f64) {
 
 /// Traces of one spindle position, repeat and direction that are read at the same time: each pass of the
 /// slide, in the order of its first trace.
-fn passes(model: &FirstOrder) -> Vec<Vec<Range<usize>>> {
+fn passes(model: &Linearised) -> Vec<Vec<Range<usize>>> {
     let mut passes: Vec<(Pass, Vec<Range<usize>>)> = Vec::new();
     for trace in model.traces() {
         let here = Pass::of(model, trace);
@@ -387,7 +387,7 @@ struct Pass {
 }
 
 impl Pass {
-    fn of(model: &FirstOrder, trace: &Range<usize>) -> Self {
+    fn of(model: &Linearised, trace: &Range<usize>) -> Self {
         let place = &model.places()[trace.start];
         let times = model.places()[trace.clone()].iter().map(|p| p.time);
         Self {
@@ -407,7 +407,7 @@ impl Pass {
 
 /// A change of the readings of one pass.
 fn in_pass(
-    model: &FirstOrder,
+    model: &Linearised,
     pass: &[Range<usize>],
     change: impl Fn(usize, &Place) -> f64,
 ) -> Column {
@@ -420,6 +420,6 @@ fn in_pass(
 }
 
 /// Most slips over the travel: six readings from slip to slip.
-fn highest(model: &FirstOrder) -> f64 {
+fn highest(model: &Linearised) -> f64 {
     0.16 * model.positions().len() as f64
 }

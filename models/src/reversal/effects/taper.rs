@@ -1,12 +1,12 @@
 //! The artefact is a cone: both surfaces fall away from its axis.
 
-use super::FirstOrder;
+use super::Linearised;
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 
 /// See the head of the file.
 pub(super) struct Taper;
 
-impl Effect<FirstOrder> for Taper {
+impl Effect<Linearised> for Taper {
     fn name(&self) -> &str {
         "taper"
     }
@@ -27,7 +27,7 @@ impl Effect<FirstOrder> for Taper {
         vec![Parameter::between("half-angle", "rad", -0.1, 0.1)]
     }
 
-    fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, _shape: &Shape) -> Vec<Column> {
         vec![Column::from_places(model.places(), |_, place| {
             place.x * 1e3
         })]

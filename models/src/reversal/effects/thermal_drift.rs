@@ -8,7 +8,7 @@
 use nalgebra::DMatrix;
 
 use super::indicators::{ALL, Indicators};
-use super::{FirstOrder, spread};
+use super::{Linearised, spread};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Parameter, Shape};
 
 /// See the head of the file. Variants: the indicators, and beyond the scopes two time constants.
@@ -22,7 +22,7 @@ const FAST: [f64; 4] = [0.03, 0.08, 0.2, 0.5];
 /// See [`FAST`]; the last is nearly a straight line.
 const SLOW: [f64; 4] = [0.3, 0.9, 3.0, 20.0];
 
-impl Effect<FirstOrder> for ThermalDrift {
+impl Effect<Linearised> for ThermalDrift {
     fn name(&self) -> &str {
         "thermal-drift"
     }
@@ -51,7 +51,7 @@ impl Effect<FirstOrder> for ThermalDrift {
             .to_vec()
     }
 
-    fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, model: &Linearised) -> Vec<Shape> {
         let at = |part: f64| Shape {
             variant: self.0.fullest(),
             values: vec![(part * model.duration()).ln()],
@@ -63,7 +63,7 @@ impl Effect<FirstOrder> for ThermalDrift {
             .to_vec()
     }
 
-    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let with = |variant: usize, values: Vec<f64>| Shape {
             variant,
             steps: vec![0.2; values.len()],
@@ -92,7 +92,7 @@ impl Effect<FirstOrder> for ThermalDrift {
         }
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let total = model.duration();
         let stage = |log_constant: &f64| {
             let constant = log_constant.exp().max(1e-3 * total);
@@ -106,14 +106,14 @@ impl Effect<FirstOrder> for ThermalDrift {
         shape.values.iter().flat_map(stage).collect()
     }
 
-    fn allowed(&self, model: &FirstOrder, shape: &Shape) -> bool {
+    fn allowed(&self, model: &Linearised, shape: &Shape) -> bool {
         let part = |log_constant: &f64| log_constant.exp() / model.duration();
         let inside = |part: f64| part > 0.005 && part < 50.0;
         shape.values.iter().all(|v| inside(part(v)))
             && shape.values.windows(2).all(|v| v[1] > v[0] + APART.ln())
     }
 
-    fn variant_name(&self, _model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, _model: &Linearised, shape: &Shape) -> Option<String> {
         let linear = shape.free() == 0;
         Some(
             match (self.stages(shape), linear) {

@@ -1,12 +1,12 @@
 //! The probed point lies half a thickness from the tilted axis.
 
-use super::{FirstOrder, SETTLING, settled_at};
+use super::{Linearised, SETTLING, settled_at};
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Place, Shape};
 
 /// See the head of the file.
 pub(super) struct ThicknessShift;
 
-impl Effect<FirstOrder> for ThicknessShift {
+impl Effect<Linearised> for ThicknessShift {
     fn name(&self) -> &str {
         "thickness-shift"
     }
@@ -27,7 +27,7 @@ impl Effect<FirstOrder> for ThicknessShift {
         vec![Parameter::between("thickness", "mm", 0.0, 500.0)]
     }
 
-    fn grid(&self, _model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, _model: &Linearised) -> Vec<Shape> {
         vec![SETTLING]
     }
 
@@ -35,7 +35,7 @@ impl Effect<FirstOrder> for ThicknessShift {
         true
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let thickness = shape.values.first().copied().unwrap_or(0.0);
         let change = |k: usize, place: &Place| {
             let per_mm = 0.5 * model.tilt(place);
@@ -48,7 +48,7 @@ impl Effect<FirstOrder> for ThicknessShift {
         }]
     }
 
-    fn open(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn open(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let thickness = shape.values.first().copied().unwrap_or(0.0);
         model.between_positions(|_, place| [0.0, 0.5 * model.tilt(place) * thickness])
     }

@@ -1,12 +1,12 @@
 //! The stylus ball does not reach into the artefact's valleys.
 
-use super::FirstOrder;
+use super::Linearised;
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
 
 /// See the head of the file.
 pub(super) struct TipRadius;
 
-impl Effect<FirstOrder> for TipRadius {
+impl Effect<Linearised> for TipRadius {
     fn name(&self) -> &str {
         "tip-radius"
     }
@@ -27,7 +27,7 @@ impl Effect<FirstOrder> for TipRadius {
         true
     }
 
-    fn columns(&self, model: &FirstOrder, _shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, _shape: &Shape) -> Vec<Column> {
         vec![Column::from_places(model.places(), |_, place| {
             let slope = model.side_slope(place) * 1e-3;
             0.5e3 * slope * slope

@@ -6,7 +6,7 @@
 //! same: the zero of a whole channel is free; where zeros are kept it lasts in any case. Free: the jump,
 //! its time, the indicator or channel.
 
-use super::FirstOrder;
+use super::Linearised;
 use super::indicators::Indicators;
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
 use crate::reversal::designs::Zero;
@@ -20,7 +20,7 @@ const NEARBY: usize = 6;
 /// Readings between neighbouring starts of the search.
 const STRIDE: usize = 8;
 
-impl Effect<FirstOrder> for ZeroJump {
+impl Effect<Linearised> for ZeroJump {
     fn name(&self) -> &str {
         "zero-jump"
     }
@@ -41,7 +41,7 @@ impl Effect<FirstOrder> for ZeroJump {
         vec![Parameter::between("time", "s", 0.0, 1e9)]
     }
 
-    fn grid(&self, model: &FirstOrder) -> Vec<Shape> {
+    fn grid(&self, model: &Linearised) -> Vec<Shape> {
         let mut shapes = Vec::new();
         let channels = model.present().len();
         for variant in 0..channels + self.0.count() {
@@ -64,7 +64,7 @@ impl Effect<FirstOrder> for ZeroJump {
 
     /// The same jump some readings sooner or later: the score climbs to its time in steps, which halve the
     /// way of a search too soon.
-    fn relatives(&self, model: &FirstOrder, shape: &Shape) -> Vec<Shape> {
+    fn relatives(&self, model: &Linearised, shape: &Shape) -> Vec<Shape> {
         let Some(&time) = shape.values.first() else {
             return Vec::new();
         };
@@ -80,7 +80,7 @@ impl Effect<FirstOrder> for ZeroJump {
             .collect()
     }
 
-    fn columns(&self, model: &FirstOrder, shape: &Shape) -> Vec<Column> {
+    fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let time = shape.values.first().copied().unwrap_or(f64::INFINITY);
         let mut column = Column::default();
         for trace in model.traces() {
@@ -98,7 +98,7 @@ impl Effect<FirstOrder> for ZeroJump {
     }
 
     /// The jump lies anywhere between two readings: a rectangle of that width.
-    fn resolution(&self, model: &FirstOrder, shape: &Shape) -> Vec<f64> {
+    fn resolution(&self, model: &Linearised, shape: &Shape) -> Vec<f64> {
         let times = times_of(model, shape.variant);
         let right = shape
             .values
@@ -114,7 +114,7 @@ impl Effect<FirstOrder> for ZeroJump {
         vec![gap / 12f64.sqrt()]
     }
 
-    fn variant_name(&self, model: &FirstOrder, shape: &Shape) -> Option<String> {
+    fn variant_name(&self, model: &Linearised, shape: &Shape) -> Option<String> {
         let channels = model.present();
         Some(match channels.get(shape.variant) {
             Some(channel) => format!("channel {}", channel.name),
@@ -124,7 +124,7 @@ impl Effect<FirstOrder> for ZeroJump {
 }
 
 /// Whether a channel is one in which a variant's jump lasts.
-fn read_by(model: &FirstOrder, variant: usize, channel: usize) -> bool {
+fn read_by(model: &Linearised, variant: usize, channel: usize) -> bool {
     let channels = model.present();
     if variant < channels.len() {
         return channel == variant;
@@ -133,14 +133,14 @@ fn read_by(model: &FirstOrder, variant: usize, channel: usize) -> bool {
 }
 
 /// The channels of a variant.
-fn read_channels(model: &FirstOrder, variant: usize) -> impl Iterator<Item = usize> {
+fn read_channels(model: &Linearised, variant: usize) -> impl Iterator<Item = usize> {
     let all = 0..model.present().len();
     all.filter(move |channel| read_by(model, variant, *channel))
 }
 
 /// Whether a jump of an indicator is another than one of a channel: it goes back to a spindle position
 /// after it has read in another, or zeros are kept.
-fn alternating(model: &FirstOrder, variant: usize) -> bool {
+fn alternating(model: &Linearised, variant: usize) -> bool {
     let ranges: Vec<(f64, f64)> = read_channels(model, variant)
         .filter_map(|channel| {
             let times = times_of(model, channel);
@@ -154,7 +154,7 @@ fn alternating(model: &FirstOrder, variant: usize) -> bool {
 }
 
 /// The times of a variant's readings, in order.
-fn times_of(model: &FirstOrder, variant: usize) -> Vec<f64> {
+fn times_of(model: &Linearised, variant: usize) -> Vec<f64> {
     let mut times: Vec<f64> = model
         .places()
         .iter()

@@ -18,6 +18,7 @@ pub fn rows(seeds: u64) -> Vec<Row> {
                 full_scale: 1000.0,
                 loads,
                 sets,
+                both_directions: false,
                 noise: NOISE,
                 disturbances: Vec::new(),
             };

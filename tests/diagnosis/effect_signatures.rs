@@ -74,6 +74,7 @@ fn calibration_line() {
             full_scale: 50.0,
             loads: 12,
             sets: 3,
+            both_directions: true,
             noise: 0.0,
             disturbances,
         };
@@ -88,6 +89,11 @@ fn calibration_line() {
         ("saturation", at(0, &[0.2])),
         ("drift", at(0, &[(1.0f64 / 3.0).ln()])),
         ("set-offset", at(2, &[])),
+        ("set-slope", at(2, &[])),
+        ("sensitivity-drift", at(0, &[(1.0f64 / 3.0).ln()])),
+        ("hysteresis", at(0, &[])),
+        // 0.55 of 69 readings.
+        ("zero-jump", at(0, &[37.5])),
     ] {
         let with = made(vec![line::Disturbance::named(name, 0.1, 3).unwrap()]);
         // Epsilons: these effects are linear; readings of 100 carry 10⁻¹⁴, the change is 10⁻³.
@@ -98,16 +104,26 @@ fn calibration_line() {
 
 #[test]
 fn circle() {
-    let what = CircleSimulation {
+    let what = |pass: usize| CircleSimulation {
         // Clear of the direction where angles begin again.
         start: 0.01,
         count: 48,
         noise_um: 0.0,
+        pass: (pass, 3),
         ..CircleSimulation::default()
     };
     let made = |disturbances: &[circle::Disturbance]| {
-        let points = circle::simulate_disturbed(&what, disturbances, 1).unwrap();
-        let numbered: Vec<_> = points.into_iter().map(|p| (p, 1)).collect();
+        let mut numbered = Vec::new();
+        for pass in 0..3 {
+            // Dirt lies in one pass only.
+            let own: Vec<circle::Disturbance> = disturbances
+                .iter()
+                .filter(|d| pass == 0 || !matches!(d, circle::Disturbance::Outlier { .. }))
+                .copied()
+                .collect();
+            let points = circle::simulate_disturbed(&what(pass), &own, 1).unwrap();
+            numbered.extend(points.into_iter().map(|p| (p, pass as u32 + 1)));
+        }
         CirclePoints::new(&numbered, None).unwrap()
     };
     let bare = made(&[]);
@@ -116,8 +132,16 @@ fn circle() {
         ("lobes", 1.0, at(0, &[3.0])),
         ("outlier", 1.0, at(16, &[])),
         ("scale-mismatch", 1e-5, at(0, &[])),
+        ("squareness", 1e-5, at(0, &[])),
+        ("centre-drift", 1.0, at(0, &[])),
+        ("radius-growth", 1.0, at(0, &[])),
+        ("axis-backlash", 1.0, at(0, &[])),
+        ("asynchronous-motion", 1.0, at(0, &[2.4])),
+        ("part-moved", 1.0, at(2, &[])),
+        // 0.55 of 143 steps.
+        ("zero-jump", 1.0, at(0, &[78.65])),
     ] {
-        let with = made(&[circle::Disturbance::named(name, size, what.count).unwrap()]);
+        let with = made(&[circle::Disturbance::named(name, size, 48).unwrap()]);
         // Truncation: angles move by the effect over the radius, 1 µm on 50 mm.
         let rest = left(&bare, &with, name, &shape);
         assert!(rest < 1e-4, "{name}: {rest:e}");
@@ -144,9 +168,18 @@ fn four_sensor() {
         // differences of its points 2 mm apart under waves of 25 mm.
         ("gain", 1e-3, 2, 0.1),
         ("sensor-position", 1e-3, 2, 0.2),
+        ("lag", 1e-3, 2, 0.2),
+        ("nonlinearity", 0.1, 2, 0.1),
+        ("settling", 1.0, 2, 1e-9),
+        ("zero-jump", 1.0, 2, 1e-9),
     ] {
         let with = made(Some((name, size)));
-        let rest = left(&bare, &with, name, &at(variant, &[]));
+        let values: &[f64] = match name {
+            "settling" => &[0.25f64.ln()],
+            "zero-jump" => &[0.55 * 119.0],
+            _ => &[],
+        };
+        let rest = left(&bare, &with, name, &at(variant, values));
         assert!(rest < most, "{name}: {rest:e}");
     }
 }
@@ -175,9 +208,23 @@ fn fourier() {
         ("probe-spacing", 1e-3, 2, 5e-3),
         // Truncation: tan of 10⁻⁵ rad.
         ("yaw", 1e-5, 0, 1e-6),
+        // The readings hold the effect themselves: 10⁻⁴ and 10⁻³ of it.
+        ("probe-gain", 1e-4, 1, 1e-3),
+        ("probe-nonlinearity", 1e-3, 1, 1e-2),
+        // The time of the simulation is 200 of 201 steps a scan.
+        ("drift", 1.0, 0, 0.02),
+        ("thermal-bending", 1.0, 0, 0.02),
+        ("zero-jump", 1.0, 2, 1e-9),
+        // Second order, and the ends of the section.
+        ("travel-scale", 1e-5, 0, 0.02),
     ] {
         let with = made(&[fourier::Disturbance::named(name, size, 3).unwrap()]);
-        let rest = left(&bare, &with, name, &at(variant, &[]));
+        let values: &[f64] = match name {
+            "drift" => &[0.15f64.ln()],
+            "zero-jump" => &[500.5],
+            _ => &[],
+        };
+        let rest = left(&bare, &with, name, &at(variant, values));
         assert!(rest < most, "{name}: {rest:e}");
     }
 }
@@ -203,6 +250,9 @@ fn step_diagonal() {
         ("mirror-misalignment", 1e-6, at(of_mirror, &[])),
         ("angular-error", 1e-6, at(of_rotation, &[])),
         ("drift", 1.0, at(0, &[0.1f64.ln()])),
+        ("thermal-expansion", 1e-6, at(0, &[])),
+        ("axis-growth", 1.0, at(0, &[])),
+        ("mirror-creep", 1e-6, at(bare.channels().len() / 6 - 1, &[])),
     ] {
         let disturbance = diagonal::Disturbance::named(name, size, &what).unwrap();
         let shape = if name == "mirror-misalignment" {

@@ -3,6 +3,7 @@
 
 use crate::other_models::{MAKERS, Maker, judged, seen_from};
 use errsep::diagnosis::{Kind, Options, diagnose};
+use errsep_models::calibration_line::simulate::{CalibrationSimulation, Disturbance, simulate};
 use errsep_models::calibration_line::{CalibrationLine, CalibrationReading};
 use errsep_models::model::FittedModel;
 
@@ -69,6 +70,30 @@ fn maker(model: &str) -> &'static Maker {
 fn calibration_line() {
     found_blind(maker("calibration-line"));
     not_passed_over(maker("calibration-line"), "set-offset");
+}
+
+/// Loads that rise and fall again show a loop; its size is found. k·u: 4 of one uncertainty.
+#[test]
+fn a_loop_between_rising_and_falling_loads_is_hysteresis() {
+    let what = CalibrationSimulation {
+        line: [0.5, 2e-3],
+        full_scale: 1000.0,
+        loads: 20,
+        sets: 3,
+        both_directions: true,
+        noise: 1e-3,
+        disturbances: vec![Disturbance::Hysteresis(4e-3)],
+    };
+    let readings = simulate(&what, 3).unwrap();
+    let model = CalibrationLine::new(&readings, None).unwrap();
+    let diagnosis = diagnose(&model, &options(&[]));
+    assert_eq!(diagnosis.verdict.effects, ["hysteresis"]);
+    let found = diagnosis
+        .candidates
+        .iter()
+        .find(|c| c.effect == "hysteresis");
+    let width = &found.unwrap().parameters[0];
+    assert!((width.value - 4e-3).abs() < 4.0 * width.std, "{width:?}");
 }
 
 #[test]

@@ -37,29 +37,70 @@ pub const MAKERS: [Maker; 6] = [
             "logarithmic",
             "quadratic",
             "saturation",
+            "sensitivity-drift",
             "set-offset",
+            "set-slope",
             "square-root",
+            "zero-jump",
         ],
         diagnosed: calibration_line,
     },
     Maker {
         model: "circle",
-        effects: &["lobes", "outlier", "ovality", "scale-mismatch"],
+        effects: &[
+            "asynchronous-motion",
+            "axis-backlash",
+            "centre-drift",
+            "lobes",
+            "outlier",
+            "ovality",
+            "part-moved",
+            "radius-growth",
+            "scale-mismatch",
+            "squareness",
+            "zero-jump",
+        ],
         diagnosed: circle,
     },
     Maker {
         model: "four-sensor",
-        effects: &["drift", "gain", "sensor-position"],
+        effects: &[
+            "drift",
+            "gain",
+            "lag",
+            "nonlinearity",
+            "sensor-position",
+            "settling",
+            "zero-jump",
+        ],
         diagnosed: four_sensor,
     },
     Maker {
         model: "fourier",
-        effects: &["height-difference", "probe-spacing", "yaw"],
+        effects: &[
+            "drift",
+            "height-difference",
+            "probe-gain",
+            "probe-nonlinearity",
+            "probe-spacing",
+            "thermal-bending",
+            "travel-scale",
+            "yaw",
+            "zero-jump",
+        ],
         diagnosed: fourier,
     },
     Maker {
         model: "step-diagonal",
-        effects: &["angular-error", "drift", "mirror-misalignment"],
+        effects: &[
+            "angular-error",
+            "axis-growth",
+            "drift",
+            "lost-counts",
+            "mirror-creep",
+            "mirror-misalignment",
+            "thermal-expansion",
+        ],
         diagnosed: step_diagonal,
     },
     Maker {
@@ -92,6 +133,7 @@ pub fn calibration_line_made(put: Put<'_>, seed: u64, noise: f64) -> Calibration
         full_scale: 1000.0,
         loads: 20,
         sets: REPEATS,
+        both_directions: false,
         noise: 1e-3 * noise,
         disturbances: put
             .iter()
@@ -108,13 +150,14 @@ fn circle(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
 
 /// Four passes over a circle, likewise.
 pub fn circle_made(put: Put<'_>, seed: u64, noise: f64) -> CirclePoints {
-    let what = CircleSimulation {
+    let mut what = CircleSimulation {
         count: 72,
         noise_um: noise,
         ..CircleSimulation::default()
     };
     let mut points = Vec::new();
     for repeat in 1..=REPEATS {
+        what.pass = (repeat as usize - 1, REPEATS as usize);
         // Dirt lies in one pass only.
         let disturbances: Vec<circle::Disturbance> = put
             .iter()
@@ -141,7 +184,10 @@ pub fn four_sensor_made(put: Put<'_>, seed: u64, noise: f64) -> FourSensors {
         assert!(disturbances.add(name, *size), "{name}");
     }
     let repeats: Vec<_> = (0..u64::from(REPEATS))
-        .map(|repeat| simulate(&geometry, &truth, &disturbances, seed * 100 + repeat).unwrap())
+        .map(|repeat| {
+            disturbances.pass = (repeat as usize, REPEATS as usize);
+            simulate(&geometry, &truth, &disturbances, seed * 100 + repeat).unwrap()
+        })
         .collect();
     FourSensors::new(&repeats, None).unwrap()
 }

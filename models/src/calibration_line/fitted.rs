@@ -41,6 +41,24 @@ pub enum NotALine {
     },
 }
 
+/// For each load of a set in the order taken whether it was reached by rising (1) or falling (−1).
+fn directions(loads: impl Iterator<Item = f64>) -> Vec<f64> {
+    let loads: Vec<f64> = loads.collect();
+    let mut direction = match loads.iter().find(|x| **x != loads[0]) {
+        Some(next) if *next < loads[0] => -1.0,
+        _ => 1.0,
+    };
+    let mut last = loads.first().copied().unwrap_or(0.0);
+    let reached = |x: &f64| {
+        if *x != last {
+            direction = (x - last).signum();
+        }
+        last = *x;
+        direction
+    };
+    loads.iter().map(reached).collect()
+}
+
 /// The line of least squares through the readings.
 #[derive(Debug, Clone)]
 pub struct CalibrationLine {
@@ -84,9 +102,11 @@ impl CalibrationLine {
             .fold(f64::INFINITY, f64::min);
         let (mut observed, mut places, mut traces) = (Vec::new(), Vec::new(), Vec::new());
         for (set, mut members) in sets {
-            members.sort_by(|a, b| a.1.x.total_cmp(&b.1.x));
+            let directions = directions(members.iter().map(|m| m.1.x));
+            let mut members: Vec<_> = members.drain(..).zip(directions).collect();
+            members.sort_by(|a, b| a.0.1.x.total_cmp(&b.0.1.x));
             let start = places.len();
-            for (order, reading) in members {
+            for ((order, reading), direction) in members {
                 observed.push(reading.y);
                 places.push(Place {
                     channel: 0,
@@ -96,7 +116,7 @@ impl CalibrationLine {
                         _ => order as f64,
                     },
                     repeat: set,
-                    direction: 1.0,
+                    direction,
                     cell: values.partition_point(|v| *v < reading.x),
                 });
             }

@@ -39,22 +39,51 @@ pub enum Disturbance {
         /// The set, from 1.
         set: u32,
     },
+    /// Slope of one set, by what it changes at full scale.
+    SetSlope {
+        /// Change at full scale.
+        at_full: f64,
+        /// The set, from 1.
+        set: u32,
+    },
+    /// Drift of the slope, by what it changes at full scale at the end, with its time constant as a part of
+    /// the duration.
+    SensitivityDrift {
+        /// At full scale, at the end.
+        drift: f64,
+        /// Time constant.
+        constant: f64,
+    },
+    /// Jump of the zero after a part of the duration.
+    ZeroJump {
+        /// The jump.
+        jump: f64,
+        /// When.
+        moment: f64,
+    },
+    /// Width of a loop between rising and falling loads, greatest at half of full scale.
+    Hysteresis(f64),
 }
 
 impl Disturbance {
     /// The names that [`Self::named`] knows.
-    pub const NAMES: [&'static str; 7] = [
+    pub const NAMES: [&'static str; 11] = [
         "cubic",
         "drift",
+        "hysteresis",
         "logarithmic",
         "quadratic",
         "saturation",
+        "sensitivity-drift",
         "set-offset",
+        "set-slope",
         "square-root",
+        "zero-jump",
     ];
 
     /// A disturbance by the name of its effect and its size; what these leave open is usual: a knee
-    /// at a fifth of full scale, a time constant of a third of the duration, the last set.
+    /// at a fifth of full scale, a time constant of a third of the duration, the last set, a jump after
+    /// 0.55 of it.
     pub fn named(name: &str, size: f64, sets: u32) -> Option<Self> {
         Some(match name {
             "quadratic" => Self::Quadratic(size),
@@ -73,25 +102,47 @@ impl Disturbance {
                 offset: size,
                 set: sets,
             },
+            "set-slope" => Self::SetSlope {
+                at_full: size,
+                set: sets,
+            },
+            "sensitivity-drift" => Self::SensitivityDrift {
+                drift: size,
+                constant: 1.0 / 3.0,
+            },
+            "zero-jump" => Self::ZeroJump {
+                jump: size,
+                moment: 0.55,
+            },
+            "hysteresis" => Self::Hysteresis(size),
             _ => return None,
         })
     }
 
-    fn response(self, load: f64, moment: f64, set: u32) -> f64 {
+    fn response(self, load: f64, moment: f64, set: u32, rises: bool) -> f64 {
+        let settled = |constant: f64| {
+            let left = |part: f64| (-part / constant).exp();
+            (1.0 - left(moment)) / (1.0 - left(1.0))
+        };
+        let of_set = |own: u32| if own == set { 1.0 } else { 0.0 };
         match self {
             Self::Quadratic(at_full) => at_full * load * load,
             Self::Cubic(at_full) => at_full * load * load * load,
             Self::SquareRoot(at_full) => at_full * load.sqrt(),
             Self::Logarithmic(per_fold) => per_fold * load.ln(),
             Self::Saturation { lost, knee } => lost * (1.0 - (-load / knee).exp()),
-            Self::Drift { drift, constant } => {
-                drift * (1.0 - (-moment / constant).exp()) / (1.0 - (-1.0 / constant).exp())
-            }
-            Self::SetOffset { offset, set: own } => {
-                if own == set {
-                    offset
+            Self::Drift { drift, constant } => drift * settled(constant),
+            Self::SetOffset { offset, set } => offset * of_set(set),
+            Self::SetSlope { at_full, set } => at_full * load * of_set(set),
+            Self::SensitivityDrift { drift, constant } => drift * load * settled(constant),
+            Self::ZeroJump { jump, moment: from } if moment > from => jump,
+            Self::ZeroJump { .. } => 0.0,
+            Self::Hysteresis(width) => {
+                let open = 1.0 - (2.0 * load - 1.0).powi(2);
+                if rises {
+                    -width * open / 2.0
                 } else {
-                    0.0
+                    width * open / 2.0
                 }
             }
         }
@@ -109,6 +160,8 @@ pub struct CalibrationSimulation {
     pub loads: usize,
     /// Sets.
     pub sets: u32,
+    /// Whether each set goes back through the same loads.
+    pub both_directions: bool,
     /// Standard deviation of a reading.
     pub noise: f64,
     /// What is not straight.
@@ -125,16 +178,20 @@ pub fn simulate(
 ) -> Result<Vec<CalibrationReading>, NormalError> {
     let noise = Normal::new(0.0, what.noise.abs())?;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let last = (what.loads * what.sets as usize).saturating_sub(1).max(1) as f64;
-    let mut readings = Vec::with_capacity(what.loads * what.sets as usize);
+    let up = (1..=what.loads).map(|step| (step, true));
+    let down = (1..what.loads).rev().map(|step| (step, false));
+    let path: Vec<(usize, bool)> = up.chain(down.filter(|_| what.both_directions)).collect();
+    let count = path.len() * what.sets as usize;
+    let last = count.saturating_sub(1).max(1) as f64;
+    let mut readings = Vec::with_capacity(count);
     for set in 1..=what.sets {
-        for step in 1..=what.loads {
-            let load = step as f64 / what.loads as f64;
+        for (step, rises) in &path {
+            let load = *step as f64 / what.loads as f64;
             let time = readings.len() as f64;
             let bent: f64 = what
                 .disturbances
                 .iter()
-                .map(|d| d.response(load, time / last, set))
+                .map(|d| d.response(load, time / last, set, *rises))
                 .sum();
             let x = load * what.full_scale;
             readings.push(CalibrationReading {

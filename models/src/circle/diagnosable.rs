@@ -4,6 +4,7 @@
 //! was taken. Taking an effect out of the readings moves the points along their radii and the circle
 //! is fitted again, exactly; the fixed circle only keeps the books.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Matrix3};
@@ -28,8 +29,8 @@ pub struct CirclePoints {
 }
 
 impl CirclePoints {
-    /// Fits the circle to points (mm) with their repeat numbers from 1; the k-th point by angle of
-    /// each repeat stands at the same place. `noise` is the standard deviation of a radial
+    /// Fits the circle to points (mm) with their repeat numbers from 1, in the order in which they were
+    /// taken; the k-th point by angle of each repeat stands at the same place. `noise` is the standard deviation of a radial
     /// deviation, µm, where it is known.
     ///
     /// # Errors
@@ -50,9 +51,11 @@ impl CirclePoints {
                 .map(|p| raw(p.0)),
         );
         let degrees = |p: Point| seam + (raw(p) - seam).rem_euclid(360.0);
-        let mut sorted: Vec<(u32, f64, Point)> = points
+        let directions = directions(points, raw);
+        let mut sorted: Vec<(u32, f64, Point, usize)> = points
             .iter()
-            .map(|&(p, repeat)| (repeat, degrees(p), p))
+            .enumerate()
+            .map(|(order, &(p, repeat))| (repeat, degrees(p), p, order))
             .collect();
         sorted.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let mut traces: Vec<Range<usize>> = Vec::new();
@@ -72,12 +75,12 @@ impl CirclePoints {
         let places = sorted
             .iter()
             .enumerate()
-            .map(|(k, (repeat, angle, _))| Place {
+            .map(|(k, (repeat, angle, _, order))| Place {
                 channel: 0,
                 x: *angle,
-                time: k as f64,
+                time: *order as f64,
                 repeat: *repeat,
-                direction: 1.0,
+                direction: directions.get(repeat).copied().unwrap_or(1.0),
                 cell: k % size,
             })
             .collect();
@@ -125,10 +128,36 @@ impl CirclePoints {
         self.record.traces.first().map_or(0, Range::len)
     }
 
+    /// Part of the test at which a point was taken, 0 to 1.
+    pub(super) fn moment(&self, place: &Place) -> f64 {
+        place.time / (self.record.places.len().max(2) - 1) as f64
+    }
+
+    /// Angle turned since the first pass began, rad: the passes follow each other without stopping.
+    pub(super) fn turned(&self, place: &Place) -> f64 {
+        let start = |t: &Range<usize>| self.record.places[t.start].repeat;
+        let passes = self.record.traces.iter().map(start);
+        let before = passes.filter(|repeat| *repeat < place.repeat).count();
+        Self::angle(place) + std::f64::consts::TAU * place.direction * before as f64
+    }
+
     /// Angle of a place, rad.
     pub(super) fn angle(place: &Place) -> f64 {
         place.x.to_radians()
     }
+}
+
+/// The sense of each repeat, by the sum of its steps of less than half a turn: 1 with growing angles.
+fn directions(points: &[(Point, u32)], degrees: impl Fn(Point) -> f64) -> BTreeMap<u32, f64> {
+    let mut sums: BTreeMap<u32, f64> = BTreeMap::new();
+    for pair in points.windows(2).filter(|pair| pair[0].1 == pair[1].1) {
+        let step = degrees(pair[1].0) - degrees(pair[0].0);
+        *sums.entry(pair[0].1).or_default() += (step + 180.0).rem_euclid(360.0) - 180.0;
+    }
+    let sense = |sum: f64| if sum < 0.0 { -1.0 } else { 1.0 };
+    sums.into_iter()
+        .map(|(repeat, sum)| (repeat, sense(sum)))
+        .collect()
 }
 
 /// Where a pass is cut open, degrees: the middle of the widest gap between its points, so that noise

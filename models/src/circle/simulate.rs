@@ -23,6 +23,13 @@ pub struct CircleSimulation {
     pub noise_um: f64,
     /// Lobes of the form: (undulations per revolution, amplitude in µm, phase in rad).
     pub lobes: Vec<(u32, f64, f64)>,
+    /// Which pass this is, from 0, and of how many.
+    #[serde(skip, default = "only_pass")]
+    pub pass: (usize, usize),
+}
+
+fn only_pass() -> (usize, usize) {
+    (0, 1)
 }
 
 impl Default for CircleSimulation {
@@ -35,6 +42,7 @@ impl Default for CircleSimulation {
             arc: std::f64::consts::TAU,
             noise_um: 1.0,
             lobes: Vec::new(),
+            pass: only_pass(),
         }
     }
 }
@@ -63,14 +71,46 @@ pub enum Disturbance {
     Scale(f64),
     /// x reads too much by this share.
     ScaleMismatch(f64),
+    /// The y axis leans towards x by this angle, rad.
+    Squareness(f64),
+    /// The centre moves along x by so much over all passes, µm.
+    CentreDrift(f64),
+    /// The radius grows by so much over all passes, µm.
+    RadiusGrowth(f64),
+    /// The x axis loses so much motion where it reverses, µm.
+    AxisBacklash(f64),
+    /// A wave of a period that is no whole part of a turn.
+    AsynchronousMotion {
+        /// Undulations per revolution.
+        undulations: f64,
+        /// Amplitude, µm.
+        amplitude: f64,
+    },
+    /// The part lies so far along x in the last pass, µm.
+    PartMoved(f64),
+    /// The zero of the probe jumps by so much after 0.55 of all passes, µm.
+    ZeroJump(f64),
 }
 
 impl Disturbance {
     /// The names that [`Self::named`] knows.
-    pub const NAMES: [&'static str; 5] = ["lobes", "outlier", "ovality", "scale", "scale-mismatch"];
+    pub const NAMES: [&'static str; 12] = [
+        "asynchronous-motion",
+        "axis-backlash",
+        "centre-drift",
+        "lobes",
+        "outlier",
+        "ovality",
+        "part-moved",
+        "radius-growth",
+        "scale",
+        "scale-mismatch",
+        "squareness",
+        "zero-jump",
+    ];
 
-    /// A disturbance by the name of its effect and its size, µm or a share; what these leave open is
-    /// usual: three lobes, the first at 20°, the point after a third of the way round.
+    /// A disturbance by the name of its effect and its size, µm, rad or a share; what these leave open is
+    /// usual: three lobes, the first at 20°, the point after a third of the way round, 2.4 waves a turn.
     pub fn named(name: &str, size: f64, points: usize) -> Option<Self> {
         let lobes = |undulations| Self::Lobes {
             undulations,
@@ -86,6 +126,16 @@ impl Disturbance {
             },
             "scale" => Self::Scale(size),
             "scale-mismatch" => Self::ScaleMismatch(size),
+            "squareness" => Self::Squareness(size),
+            "centre-drift" => Self::CentreDrift(size),
+            "radius-growth" => Self::RadiusGrowth(size),
+            "axis-backlash" => Self::AxisBacklash(size),
+            "asynchronous-motion" => Self::AsynchronousMotion {
+                undulations: 2.4,
+                amplitude: size,
+            },
+            "part-moved" => Self::PartMoved(size),
+            "zero-jump" => Self::ZeroJump(size),
             _ => return None,
         })
     }
@@ -143,6 +193,10 @@ pub fn simulate_disturbed(
                 .sum();
             let mut r = radius + 1e-3 * form_um;
             let (mut of_x, mut of_y) = (1.0, 1.0);
+            let (mut along_x, mut leans): (f64, f64) = (0.0, 0.0);
+            let (pass, passes) = what.pass;
+            let taken = (pass * what.count + i) as f64;
+            let moment = taken / (passes * what.count).saturating_sub(1).max(1) as f64;
             for disturbance in disturbances {
                 match *disturbance {
                     Disturbance::Lobes {
@@ -159,11 +213,33 @@ pub fn simulate_disturbed(
                         of_y *= 1.0 + share;
                     }
                     Disturbance::ScaleMismatch(share) => of_x *= 1.0 + share,
+                    Disturbance::Squareness(angle) => leans += angle,
+                    Disturbance::CentreDrift(size) => along_x += 1e-3 * size * moment,
+                    Disturbance::RadiusGrowth(size) => r += 1e-3 * size * moment,
+                    Disturbance::AxisBacklash(lost) => {
+                        // In the upper half x falls.
+                        let falls = (angle.sin() > 0.0) == (what.arc > 0.0);
+                        along_x += if falls { 0.5e-3 * lost } else { -0.5e-3 * lost };
+                    }
+                    Disturbance::AsynchronousMotion {
+                        undulations,
+                        amplitude,
+                    } => {
+                        let turned = angle + what.arc * pass as f64;
+                        r += 1e-3 * amplitude * (undulations * turned).cos();
+                    }
+                    Disturbance::PartMoved(size) if pass + 1 == passes => along_x += 1e-3 * size,
+                    Disturbance::ZeroJump(size) if moment > 0.55 => r += 1e-3 * size,
+                    Disturbance::PartMoved(_) | Disturbance::ZeroJump(_) => {}
                 }
             }
+            let (x, y) = (
+                what.centre.x + r * angle.cos(),
+                what.centre.y + r * angle.sin(),
+            );
             Point::new(
-                of_x * (what.centre.x + r * angle.cos()) + noise.sample(&mut rng),
-                of_y * (what.centre.y + r * angle.sin()) + noise.sample(&mut rng),
+                of_x * (x + y * leans.sin()) + along_x + noise.sample(&mut rng),
+                of_y * y * leans.cos() + noise.sample(&mut rng),
             )
         })
         .collect())

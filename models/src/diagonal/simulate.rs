@@ -94,14 +94,31 @@ pub enum Disturbance {
         /// Time constant as a part of the duration.
         constant: f64,
     },
+    /// All scales grow by this share over the test.
+    ThermalExpansion(f64),
+    /// The X axis grows by so much at the end of its travel over the test, µm.
+    AxisGrowth(f64),
+    /// The laser loses so much in the last run, after its first third, µm.
+    LostCounts(f64),
+    /// The mirror of the last diagonal turns about the first of [`Diagonal::mirror_axes`] by so much while
+    /// its runs are taken, rad.
+    MirrorCreep(f64),
 }
 
 impl Disturbance {
     /// The names that [`Self::named`] knows.
-    pub const NAMES: [&'static str; 4] =
-        ["angular-error", "dead-path", "drift", "mirror-misalignment"];
+    pub const NAMES: [&'static str; 8] = [
+        "angular-error",
+        "axis-growth",
+        "dead-path",
+        "drift",
+        "lost-counts",
+        "mirror-creep",
+        "mirror-misalignment",
+        "thermal-expansion",
+    ];
 
-    /// A disturbance by the name of its effect and its size, µm or rad; what these leave open is
+    /// A disturbance by the name of its effect and its size, µm, rad or a share; what these leave open is
     /// usual: the rotation of Z about itself, a time constant of a tenth of the duration, the last of
     /// the diagonals and sequences.
     pub fn named(name: &str, size: f64, what: &DiagonalSimulation) -> Option<Self> {
@@ -120,6 +137,10 @@ impl Disturbance {
                 drift: size,
                 constant: 0.1,
             },
+            "thermal-expansion" => Self::ThermalExpansion(size),
+            "axis-growth" => Self::AxisGrowth(size),
+            "lost-counts" => Self::LostCounts(size),
+            "mirror-creep" => Self::MirrorCreep(size),
             _ => return None,
         })
     }
@@ -188,6 +209,7 @@ pub fn simulate_disturbed(
         }
     }
     add_drifts(&mut readings, disturbances);
+    add_growths(zone, &mut readings, disturbances);
     (readings, errors, mirrors)
 }
 
@@ -232,6 +254,62 @@ fn add_drifts(readings: &mut [DiagonalReading], disturbances: &[Disturbance]) {
     let mut run = None;
     for (order, reading) in readings.iter_mut().enumerate() {
         let now = drifted(order as f64 / last);
+        if run.replace(reading.run()) != Some(reading.run()) {
+            zero = now;
+        }
+        reading.value += now - zero;
+    }
+}
+
+/// What grows with time and place, from the zero at the beginning of each run, and lost counts.
+fn add_growths(zone: &WorkZone, readings: &mut [DiagonalReading], disturbances: &[Disturbance]) {
+    let last = readings.len().saturating_sub(1).max(1) as f64;
+    let Some(end) = readings.last().copied() else {
+        return;
+    };
+    let own = |r: &DiagonalReading| (r.diagonal, r.target) == (end.diagonal, end.target);
+    let first_of_last = readings.iter().position(own).unwrap_or(0) as f64;
+    let run_starts = readings
+        .iter()
+        .position(|r| r.run() == end.run())
+        .unwrap_or(0);
+    let run_length = readings.len() - run_starts;
+    let grown = |order: usize, reading: &DiagonalReading| -> f64 {
+        let moment = order as f64 / last;
+        let at = zone.position(reading.at);
+        let direction = reading.diagonal.direction(zone);
+        let start = reading.diagonal.start(zone);
+        let of = |disturbance: &Disturbance| match *disturbance {
+            Disturbance::ThermalExpansion(share) => {
+                1e3 * share * moment * direction.dot(&(at - start))
+            }
+            Disturbance::AxisGrowth(size) => size * moment * direction.x * (at.x / zone.travel[0]),
+            Disturbance::LostCounts(size) => {
+                let lost = order >= run_starts + run_length / 3;
+                if lost { size } else { 0.0 }
+            }
+            Disturbance::MirrorCreep(angle) if own(reading) => {
+                let part = (order as f64 - first_of_last) / (last - first_of_last).max(1.0);
+                let turn = reading.diagonal.mirror_axes(zone).into_iter().next();
+                // The mirror turns about the axis; the beam meets it off the diagonal by what the sequence has
+                // not yet travelled.
+                let off = at - start - direction * direction.dot(&(at - start));
+                turn.map_or(0.0, |axis| {
+                    1e3 * angle * part * axis.cross(&off).dot(&direction)
+                })
+            }
+            _ => 0.0,
+        };
+        disturbances.iter().map(of).sum()
+    };
+    let mut zero = 0.0;
+    let mut run = None;
+    let all: Vec<f64> = readings
+        .iter()
+        .enumerate()
+        .map(|(k, r)| grown(k, r))
+        .collect();
+    for (reading, now) in readings.iter_mut().zip(all) {
         if run.replace(reading.run()) != Some(reading.run()) {
             zero = now;
         }

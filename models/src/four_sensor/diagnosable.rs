@@ -99,6 +99,20 @@ impl FourSensors {
         self.at(place) as f64 / (self.geometry.output_count() - 1) as f64
     }
 
+    /// Part of all travels at which a reading was taken, 0 to 1.
+    pub(super) fn moment(&self, place: &Place) -> f64 {
+        let readings = self.record.places.len() / 4;
+        place.time / (readings.max(2) - 1) as f64
+    }
+
+    /// Slope of what the fitted state says a sensor reads, along the travel, µm/mm.
+    pub(super) fn reading_slope(&self, place: &Place) -> f64 {
+        let (n, step) = (self.at(place), self.geometry.step());
+        self.surface_slope(place)
+            + slope(&self.state.straightness.values, n, step)
+            + UM_PER_MM * self.arm(place.channel) * slope(&self.state.tilt.values, n, step)
+    }
+
     /// Place of a sensor from sensor 1, mm.
     pub(super) fn arm(&self, sensor: usize) -> f64 {
         self.geometry.positions()[sensor]

@@ -86,6 +86,16 @@ pub struct Disturbances {
     pub gain: [f64; 4],
     /// Drift of each sensor over the travel, µm.
     pub sensor_drift: [f64; 4],
+    /// What sensor 3 settles by over all travels, µm, with a time constant of a quarter of them.
+    pub settling: f64,
+    /// Jump of the zero of sensor 3 after 0.55 of all travels, µm.
+    pub jump: f64,
+    /// What sensor 3 reads too much at 30 µm, µm, by the square of its reading.
+    pub bent: f64,
+    /// How far sensor 3 lags behind, mm.
+    pub lag: f64,
+    /// Which travel this is, from 0, and of how many.
+    pub pass: (usize, usize),
 }
 
 impl Disturbances {
@@ -98,19 +108,28 @@ impl Disturbances {
             drift: 0.0,
             gain: [0.0; 4],
             sensor_drift: [0.0; 4],
+            settling: 0.0,
+            jump: 0.0,
+            bent: 0.0,
+            lag: 0.0,
+            pass: (0, 1),
         }
     }
 }
 
 impl Disturbances {
     /// The names that [`Self::add`] knows.
-    pub const NAMES: [&'static str; 6] = [
+    pub const NAMES: [&'static str; 10] = [
         "common-drift",
         "common-gain",
         "drift",
         "gain",
+        "lag",
+        "nonlinearity",
         "sensor-position",
+        "settling",
         "slide-position",
+        "zero-jump",
     ];
 
     /// Adds an effect of the diagnosis's catalogue by its name at a size (µm, mm or a share), to
@@ -122,6 +141,10 @@ impl Disturbances {
             "common-gain" => self.gain = self.gain.map(|g| g + size),
             "drift" => self.sensor_drift[2] += size,
             "gain" => self.gain[2] += size,
+            "lag" => self.lag += size,
+            "nonlinearity" => self.bent += size,
+            "settling" => self.settling += size,
+            "zero-jump" => self.jump += size,
             "sensor-position" => self.sensor_position[2] += size,
             // Equation (20) of Zhao et al. begins with 10 µm.
             "slide-position" => self.slide_position += size / mm_from_um(10.0),
@@ -145,20 +168,36 @@ pub fn simulate(
     let travel = (geometry.output_count() - 1) as f64 * geometry.step();
     let places = geometry.positions();
     let zero = truth.zero_adjustment();
+    let (pass, passes) = disturbances.pass;
+    let count = geometry.output_count();
     let readings = (0..geometry.output_count())
         .map(|n| {
             let commanded = n as f64 * geometry.step();
             let share = commanded / travel;
             let x = commanded + disturbances.slide_position * slide_position_error(share);
+            let taken = (pass * count + n) as f64;
+            let moment = taken / (passes * count).saturating_sub(1).max(1) as f64;
             std::array::from_fn(|sensor| {
                 let arm = places[sensor] + disturbances.sensor_position[sensor];
+                let third = if sensor == 2 { 1.0 } else { 0.0 };
+                let x = x - third * disturbances.lag;
+                let own = disturbances.settling * (1.0 - (-4.0 * moment).exp())
+                    + if moment > 0.55 {
+                        disturbances.jump
+                    } else {
+                        0.0
+                    };
                 let sum = truth.surface(x + arm)
                     + truth.straightness(x)
                     + UM_PER_MM * arm * truth.tilt(x)
                     + zero[sensor]
                     + (disturbances.drift + disturbances.sensor_drift[sensor]) * share;
                 let noise: f64 = StandardNormal.sample(&mut generator);
-                (1.0 + disturbances.gain[sensor]) * sum + disturbances.noise * noise
+                let bent = third * disturbances.bent * (sum / 30.0).powi(2);
+                (1.0 + disturbances.gain[sensor]) * sum
+                    + bent
+                    + third * own
+                    + disturbances.noise * noise
             })
         })
         .collect();

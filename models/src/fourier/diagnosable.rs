@@ -26,6 +26,8 @@ pub struct FourierScans {
     solver: Arc<DMatrix<f64>>,
     coefficients: DVector<f64>,
     noise: Option<f64>,
+    /// What the first probe and the one it is compared with read, µm.
+    seen: Arc<Vec<[f64; 2]>>,
 }
 
 impl FourierScans {
@@ -40,6 +42,7 @@ impl FourierScans {
         }
         let spacings = spacings(scans);
         let (mut places, mut traces, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        let mut seen = Vec::new();
         for (channel, spacing) in spacings.iter().enumerate() {
             let first_cell = channel << 32;
             for scan in scans.iter().filter(|s| s.spacing == *spacing) {
@@ -47,6 +50,8 @@ impl FourierScans {
                 let start = places.len();
                 for (k, value) in joined.difference.iter().enumerate() {
                     values.push(*value);
+                    let first = scan.readings[k].m1;
+                    seen.push([first, first - value]);
                     places.push(Place {
                         channel,
                         x: section.length * k as f64 / joined.difference.len() as f64,
@@ -68,6 +73,7 @@ impl FourierScans {
             coefficients: DVector::zeros(0),
             // A difference of two readings.
             noise: noise.map(|sigma| sigma * 2f64.sqrt()),
+            seen: Arc::new(seen),
         };
         let columns = model.design();
         let gram = columns.tr_mul(&columns);
@@ -140,9 +146,77 @@ impl FourierScans {
         place.x + self.arm(place)
     }
 
+    /// Part of the section from the first probe to the other one.
+    pub(super) fn share_of_arm(&self, place: &Place) -> f64 {
+        self.arm(place) / self.section.length
+    }
+
+    /// Part of the test at which a reading was taken, 0 to 1.
+    pub(super) fn moment(&self, place: &Place) -> f64 {
+        place.time / (self.record.places.len().max(2) - 1) as f64
+    }
+
+    /// The probes with readings, from 1.
+    pub(super) fn probes(&self) -> impl Iterator<Item = usize> + use<> {
+        let third = self.record.places.iter().any(|p| self.beyond(p));
+        1..if third { 4 } else { 3 }
+    }
+
+    /// What a change of a probe's reading changes in a difference, zero where it has no part in it.
+    pub(super) fn seen_by(&self, probe: usize, row: usize, of: impl Fn(f64) -> f64) -> f64 {
+        let other = if self.beyond(&self.record.places[row]) {
+            3
+        } else {
+            2
+        };
+        let [first, second] = self.seen[row];
+        match probe {
+            1 => of(first),
+            _ if probe == other => -of(second),
+            _ => 0.0,
+        }
+    }
+
+    /// The readings of a probe.
+    fn readings_of(&self, probe: usize) -> impl Iterator<Item = f64> + '_ {
+        let rows = self.seen.iter().zip(self.record.places.iter());
+        rows.filter_map(move |([first, second], place)| {
+            let other = if self.beyond(place) { 3 } else { 2 };
+            match probe {
+                1 => Some(*first),
+                _ if probe == other => Some(*second),
+                _ => None,
+            }
+        })
+    }
+
+    /// Mean reading of a probe, µm.
+    pub(super) fn mean_reading(&self, probe: usize) -> f64 {
+        let count = self.readings_of(probe).count().max(1) as f64;
+        self.readings_of(probe).sum::<f64>() / count
+    }
+
+    /// Greatest reading of a probe off its mean, µm.
+    pub(super) fn reach_of(&self, probe: usize) -> f64 {
+        let mean = self.mean_reading(probe);
+        let off = self
+            .readings_of(probe)
+            .map(|reading| (reading - mean).abs());
+        off.fold(f64::MIN_POSITIVE, f64::max)
+    }
+
+    /// Slope of the fitted workpiece under the first probe, µm/mm.
+    pub(super) fn slope_here(&self, place: &Place) -> f64 {
+        self.slope_at(place.x)
+    }
+
     /// Slope of the fitted workpiece under the second or third probe, µm/mm.
     pub(super) fn slope_there(&self, place: &Place) -> f64 {
-        let theta = self.angle(self.second(place));
+        self.slope_at(self.second(place))
+    }
+
+    fn slope_at(&self, x: f64) -> f64 {
+        let theta = self.angle(x);
         let per_mm = TAU / self.section.length;
         (1..=self.section.orders)
             .map(|order| {

@@ -84,13 +84,36 @@ pub enum Disturbance {
     },
     /// The slide turns by a sine over the section, rad.
     Yaw(f64),
+    /// P2 reads too much by this share.
+    ProbeGain(f64),
+    /// P2 reads too much by the square of its reading, by so much at its greatest, µm.
+    ProbeNonlinearity(f64),
+    /// P1 settles by so much over all scans, µm, with a time constant of 0.15 of them; the zero of each
+    /// scan stays in it.
+    Drift(f64),
+    /// The zero of P1 jumps by so much in the middle of the last scan, µm.
+    ZeroJump(f64),
+    /// The slide travels too far by this share.
+    TravelScale(f64),
+    /// The workpiece bends by so much over all scans, µm.
+    ThermalBending(f64),
 }
 
 impl Disturbance {
     /// The names that [`Self::named`] knows.
-    pub const NAMES: [&'static str; 3] = ["height-difference", "probe-spacing", "yaw"];
+    pub const NAMES: [&'static str; 9] = [
+        "drift",
+        "height-difference",
+        "probe-gain",
+        "probe-nonlinearity",
+        "probe-spacing",
+        "thermal-bending",
+        "travel-scale",
+        "yaw",
+        "zero-jump",
+    ];
 
-    /// A disturbance by the name of its effect and its size, µm, mm or rad; those of one spacing are
+    /// A disturbance by the name of its effect and its size, µm, mm, rad or a share; those of one spacing are
     /// given to the last.
     pub fn named(name: &str, size: f64, spacings: usize) -> Option<Self> {
         let spacing = spacings.saturating_sub(1);
@@ -104,8 +127,55 @@ impl Disturbance {
                 error: size,
             },
             "yaw" => Self::Yaw(size),
+            "probe-gain" => Self::ProbeGain(size),
+            "probe-nonlinearity" => Self::ProbeNonlinearity(size),
+            "drift" => Self::Drift(size),
+            "zero-jump" => Self::ZeroJump(size),
+            "travel-scale" => Self::TravelScale(size),
+            "thermal-bending" => Self::ThermalBending(size),
             _ => return None,
         })
+    }
+}
+
+/// What disturbs one scan.
+#[derive(Default)]
+struct Here {
+    height: f64,
+    error: f64,
+    yaw: f64,
+    gain: f64,
+    bent: f64,
+    drift: f64,
+    jump: f64,
+    scale: f64,
+    bending: f64,
+}
+
+impl Here {
+    /// Of the scans of a spacing; the last of all is one that may jump.
+    fn of(disturbances: &[Disturbance], place: usize, is_last: bool) -> Self {
+        let mut here = Self::default();
+        for disturbance in disturbances {
+            match *disturbance {
+                Disturbance::HeightDifference { spacing, height } if spacing == place => {
+                    here.height += height;
+                }
+                Disturbance::ProbeSpacing { spacing, error } if spacing == place => {
+                    here.error += error;
+                }
+                Disturbance::HeightDifference { .. } | Disturbance::ProbeSpacing { .. } => {}
+                Disturbance::Yaw(angle) => here.yaw += angle,
+                Disturbance::ProbeGain(share) => here.gain += share,
+                Disturbance::ProbeNonlinearity(size) => here.bent += size,
+                Disturbance::Drift(size) => here.drift += size,
+                Disturbance::ZeroJump(size) if is_last => here.jump += size,
+                Disturbance::ZeroJump(_) => {}
+                Disturbance::TravelScale(share) => here.scale += share,
+                Disturbance::ThermalBending(size) => here.bending += size,
+            }
+        }
+        here
     }
 }
 
@@ -194,6 +264,7 @@ pub fn simulate_disturbed(
         workpiece: (0..what.samples).map(|i| workpiece(grid(i))).collect(),
         slide: (0..what.samples).map(|i| slide(grid(i))).collect(),
     };
+    let runs = what.repeats.max(1) as usize * what.spacings.len();
     let mut scans = Vec::new();
     for repeat in 1..=what.repeats.max(1) {
         for (place, &spacing) in what.spacings.iter().enumerate() {
@@ -201,42 +272,46 @@ pub fn simulate_disturbed(
                 return Err(FourierError::Spacing { spacing, length });
             }
             let joint = length - spacing;
-            let (mut height, mut error, mut yaw) = (0.0, 0.0, 0.0);
-            for disturbance in disturbances {
-                match *disturbance {
-                    Disturbance::HeightDifference { spacing, height: h } if spacing == place => {
-                        height += h;
-                    }
-                    Disturbance::ProbeSpacing { spacing, error: e } if spacing == place => {
-                        error += e
-                    }
-                    Disturbance::Yaw(angle) => yaw += angle,
-                    Disturbance::HeightDifference { .. } | Disturbance::ProbeSpacing { .. } => {}
-                }
-            }
+            // The scans of one spacing are taken in one go.
+            let run = place * what.repeats.max(1) as usize + repeat as usize - 1;
+            let here = Here::of(disturbances, place, run + 1 == runs);
             // A probe at an arm along the slide rises by the arm times the tangent of the angle.
-            let lift = |x: f64, arm: f64| 1e3 * arm * (yaw * (TAU * x / length + 0.7).sin()).tan();
+            let lift =
+                |x: f64, arm: f64| 1e3 * arm * (here.yaw * (TAU * x / length + 0.7).sin()).tan();
             // One step before the joint, so that it can be interpolated where it is off the grid.
             let third_from = joint - 1.5 * length / what.samples as f64;
+            let second =
+                |i: usize| what.height_difference + workpiece(grid(i) + spacing) + slide(grid(i));
+            let reach = (0..=what.samples)
+                .map(|i| second(i).abs())
+                .fold(1e-9, f64::max);
             let readings = (0..=what.samples)
                 .map(|i| {
                     let x = grid(i);
+                    let moment = (run as f64 + i as f64 / what.samples as f64) / runs as f64;
+                    let stands = x * (1.0 + here.scale);
+                    let probed = |at: f64| {
+                        let u = at.rem_euclid(length) / length;
+                        workpiece(at) + here.bending * moment * (1.0 - (2.0 * u - 1.0).powi(2))
+                    };
+                    let zero = here.drift * (1.0 - (-moment / 0.15).exp())
+                        + if 2 * i > what.samples { here.jump } else { 0.0 };
                     let mut noise = || normal.sample(&mut rng);
+                    let m1 = probed(stands) + slide(x) + zero + noise();
+                    let m2 = what.height_difference
+                        + probed(stands + spacing + here.error)
+                        + slide(x)
+                        + lift(x, spacing + here.error);
+                    let m2 = m2 * (1.0 + here.gain) + here.bent * (m2 / reach).powi(2) + noise();
                     ScanReading {
                         x,
-                        m1: workpiece(x) + slide(x) + noise(),
-                        m2: Some(
-                            what.height_difference
-                                + workpiece(x + spacing + error)
-                                + slide(x)
-                                + lift(x, spacing + error)
-                                + noise(),
-                        ),
+                        m1,
+                        m2: Some(m2),
                         m3: (what.third_probe && x >= third_from).then(|| {
-                            workpiece(x - joint + error)
+                            probed(stands - joint + here.error)
                                 + slide(x)
-                                + height
-                                + lift(x, error - joint)
+                                + here.height
+                                + lift(x, here.error - joint)
                                 + noise()
                         }),
                     }

@@ -186,6 +186,12 @@ pub trait Effect<M>: Send + Sync {
         Vec::new()
     }
 
+    /// Columns of the limit in which the freedom of a shape shows nothing, if they are those of another effect:
+    /// a cause stands only where the evidence for it is greater than for them.
+    fn limit(&self, _model: &M, _shape: &Shape) -> Vec<Column> {
+        Vec::new()
+    }
+
     /// Values of a shape, by their places, that are the same again after a period, and this period, where
     /// a search by small steps may stop beside the best.
     fn cycles(&self, _model: &M, _shape: &Shape) -> Vec<(usize, f64)> {

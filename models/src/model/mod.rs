@@ -5,6 +5,7 @@
 //! that the model leaves out.
 
 mod effect;
+mod moments;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -16,6 +17,7 @@ pub(crate) const ROUNDING: f64 = 1e-12;
 
 pub(crate) use effect::each;
 pub use effect::{About, Effect, Estimate, Link, Parameter, Shape};
+pub(crate) use moments::Moments;
 
 /// The circumstances of one reading.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -36,6 +36,9 @@ pub struct Args {
     /// Sets.
     #[arg(long, alias = "sets", default_value_t = 2, value_name = "N")]
     repeats: u32,
+    /// Go back through the same loads in each set
+    #[arg(long)]
+    both_directions: bool,
     /// Standard deviation of a reading.
     #[arg(long, default_value_t = 1e-3, value_name = "Y")]
     noise: f64,
@@ -76,6 +79,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         full_scale: args.full_scale,
         loads: args.positions,
         sets: args.repeats,
+        both_directions: args.both_directions,
         noise: args.noise,
         disturbances,
     };

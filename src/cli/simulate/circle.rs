@@ -66,7 +66,7 @@ fn parse_lobe(text: &str) -> Result<(u32, f64), String> {
 pub fn run(args: &Args) -> Result<Answer, Message> {
     super::few_enough(&[args.positions, args.repeats], "--positions or --repeats")?;
     super::standard_deviations(&[("--noise", args.noise)])?;
-    let what = CircleSimulation {
+    let mut what = CircleSimulation {
         centre: Point::new(args.centre_x, args.centre_y),
         radius: args.radius,
         count: args.positions,
@@ -74,6 +74,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         arc: args.arc.to_radians(),
         noise_um: args.noise,
         lobes: args.lobe.iter().map(|&(n, a)| (n, a, 0.0)).collect(),
+        pass: (0, args.repeats.max(1)),
     };
     let seed = args.common.seed;
     let disturbances = super::effects(&args.effects, &Disturbance::NAMES, |name, size| {
@@ -82,6 +83,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let mut points = Vec::new();
     let mut repeats = Vec::new();
     for repeat in 0..args.repeats {
+        what.pass.0 = repeat;
         let pass = simulate_disturbed(&what, &disturbances, super::seed_of(seed, repeat));
         let pass = pass.map_err(|e| {
             Message::bad_input(e.to_string()).remedy("change --radius, --positions or --noise")

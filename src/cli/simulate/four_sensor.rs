@@ -110,6 +110,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let passes: Vec<Outputs> = (0..args.repeats.max(1))
         .map(|repeat| {
             let seed = super::seed_of(args.common.seed, repeat);
+            disturbances.pass = (repeat, args.repeats.max(1));
             simulate(&geometry, &truth, &disturbances, seed)
         })
         .collect::<Result<_, _>>()

@@ -9,6 +9,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder, raw_signatures, span};
+use crate::diagnosis::attribution::limits::is_beyond_limit;
 use crate::diagnosis::attribution::shrink::held_out_square;
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::detection::space::{Space, orthonormal};
@@ -88,7 +89,10 @@ pub(in crate::diagnosis) fn confidence_set<M: FittedModel>(
             })
             && predicts(context, readings, &best);
     Answer {
-        complete: needed && context.adequate(&best, &remainder) && sized(context, readings, &best),
+        complete: needed
+            && context.adequate(&best, &remainder)
+            && (0..best.len()).all(|k| is_beyond_limit(context, readings, &best, k))
+            && sized(context, readings, &best),
         causes: best,
         groups,
         remainder,
@@ -233,6 +237,7 @@ fn alternatives<M: FittedModel>(
             let left = context.judged(readings, &trial);
             let misfit = left.residual.norm_squared();
             let passes = context.adequate(&trial, &left)
+                && is_beyond_limit(context, readings, &trial, k)
                 && Sizes::fitted(context, readings, &trial)
                     .is_some_and(|sizes| stands(context, &trial, &sizes, k));
             passes.then(|| Member {

@@ -9,6 +9,7 @@ pub(super) mod confidence;
 pub(super) mod context;
 pub(super) mod doubt;
 pub(super) mod examined;
+pub(super) mod limits;
 pub(super) mod mixing;
 pub(super) mod refine;
 pub(super) mod refit;

@@ -21,6 +21,7 @@ fn line(disturbance: Disturbance, seed: u64) -> CalibrationLine {
         full_scale: 1000.0,
         loads: 20,
         sets: 4,
+        both_directions: false,
         noise: 1.0,
         disturbances: vec![disturbance],
     };

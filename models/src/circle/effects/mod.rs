@@ -1,10 +1,17 @@
 //! What a circle leaves out of the points measured on it: one file an effect.
 
+mod asynchronous_motion;
+mod axis_backlash;
+mod centre_drift;
 mod lobes;
 mod outlier;
 mod ovality;
+mod part_moved;
+mod radius_growth;
 mod scale;
 mod scale_mismatch;
+mod squareness;
+mod zero_jump;
 
 use nalgebra::DMatrix;
 
@@ -14,11 +21,18 @@ use crate::model::{Column, Effect, Estimate, FittedModel};
 /// The catalogue.
 pub(super) fn all() -> Vec<Box<dyn Effect<CirclePoints>>> {
     vec![
+        Box::new(asynchronous_motion::AsynchronousMotion),
+        Box::new(axis_backlash::AxisBacklash),
+        Box::new(centre_drift::CentreDrift),
         Box::new(lobes::Lobes),
         Box::new(outlier::Outlier),
         Box::new(ovality::Ovality),
+        Box::new(part_moved::PartMoved),
+        Box::new(radius_growth::RadiusGrowth),
         Box::new(scale::Scale),
         Box::new(scale_mismatch::ScaleMismatch),
+        Box::new(squareness::Squareness),
+        Box::new(zero_jump::ZeroJump),
     ]
 }
 

@@ -1,9 +1,13 @@
 //! What the regression of step-diagonal readings leaves out: one file an effect.
 
 mod angular_error;
+mod axis_growth;
 mod dead_path;
 mod drift;
+mod lost_counts;
+mod mirror_creep;
 mod mirror_misalignment;
+mod thermal_expansion;
 
 use super::diagnosable::DiagonalRuns;
 use crate::model::Effect;
@@ -12,8 +16,12 @@ use crate::model::Effect;
 pub(super) fn all() -> Vec<Box<dyn Effect<DiagonalRuns>>> {
     vec![
         Box::new(angular_error::AngularError),
+        Box::new(axis_growth::AxisGrowth),
         Box::new(dead_path::DeadPath),
         Box::new(drift::Drift),
+        Box::new(lost_counts::LostCounts),
+        Box::new(mirror_creep::MirrorCreep),
         Box::new(mirror_misalignment::MirrorMisalignment),
+        Box::new(thermal_expansion::ThermalExpansion),
     ]
 }

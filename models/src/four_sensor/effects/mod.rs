@@ -4,8 +4,12 @@ mod common_drift;
 mod common_gain;
 mod drift;
 mod gain;
+mod lag;
+mod nonlinearity;
 mod sensor_position;
+mod settling;
 mod slide_position;
+mod zero_jump;
 
 use super::diagnosable::FourSensors;
 use crate::model::Effect;
@@ -17,7 +21,11 @@ pub(super) fn all() -> Vec<Box<dyn Effect<FourSensors>>> {
         Box::new(common_gain::CommonGain),
         Box::new(drift::Drift),
         Box::new(gain::Gain),
+        Box::new(lag::Lag),
+        Box::new(nonlinearity::Nonlinearity),
         Box::new(sensor_position::SensorPosition),
+        Box::new(settling::Settling),
         Box::new(slide_position::SlidePosition),
+        Box::new(zero_jump::ZeroJump),
     ]
 }

@@ -1,8 +1,14 @@
 //! What the Fourier separation leaves out: one file an effect.
 
+mod drift;
 mod height_difference;
+mod probe_gain;
+mod probe_nonlinearity;
 mod probe_spacing;
+mod thermal_bending;
+mod travel_scale;
 mod yaw;
+mod zero_jump;
 
 use super::diagnosable::FourierScans;
 use crate::model::Effect;
@@ -10,8 +16,14 @@ use crate::model::Effect;
 /// The catalogue.
 pub(super) fn all() -> Vec<Box<dyn Effect<FourierScans>>> {
     vec![
+        Box::new(drift::Drift),
         Box::new(height_difference::HeightDifference),
+        Box::new(probe_gain::ProbeGain),
+        Box::new(probe_nonlinearity::ProbeNonlinearity),
         Box::new(probe_spacing::ProbeSpacing),
+        Box::new(thermal_bending::ThermalBending),
+        Box::new(travel_scale::TravelScale),
         Box::new(yaw::Yaw),
+        Box::new(zero_jump::ZeroJump),
     ]
 }

@@ -63,6 +63,16 @@ enum Anew {
     Lean(usize),
 }
 
+impl Anew {
+    /// What a unit of lag or lean changes: a lag as far as it is, by what the slide comes upon there.
+    fn change(self, model: &Linearised, k: usize, place: &Place, lag: f64) -> f64 {
+        match self {
+            Self::Lean(axis) => place.direction * model.seat(place).phi[axis],
+            Self::Lag => -place.direction * model.reading_chord(k, -place.direction * lag),
+        }
+    }
+}
+
 impl StickSlip {
     pub fn new(channels: &Arrangement) -> Self {
         let sees = |axis: &usize| channels.seats().iter().any(|s| s.phi[*axis] != 0.0);
@@ -192,11 +202,8 @@ impl Effect<Linearised> for StickSlip {
             return Vec::new();
         };
         let run = |place: &Place| 0.5 * place.direction * part_of_travel(model, place.x);
-        // What a unit of lag or lean changes: a lag as far as it is, by what the slide comes upon there.
-        let change = |what: Anew, k: usize, place: &Place, lag: f64| match what {
-            Anew::Lean(axis) => place.direction * model.seat(place).phi[axis],
-            Anew::Lag => -place.direction * model.reading_chord(k, -place.direction * lag),
-        };
+        let change =
+            |what: Anew, k: usize, place: &Place, lag: f64| what.change(model, k, place, lag);
         match self.kind(shape.variant) {
             Kind::Lag => {
                 let &[_, state, lag] = shape.values.as_slice() else {
@@ -241,6 +248,29 @@ impl Effect<Linearised> for StickSlip {
                 vec![column]
             }
         }
+    }
+
+    /// Without slips that are seen it is a lag or a lean of either direction that changes evenly along the travel:
+    /// `axis-backlash`, `lateral-backlash`.
+    fn limit(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
+        let Kind::Sawtooth(what, _) = self.kind(shape.variant) else {
+            return Vec::new();
+        };
+        let lag = shape.values.get(1 + passes(model).len()).copied();
+        let half = 0.5 * lag.unwrap_or(0.0);
+        let of = |direction: f64, along: fn(f64) -> f64| {
+            Column::from_places(model.places(), |k, place| {
+                if place.direction == direction {
+                    along(part_of_travel(model, place.x)) * what.change(model, k, place, half)
+                } else {
+                    0.0
+                }
+            })
+        };
+        [1.0, -1.0]
+            .into_iter()
+            .flat_map(|direction| [of(direction, |_| 1.0), of(direction, |part| part)])
+            .collect()
     }
 
     /// A sawtooth from 0 to 1 at θ/2π + φ has the first wave −sin(θ + 2πφ)/π: waves become the sawtooth

@@ -1,0 +1,41 @@
+//! Moments at which something may begin that lasts: between readings that follow each other.
+
+use super::{Place, Shape};
+
+/// The different moments of some readings, ascending.
+pub(crate) struct Moments(Vec<f64>);
+
+impl Moments {
+    pub fn of<'a>(places: impl Iterator<Item = &'a Place>) -> Self {
+        let mut moments: Vec<f64> = places.map(|p| p.time).collect();
+        moments.sort_by(f64::total_cmp);
+        moments.dedup();
+        Self(moments)
+    }
+
+    /// Shapes of a variant at which a search begins, at most about `most`: each midway between two
+    /// moments.
+    pub fn grid(&self, variant: usize, most: usize) -> Vec<Shape> {
+        let stride = self.0.len().div_ceil(most).max(1);
+        let pairs = self.0.windows(2).enumerate().step_by(stride);
+        pairs
+            .map(|(k, pair)| {
+                let next = self.0[(k + stride).min(self.0.len() - 1)];
+                Shape {
+                    variant,
+                    values: vec![0.5 * (pair[0] + pair[1])],
+                    steps: vec![0.5 * (next - pair[0])],
+                }
+            })
+            .collect()
+    }
+
+    /// Standard uncertainty that the spacing of the readings leaves in a moment.
+    pub fn resolution(&self, moment: f64) -> f64 {
+        let right = self.0.partition_point(|m| *m <= moment);
+        match (right.checked_sub(1), self.0.get(right)) {
+            (Some(left), Some(after)) => (after - self.0[left]) / 12f64.sqrt(),
+            _ => f64::NAN,
+        }
+    }
+}

@@ -23,7 +23,7 @@ use crate::diagnosis::options::Options;
 use crate::diagnosis::sealing::ahead::{derivatives, held, placed, reported};
 use crate::diagnosis::sealing::carried::{Anew, Carried};
 use crate::diagnosis::sealing::sealed::{
-    Interval, REACH, Sealed, SealedEffect, SealedGap, SealedNumber, SealedTrace,
+    Interval, Sealed, SealedEffect, SealedGap, SealedNumber, SealedTrace,
 };
 
 /// Draws behind every spread, and those that are projected at once.
@@ -170,7 +170,7 @@ fn forecast<M: FittedModel>(
         gap: spread.gap,
         effect: there.told((context, causes, &known), &ahead, &expected)?,
         quantity: spread.quantities,
-        trace: traces(&state, &expected, &there.change, &spread.stds),
+        trace: SealedTrace::all(&state, &expected, &there.change, &spread.stds),
     })
 }
 
@@ -315,25 +315,13 @@ impl Spread {
         let mut of_weights = vec![[0.0; 2]; quantities.len()];
         let (mut without, mut with) = (Vec::with_capacity(DRAWS), Vec::with_capacity(DRAWS));
         for batch in 0..DRAWS / BATCH {
-            let mut noise = DMatrix::zeros(context.space.readings(), BATCH);
-            let mut missed = DMatrix::zeros(expected.len(), BATCH);
-            for j in 0..BATCH {
-                let law = context.law.possible(batch * BATCH + j, &mut random);
-                noise.set_column(j, &law.draw_all(context.model, &mut random));
-                missed.set_column(j, &law.draw_all(ahead.model, &mut random));
-            }
-            let mut errors = &known.gain * context.space.forward(noise.clone()).0;
-            errors += &known.rest
-                * DMatrix::from_fn(known.rest.ncols(), BATCH, |_, _| {
-                    StandardNormal.sample(&mut random)
-                });
-            noise -= &known.derivatives * &errors;
-            for (mut row, scale) in errors.row_iter_mut().zip(&there.scales) {
-                row *= *scale;
-            }
-            let off = carried.columns(&(&noise - flat.forward(noise.clone()).0))
-                + &there.derivatives * errors;
-            missed -= &off;
+            let (off, missed) = drawn(
+                (context, flat, known),
+                (ahead, there),
+                carried,
+                batch,
+                &mut random,
+            );
             for column in missed.column_iter() {
                 let seen = expected + column;
                 with.push(meter.square(&seen, 0).0);
@@ -372,26 +360,32 @@ impl Spread {
     }
 }
 
-fn traces<M: FittedModel>(
-    plan: &M,
-    clean: &DVector<f64>,
-    causes: &DVector<f64>,
-    stds: &DVector<f64>,
-) -> Vec<SealedTrace> {
-    let names = plan.channel_names();
-    let of = |trace: &std::ops::Range<usize>| {
-        let places = &plan.places()[trace.clone()];
-        let part = |values: &DVector<f64>| values.as_slice()[trace.clone()].to_vec();
-        Some(SealedTrace {
-            channel: names.get(places.first()?.channel)?.clone(),
-            repeat: places[0].repeat,
-            direction: places[0].direction,
-            x: places.iter().map(|p| p.x).collect(),
-            time: places.iter().map(|p| p.time).collect(),
-            expected: part(&(clean + causes)),
-            causes: part(causes),
-            band: part(&(stds * REACH)),
-        })
-    };
-    plan.traces().iter().filter_map(of).collect()
+/// What the forecast is off by and what the further measurement misses it by, planned readings × draws.
+fn drawn<M: FittedModel>(
+    (context, flat, known): (&Context<'_, M>, &Space, &Known),
+    (ahead, there): (&Context<'_, M>, &There),
+    carried: &Carried,
+    batch: usize,
+    random: &mut ChaCha8Rng,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let mut noise = DMatrix::zeros(context.space.readings(), BATCH);
+    let mut missed = DMatrix::zeros(ahead.space.readings(), BATCH);
+    for j in 0..BATCH {
+        let law = context.law.possible(batch * BATCH + j, random);
+        noise.set_column(j, &law.draw_all(context.model, random));
+        missed.set_column(j, &law.draw_all(ahead.model, random));
+    }
+    let mut errors = &known.gain * context.space.forward(noise.clone()).0;
+    errors += &known.rest
+        * DMatrix::from_fn(known.rest.ncols(), BATCH, |_, _| {
+            StandardNormal.sample(random)
+        });
+    noise -= &known.derivatives * &errors;
+    for (mut row, scale) in errors.row_iter_mut().zip(&there.scales) {
+        row *= *scale;
+    }
+    let off =
+        carried.columns(&(&noise - flat.forward(noise.clone()).0)) + &there.derivatives * errors;
+    missed -= &off;
+    (off, missed)
 }

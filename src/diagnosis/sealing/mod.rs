@@ -8,11 +8,11 @@
 mod ahead;
 mod carried;
 mod forecast;
+mod score;
 mod scored;
 mod sealed;
 
 pub use forecast::{NotSealed, sealed};
-pub use scored::{
-    Checked, CheckedEffect, CheckedGap, CheckedNumber, CheckedTrace, Standing, checked,
-};
+pub use score::{Checked, CheckedEffect, CheckedGap, CheckedNumber, CheckedTrace, Standing};
+pub use scored::checked;
 pub use sealed::{Interval, Sealed, SealedEffect, SealedGap, SealedNumber, SealedTrace};

@@ -1,5 +1,7 @@
 //! What is sealed, as plain values.
 
+use errsep_models::model::FittedModel;
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use crate::diagnosis::noise::law::Components;
@@ -155,4 +157,31 @@ pub struct SealedTrace {
     /// Half the width of the pointwise 95 % band: a reading, what a new set-up changes fitted anew, lies in
     /// `expected ± band`.
     pub band: Vec<f64>,
+}
+
+impl SealedTrace {
+    /// Those of a plan: the expected readings without the causes, what the causes change, standard deviations.
+    pub(super) fn all<M: FittedModel>(
+        plan: &M,
+        clean: &DVector<f64>,
+        causes: &DVector<f64>,
+        stds: &DVector<f64>,
+    ) -> Vec<Self> {
+        let names = plan.channel_names();
+        let of = |trace: &std::ops::Range<usize>| {
+            let places = &plan.places()[trace.clone()];
+            let part = |values: &DVector<f64>| values.as_slice()[trace.clone()].to_vec();
+            Some(Self {
+                channel: names.get(places.first()?.channel)?.clone(),
+                repeat: places[0].repeat,
+                direction: places[0].direction,
+                x: places.iter().map(|p| p.x).collect(),
+                time: places.iter().map(|p| p.time).collect(),
+                expected: part(&(clean + causes)),
+                causes: part(causes),
+                band: part(&(stds * REACH)),
+            })
+        };
+        plan.traces().iter().filter_map(of).collect()
+    }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// In the order in which they work; what is on one level may not know each other either.
-const ORDER: [&[&str]; 9] = [
+const ORDER: [&[&str]; 10] = [
     &["search", "options", "levels"],
     &["noise"],
     &["detection"],
@@ -13,6 +13,7 @@ const ORDER: [&[&str]; 9] = [
     &["verdict", "catalogue"],
     &["diagnose"],
     &["joined", "agreement", "learning"],
+    &["sealing"],
 ];
 
 fn level(room: &str) -> Option<usize> {

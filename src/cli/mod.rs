@@ -4,6 +4,7 @@ pub mod anova;
 mod answer;
 pub mod batch;
 pub mod call;
+pub mod check;
 pub mod circle;
 mod common;
 pub mod completions;
@@ -60,6 +61,7 @@ enum Command {
 #[derive(Debug, Subcommand)]
 enum Answering {
     Anova(anova::Args),
+    Check(check::Args),
     Circle(circle::Args),
     Diagnose(diagnose::Args),
     FourSensor(four_sensor::Args),
@@ -144,6 +146,7 @@ impl Answering {
     fn common(&self) -> &CommonArgs {
         match self {
             Self::Anova(args) => &args.common,
+            Self::Check(args) => &args.common,
             Self::Circle(args) => &args.common,
             Self::Diagnose(args) => &args.common,
             Self::FourSensor(args) => &args.common,
@@ -162,6 +165,7 @@ impl Answering {
     fn run(&self) -> Result<Answer, Message> {
         match self {
             Self::Anova(args) => anova::run(args),
+            Self::Check(args) => check::run(args),
             Self::Circle(args) => circle::run(args),
             Self::Diagnose(args) => diagnose::run(args),
             Self::FourSensor(args) => four_sensor::run(args),

@@ -150,6 +150,24 @@ pub fn joined<M: FittedModel>(
     names: &[String],
     options: &Options,
 ) -> Result<Joined, NotJoined> {
+    in_the_fit(
+        model,
+        catalogue,
+        names,
+        options,
+        |context, readings, causes, notes| told(context, readings, causes, notes, options),
+    )?
+}
+
+/// What is made of a fit that effects have joined: its workbench, the readings seen from there, the effects in
+/// the order in which they are named, and what should be known beside.
+pub(in crate::diagnosis) fn in_the_fit<M: FittedModel, R>(
+    model: &M,
+    catalogue: Vec<Box<dyn Effect<M>>>,
+    names: &[String],
+    options: &Options,
+    then: impl FnOnce(&Context<'_, M>, &DVector<f64>, &[Cause], Vec<String>) -> R,
+) -> Result<R, NotJoined> {
     let chosen = chosen(catalogue, names)?;
     let (calmed, calm) = calmed(model);
     let model = calmed.as_ref().unwrap_or(model);
@@ -177,7 +195,7 @@ pub fn joined<M: FittedModel>(
             calm.count
         ));
     }
-    told(&context, &readings, &causes, notes, options)
+    Ok(then(&context, &readings, &causes, notes))
 }
 
 /// The effects that are given, in their order.

@@ -15,6 +15,7 @@ mod levels;
 mod noise;
 mod options;
 mod planning;
+mod sealing;
 mod search;
 mod severity;
 pub mod turning;
@@ -34,6 +35,10 @@ pub use noise::law::{NoiseLaw, NoiseSource};
 pub use options::Options;
 pub use planning::certificate::{Diagnosability, certificate};
 pub use planning::prove::{Trials, prove};
+pub use sealing::{
+    Checked, CheckedEffect, CheckedGap, CheckedNumber, CheckedTrace, Interval, NotSealed, Sealed,
+    SealedEffect, SealedGap, SealedNumber, SealedTrace, Standing, checked, sealed,
+};
 pub use severity::{Confidence, Rival, Severity};
 pub use verdict::told::{Told, for_people, scaled};
 pub use verdict::types::{

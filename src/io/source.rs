@@ -59,6 +59,20 @@ pub fn begin_record_with(hashing: bool, in_memory: Vec<InMemory>) {
     });
 }
 
+/// Holds an input in memory beside those that the record began with.
+pub fn hold(input: InMemory) {
+    RECORD.with_borrow_mut(|record| {
+        let record = record.get_or_insert_with(|| Record {
+            hashing: false,
+            in_memory: Vec::new(),
+            digests: Vec::new(),
+            pipes: Vec::new(),
+        });
+        record.in_memory.retain(|held| held.name != input.name);
+        record.in_memory.push(input);
+    });
+}
+
 /// Digests are wanted of what this thread reads from now on, whatever its record began with.
 pub fn want_digests() {
     RECORD.with_borrow_mut(|record| {

@@ -22,6 +22,9 @@ mod plan_of_designs;
 mod positioning;
 mod report;
 mod reversal;
+mod seal;
+#[path = "../sealed_machine/mod.rs"]
+mod sealed_machine;
 mod spindle_bar;
 mod step_diagonal;
 mod turning_bar;

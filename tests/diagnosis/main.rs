@@ -15,6 +15,9 @@ mod positions;
 mod realisations;
 #[path = "../scene/mod.rs"]
 mod scene;
+#[path = "../sealed_machine/mod.rs"]
+mod sealed_machine;
+mod sealing;
 mod several_ways;
 mod severity;
 mod single_effects;

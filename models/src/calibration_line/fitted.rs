@@ -200,6 +200,11 @@ impl FittedModel for CalibrationLine {
         vec!["y".to_owned()]
     }
 
+    /// The instrument and its line are the same.
+    fn set_anew(&self) -> Option<DMatrix<f64>> {
+        Some(DMatrix::zeros(self.record.places.len(), 0))
+    }
+
     fn quantities(&self) -> Vec<Quantity> {
         let count = self.record.places.len() as f64;
         let mean = self.record.places.iter().map(|p| p.x).sum::<f64>() / count;

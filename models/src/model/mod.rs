@@ -297,6 +297,13 @@ pub trait FittedModel: Clone + Send + Sync {
         Vec::new()
     }
 
+    /// The changes of the readings by what a new set-up changes, readings × unknowns: a further
+    /// measurement of the same thing fits them anew and takes over all else. `None`: the model does
+    /// not say what stays the same.
+    fn set_anew(&self) -> Option<DMatrix<f64>> {
+        None
+    }
+
     /// The fitted state with a change of what is seen, one value a reading, that is not fitted:
     /// signatures of effects that depend on it are taken there.
     #[must_use]

@@ -34,11 +34,8 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     };
     super::positive(setup.line.noise, "[line] noise", args)?;
     let readings = read(&args.data)?;
-    let model = CalibrationLine::new(&readings, setup.line.noise).map_err(|e| {
-        Message::bad_input(e.to_string())
-            .in_file(&args.data)
-            .remedy("give finite readings at four or more values of x")
-    })?;
+    let noise = setup.line.noise;
+    let model = fitted(&readings, noise, args)?;
     let mut notes = vec![
         "x and y are in the units of their columns; sizes of effects are in the unit of y."
             .to_owned(),
@@ -63,7 +60,21 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         notes,
         inputs: Vec::new(),
     }
-    .answer(args)
+    .answer_with(args, |plan| {
+        Some(read(&plan.data).and_then(|readings| fitted(&readings, noise, plan)))
+    })
+}
+
+fn fitted(
+    readings: &[CalibrationReading],
+    noise: Option<f64>,
+    args: &Args,
+) -> Result<CalibrationLine, Message> {
+    CalibrationLine::new(readings, noise).map_err(|e| {
+        Message::bad_input(e.to_string())
+            .in_file(&args.data)
+            .remedy("give finite readings at four or more values of x")
+    })
 }
 
 fn test_in_words(test: &LackOfFit) -> String {

@@ -7,6 +7,7 @@ use errsep_models::model::{Effect, FittedModel, Place};
 use serde_json::{Value, json};
 
 use super::learnt::{all_tested, learnt, tested_in_words};
+use super::sealed::Seal;
 use super::{Args, page, within_reach_of, words};
 use crate::cli::{Answer, progress};
 use crate::diagnosis::{
@@ -30,13 +31,26 @@ pub(super) struct Case<M> {
 impl<M: FittedModel> Case<M> {
     /// Diagnoses the case.
     pub(super) fn answer(self, args: &Args) -> Result<Answer, Message> {
+        self.answer_with(args, |_| None)
+    }
+
+    /// The same where a model can be made of a plan: `plan` reads the one that the arguments name.
+    pub(super) fn answer_with(
+        self,
+        args: &Args,
+        plan: impl Fn(&Args) -> Option<Result<M, Message>>,
+    ) -> Result<Answer, Message> {
         within_reach_of(&self.model, self.along, &args.data)?;
+        if let Some(seal) = &args.check {
+            return self.checked(args, seal);
+        }
         if !args.with.is_empty() {
             return Ok(self.with_effects(args)?.0);
         }
         let place = args.learn.as_deref();
         let file = place.map(|p| OutFile::reserve(p).map(|file| (p, file)));
         let file = file.transpose()?;
+        let seal = Seal::begun(args, plan)?;
         let catalogue = catalogue(args, &self.model)?;
         let known: Vec<String> = catalogue.iter().map(|e| e.name().to_owned()).collect();
         if let Some(name) = args.without.iter().find(|n| !known.contains(n)) {
@@ -56,6 +70,8 @@ impl<M: FittedModel> Case<M> {
         let own = self::catalogue(args, &self.model)?;
         let learnt = file.map(|file| learnt(&self.model, args, file, &diagnosis, &options));
         let learnt = learnt.transpose()?;
+        let sealed = seal.map(|seal| seal.written(&self.model, args, &diagnosis, &options));
+        let sealed = sealed.transpose()?;
         let trials = args.prove.map(|count| {
             let bar = progress("proving", None);
             // The trials are made on readings without what was found in them.
@@ -77,7 +93,8 @@ impl<M: FittedModel> Case<M> {
             &own_effects(args, &self.model)?,
             &options,
         );
-        self.delivered(args, diagnosis, trials.as_ref(), learnt, tests)
+        let said = [("learnt", learnt), ("sealed", sealed)];
+        self.delivered(args, diagnosis, trials.as_ref(), said, tests)
     }
 
     fn delivered(
@@ -85,7 +102,7 @@ impl<M: FittedModel> Case<M> {
         args: &Args,
         mut diagnosis: Diagnosis,
         trials: Option<&Trials>,
-        learnt: Option<Said>,
+        said: [(&str, Option<Said>); 2],
         (tests, remarks): (Vec<Tested>, Vec<String>),
     ) -> Result<Answer, Message> {
         diagnosis.notes.extend(self.notes);
@@ -117,7 +134,7 @@ impl<M: FittedModel> Case<M> {
             }
         }
         let told = (&mut text, &mut json, &mut view.notes);
-        tell_learnt(told, self.model.reading_unit(), &tests, learnt);
+        tell_learnt(told, self.model.reading_unit(), &tests, said);
         let mut inputs = vec![args.data.clone()];
         inputs.extend(args.setup.clone());
         inputs.extend(args.effects.clone());
@@ -141,15 +158,15 @@ impl<M: FittedModel> Case<M> {
     }
 }
 
-/// What is said of an effect that was learnt, in words and as JSON.
-type Said = (String, Value);
+/// What is said of an effect that was learnt, or of a seal, in words and as JSON.
+pub(super) type Said = (String, Value);
 
-/// Adds to text, JSON and notes of the page how learnt effects fare here, and what was learnt here.
+/// Adds to text, JSON and notes of the page how learnt effects fare here, and what was learnt or sealed here.
 fn tell_learnt(
     (text, json, notes): (&mut String, &mut Value, &mut Vec<String>),
     unit: &str,
     tests: &[Tested],
-    learnt: Option<Said>,
+    said: [(&str, Option<Said>); 2],
 ) {
     for test in tests {
         let said = tested_in_words(test, unit);
@@ -160,9 +177,12 @@ fn tell_learnt(
     if !tests.is_empty() {
         object.insert("tested".to_owned(), json!(tests));
     }
-    if let Some((said, learnt)) = learnt {
-        *text += &said;
-        object.insert("learnt".to_owned(), learnt);
+    for (key, said) in said {
+        if let Some((words, value)) = said {
+            *text += &words;
+            notes.push(words.trim().to_owned());
+            object.insert(key.to_owned(), value);
+        }
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod calibration_line;
 mod case;
+mod checked;
 mod circle;
 mod four_sensor;
 mod fourier;
@@ -14,11 +15,13 @@ mod machine;
 pub(super) mod page;
 mod recognise;
 pub(super) mod reversal;
+pub(in crate::cli) mod sealed;
 mod step_diagonal;
 mod turning_bar;
 pub(super) mod words;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use errsep_models::model::{FittedModel, Place};
 
@@ -51,7 +54,12 @@ A file for --effects has one table an effect:
 What no effect explains is learnt from one campaign and tested on another:
 
     errsep diagnose monday.csv --learn coolant.toml
-    errsep diagnose friday.csv --effects coolant.toml")]
+    errsep diagnose friday.csv --effects coolant.toml
+
+What a further measurement will show is written down before it is made, and scored afterwards:
+
+    errsep diagnose monday.csv --seal next.toml --next plan.csv
+    errsep check next.toml friday.csv")]
 pub struct Args {
     /// The readings.
     #[arg(value_name = "DATA.csv")]
@@ -85,6 +93,12 @@ pub struct Args {
     /// Where no effect explains the gap, write what is left as an effect of its own, for --effects.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "with")]
     learn: Option<PathBuf>,
+    /// Write what a further measurement is expected to show, before it is made, for `errsep check`.
+    #[arg(long, value_name = "FILE.toml", requires = "next", conflicts_with_all = ["with", "columns"])]
+    seal: Option<PathBuf>,
+    /// The further measurement that --seal is for: the columns of the readings without the readings.
+    #[arg(long, value_name = "PLAN.csv", requires = "seal")]
+    next: Option<PathBuf>,
     /// Probability of naming anything where nothing is there.
     #[arg(long, value_name = "P", default_value_t = 0.01)]
     false_alarm: f64,
@@ -96,6 +110,9 @@ pub struct Args {
     /// was right.
     #[arg(long, value_name = "N")]
     prove: Option<usize>,
+    /// What was sealed, to score these readings against in place of a diagnosis.
+    #[arg(skip)]
+    check: Option<Arc<sealed::SealFile>>,
     /// Noise of a reading that an option of the model's own command states, µm.
     #[arg(skip)]
     noise: Option<f64>,
@@ -148,7 +165,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             "give the number of rivals of a family, such as --severity {RIVALS}, at most {MOST_RIVALS}; 0 draws none"
         )));
     }
-    if args.learn.is_some() || args.effects.is_some() {
+    if args.learn.is_some() || args.effects.is_some() || args.seal.is_some() {
         // A learnt effect names the readings that it was learnt from by their digest.
         want_digests();
     }
@@ -161,6 +178,37 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         .remedy("leave it out, or say --model machine"));
     }
     (model.run)(args)
+}
+
+/// Scores readings against what was sealed before they were taken, read with these set-up and effects.
+///
+/// # Errors
+/// The readings are bad, or not those that were planned.
+pub(super) fn scored(
+    data: &Path,
+    [setup, effects]: [Option<PathBuf>; 2],
+    seal: sealed::SealFile,
+    common: &CommonArgs,
+) -> Result<Answer, Message> {
+    let models = recognise::MODELS.iter();
+    let known = models.map(|m| m.name).find(|name| *name == seal.model);
+    let model = known.ok_or_else(|| {
+        Message::bad_input(format!(
+            "the seal is of a `{}`, which is no model",
+            seal.model
+        ))
+        .remedy("score it with the version of errsep that sealed it")
+    })?;
+    let given = joined::Given {
+        setup: setup.as_deref(),
+        ..joined::Given::to(model, data, &[], common)
+    };
+    let args = Args {
+        effects,
+        check: Some(Arc::new(seal)),
+        ..given.args()
+    };
+    (recognise::model(&args)?.run)(&args)
 }
 
 /// Refuses a standard deviation in the set-up that is not positive.

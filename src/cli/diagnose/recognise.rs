@@ -18,6 +18,8 @@ pub(super) struct Model {
     pub tables: &'static [&'static str],
     /// Columns of its readings; each entry is one form of the file.
     pub columns: &'static [&'static [&'static str]],
+    /// The column of the readings, which a plan has not; none where a plan without readings has nothing to say.
+    pub reading: Option<&'static str>,
     /// Reads, fits and diagnoses.
     pub run: fn(&Args) -> Result<Answer, Message>,
 }
@@ -35,42 +37,49 @@ pub(super) const MODELS: &[Model] = &[
             &["x", "2A"],
             &["x", "2B"],
         ],
+        reading: Some("reading"),
         run: reversal::run,
     },
     Model {
         name: "calibration-line",
         tables: &["line"],
         columns: &[&["x", "y"], &["set", "x", "y"]],
+        reading: Some("y"),
         run: calibration_line::run,
     },
     Model {
         name: "circle",
         tables: &["circle"],
         columns: &[&["x", "y"], &["repeat", "x", "y"]],
+        reading: None,
         run: circle::run,
     },
     Model {
         name: "four-sensor",
         tables: &["sensors", "separation", "parabola"],
         columns: &[&["x", "m1", "m2", "m3", "m4"], &["sensor", "x", "reading"]],
+        reading: None,
         run: four_sensor::run,
     },
     Model {
         name: "fourier",
         tables: &["section", "probe", "method"],
         columns: &[&["spacing", "x", "m1", "m2"]],
+        reading: None,
         run: fourier::run,
     },
     Model {
         name: "machine",
         tables: &["chain", "errors"],
         columns: &[&["part", "point", "axis", "value"]],
+        reading: None,
         run: machine::run,
     },
     Model {
         name: "step-diagonal",
         tables: &["test", "assume", "measured"],
         columns: &[&["diagonal", "sequence", "x", "y", "reading"]],
+        reading: None,
         run: step_diagonal::run,
     },
     Model {
@@ -78,6 +87,7 @@ pub(super) const MODELS: &[Model] = &[
         tables: &["bar", "spindle"],
         // A run is told by what other files lack: see `is_run`.
         columns: &[],
+        reading: None,
         run: turning_bar::run,
     },
 ];

@@ -44,6 +44,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     let model = Linearised::new(&data.observations, assumptions(&setup))
         .map_err(|why| refusal(&why).in_file(&args.data))?;
     let notes = notes(&model);
+    let gathered = readings_of_one(&model);
     let mut answer = Case {
         model,
         readings: data.in_words(),
@@ -51,7 +52,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         notes,
         inputs: Vec::new(),
     }
-    .answer(args)?;
+    .answer_with(args, |plan| Some(planned(plan, &setup, gathered)))?;
     if let Some(command) = with_command(args, &answer.json) {
         told_command(&mut answer, command);
     }
@@ -74,7 +75,8 @@ fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<An
         along: ALONG,
         inputs: Vec::new(),
     };
-    let mut answer = case.answer(args)?;
+    let gathered = readings_of_one(&case.model);
+    let mut answer = case.answer_with(args, |plan| Some(planned(plan, setup, gathered)))?;
     let names = named(&answer.json);
     if args.with.is_empty() && !names.is_empty() {
         let mut command = format!("errsep reversal {}", args.data.display());
@@ -88,6 +90,41 @@ fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<An
         told_command(&mut answer, command);
     }
     Ok(answer)
+}
+
+/// How many readings stand for one of a model.
+fn readings_of_one(model: &Linearised) -> f64 {
+    (model.gathered.as_ref()).map_or(1.0, |gathered| gathered.readings_per_cell)
+}
+
+/// Part by which these numbers of a plan and of a measurement may differ.
+const ALIKE: f64 = 0.1;
+
+/// The model of a plan; `gathered`: how many readings of the measurement stand for one.
+fn planned(plan: &Args, setup: &ReversalSetup, gathered: f64) -> Result<Linearised, Message> {
+    let model = match read_any(&plan.data, setup)? {
+        Readings::Four(data) => Linearised::new(&data.observations, assumptions(setup)),
+        Readings::Other(data) => design_model(setup, &data, None),
+    };
+    let model = model.map_err(|why| refusal(&why).in_file(&plan.data))?;
+    if model.left_out > 0 {
+        return Err(
+            Message::bad_input("the planned traces have positions of their own")
+                .in_file(&plan.data)
+                .remedy("plan the same positions for every trace"),
+        );
+    }
+    let own = readings_of_one(&model);
+    if (own / gathered - 1.0).abs() > ALIKE {
+        return Err(Message::bad_input(format!(
+            "of the plan {} readings stand for one, of the measurement {}: the noise of their means is another",
+            number::plain(own, 2),
+            number::plain(gathered, 2)
+        ))
+        .in_file(&plan.data)
+        .remedy("plan the positions that were measured"));
+    }
+    Ok(model)
 }
 
 /// The fitted model of a design, with the fit of its readings where there is one.

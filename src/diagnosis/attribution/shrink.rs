@@ -96,10 +96,7 @@ impl GapMeter {
     /// Root mean square of what the model misses, the noise taken out:
     /// √max(0, RSS/ν − noise²), with `causes` more parameters than the model.
     pub fn size(&self, readings: &DVector<f64>, causes: usize) -> Size {
-        let all = self.space.degrees_of_freedom() as f64;
-        let freedom = (all - causes as f64).max(1.0);
-        let rss = self.space.forward_vector(readings).norm_squared();
-        let square = rss / freedom - self.expected;
+        let (square, freedom) = self.square(readings, causes);
         // And what the product of noise and gap adds.
         let variance = self.spread + 4.0 * square.max(0.0) * self.expected / freedom;
         let reach = 1.96 * variance.sqrt();
@@ -108,6 +105,15 @@ impl GapMeter {
             rms: root(square),
             ci95: [root(square - reach), root(square + reach)],
         }
+    }
+
+    /// Mean square of what the model misses less that of the noise, which chance may make negative,
+    /// and the degrees of freedom.
+    pub fn square(&self, readings: &DVector<f64>, causes: usize) -> (f64, f64) {
+        let all = self.space.degrees_of_freedom() as f64;
+        let freedom = (all - causes as f64).max(1.0);
+        let rss = self.space.forward_vector(readings).norm_squared();
+        (rss / freedom - self.expected, freedom)
     }
 
     /// What the fit leaves of every reading.

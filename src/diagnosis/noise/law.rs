@@ -11,6 +11,7 @@ use errsep_models::model::FittedModel;
 use nalgebra::{DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal, StudentT};
+use serde::{Deserialize, Serialize};
 
 use crate::diagnosis::levels::FEWEST_CONTRASTS;
 use crate::diagnosis::noise::contrasts::Contrasts;
@@ -31,7 +32,8 @@ pub enum NoiseSource {
 }
 
 /// The parts of the noise of one reading; variances in the square of the reading's unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Components {
     /// Variance of the white part.
     pub white: f64,
@@ -128,16 +130,26 @@ impl NoiseLaw {
         }
     }
 
+    /// A law that is known from elsewhere.
+    pub(in crate::diagnosis) fn stated(parts: Components) -> Self {
+        Self {
+            white: parts.white,
+            correlated: parts.correlated,
+            length: parts.length,
+            shift: parts.shift,
+            ..Self::white(1.0, f64::INFINITY, NoiseSource::Stated)
+        }
+    }
+
     /// A law of given parts.
     #[cfg(test)]
     pub(in crate::diagnosis) fn of(white: f64, correlated: f64, length: f64, shift: f64) -> Self {
-        Self {
+        Self::stated(Components {
             white,
             correlated,
             length,
             shift,
-            ..Self::white(1.0, f64::INFINITY, NoiseSource::Stated)
-        }
+        })
     }
 
     /// The mean of laws drawn from what the repeats allow.
@@ -202,10 +214,7 @@ impl NoiseLaw {
         draw: usize,
         random: &mut ChaCha8Rng,
     ) -> DVector<f64> {
-        let law = match self.possible.get(draw % self.possible.len().max(1)) {
-            Some(law) => *law,
-            None => self.rescaled(random),
-        };
+        let law = self.possible(draw, random);
         let Some((tails, student)) = self
             .tails
             .and_then(|t| Some((t, StudentT::new(t.freedom).ok()?)))
@@ -219,6 +228,18 @@ impl NoiseLaw {
         }
         spikes.pull_in(&mut noise);
         noise
+    }
+
+    /// A law that the readings allow.
+    pub(in crate::diagnosis) fn possible(
+        &self,
+        draw: usize,
+        random: &mut ChaCha8Rng,
+    ) -> Components {
+        match self.possible.get(draw % self.possible.len().max(1)) {
+            Some(law) => *law,
+            None => self.rescaled(random),
+        }
     }
 
     /// The white variance drawn from what its degrees of freedom allow.

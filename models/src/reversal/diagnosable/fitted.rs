@@ -36,10 +36,7 @@ impl FittedModel for Linearised {
         let patterns = DMatrix::from_fn(self.trace_channels.len(), by_channel.ncols(), |t, k| {
             by_channel[(self.trace_channels[t], k)]
         });
-        let constants = match self.arrangement.zero() {
-            Zero::Reset => DMatrix::identity(self.present().len(), self.present().len()),
-            Zero::Kept => self.arrangement.constants(),
-        };
+        let constants = self.constants();
         let offsets = constants.ncols();
         let beta = self.arrangement.has_beta();
         let mut columns = DMatrix::zeros(self.record.places.len(), offsets + usize::from(beta));
@@ -195,6 +192,26 @@ impl FittedModel for Linearised {
         self.further_measurements()
     }
 
+    /// The indicators' zeros, and how the artefact lies: γ, and β where it is fitted.
+    fn set_anew(&self) -> Option<DMatrix<f64>> {
+        let constants = self.constants();
+        let slopes: [fn(&Seat) -> f64; 3] = [|s| s.psi[0], |s| s.psi[1], |s| s.theta[0]];
+        let fitted = if self.arrangement.has_beta() { 3 } else { 2 };
+        let slopes = &slopes[..fitted];
+        let zeros = constants.ncols();
+        Some(DMatrix::from_fn(
+            self.record.places.len(),
+            zeros + slopes.len(),
+            |k, j| {
+                let place = &self.record.places[k];
+                match j.checked_sub(zeros) {
+                    None => constants[(place.channel, j)],
+                    Some(j) => slopes[j](self.seat(place)) * (place.x - self.middle),
+                }
+            },
+        ))
+    }
+
     fn beneath(mut self, change: &DVector<f64>) -> Self {
         self.beneath = Some(change.clone());
         self
@@ -206,6 +223,14 @@ impl FittedModel for Linearised {
 }
 
 impl Linearised {
+    /// How the zeros enter, channels × zeros.
+    fn constants(&self) -> DMatrix<f64> {
+        match self.arrangement.zero() {
+            Zero::Reset => DMatrix::identity(self.present().len(), self.present().len()),
+            Zero::Kept => self.arrangement.constants(),
+        }
+    }
+
     /// A slope as a linear function of the readings, by the weights of the channels on it.
     fn slope_quantity(&self, name: &str, slope: &[f64], weight: impl Fn(usize) -> f64) -> Quantity {
         let traces = |channel: usize| {

@@ -81,6 +81,22 @@ impl Effect<Linearised> for AmbientCycle {
             .is_some_and(|cycles| reach.contains(cycles))
     }
 
+    /// The cycles are those of the whole test.
+    fn carried(
+        &self,
+        from: &Linearised,
+        to: &Linearised,
+        shape: &Shape,
+        amplitudes: &[f64],
+    ) -> (Shape, Vec<f64>) {
+        let longer = to.duration() / from.duration();
+        let carried = Shape {
+            values: shape.values.iter().map(|cycles| cycles * longer).collect(),
+            ..shape.clone()
+        };
+        (carried, amplitudes.to_vec())
+    }
+
     fn variant_name(&self, model: &Linearised, shape: &Shape) -> Option<String> {
         let cycles = shape.values.first()?;
         Some(format!("period {:.4} s", model.duration() / cycles))

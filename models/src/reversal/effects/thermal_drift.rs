@@ -113,6 +113,25 @@ impl Effect<Linearised> for ThermalDrift {
             && shape.values.windows(2).all(|v| v[1] > v[0] + APART.ln())
     }
 
+    /// The drift is told over the whole test.
+    fn carried(
+        &self,
+        from: &Linearised,
+        to: &Linearised,
+        shape: &Shape,
+        amplitudes: &[f64],
+    ) -> (Shape, Vec<f64>) {
+        let count = self.0.of(shape.variant).len().max(1);
+        let grown = |log_constant: &f64| {
+            let whole = |model: &Linearised| (-model.duration() / log_constant.exp()).exp_m1();
+            whole(to) / whole(from)
+        };
+        let stages: Vec<f64> = shape.values.iter().map(grown).collect();
+        let by_stage = |(k, a): (usize, &f64)| a * stages.get(k / count).unwrap_or(&1.0);
+        let carried = amplitudes.iter().enumerate().map(by_stage);
+        (shape.clone(), carried.collect())
+    }
+
     fn variant_name(&self, _model: &Linearised, shape: &Shape) -> Option<String> {
         let linear = shape.free() == 0;
         Some(

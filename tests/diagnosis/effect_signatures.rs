@@ -188,6 +188,7 @@ fn four_sensor() {
 fn fourier() {
     let what = FourierSimulation {
         samples: 200,
+        repeats: 2,
         orders: 20,
         noise: 0.0,
         ..FourierSimulation::default()
@@ -214,14 +215,14 @@ fn fourier() {
         // The time of the simulation is 200 of 201 steps a scan.
         ("drift", 1.0, 0, 0.02),
         ("thermal-bending", 1.0, 0, 0.02),
-        ("zero-jump", 1.0, 2, 1e-9),
+        ("zero-jump", 1.0, 5, 1e-9),
         // Second order, and the ends of the section.
         ("travel-scale", 1e-5, 0, 0.02),
     ] {
         let with = made(&[fourier::Disturbance::named(name, size, 3).unwrap()]);
         let values: &[f64] = match name {
             "drift" => &[0.15f64.ln()],
-            "zero-jump" => &[500.5],
+            "zero-jump" => &[1100.5],
             _ => &[],
         };
         let rest = left(&bare, &with, name, &at(variant, values));

@@ -5,6 +5,7 @@
 //! step at the joint for the slope of the workpiece, common to all scans.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 use std::sync::Arc;
 
 use errsep_solvers::linear::limited;
@@ -26,7 +27,8 @@ pub struct FourierScans {
     solver: Arc<DMatrix<f64>>,
     coefficients: DVector<f64>,
     noise: Option<f64>,
-    /// What the first probe and the one it is compared with read, µm.
+    /// What the first probe and the one it is compared with read in the other repeats, µm; nothing where
+    /// some scan has no other repeat.
     seen: Arc<Vec<[f64; 2]>>,
 }
 
@@ -64,6 +66,10 @@ impl FourierScans {
                 traces.push(start..places.len());
             }
         }
+        let traces_of_all: Vec<(usize, Range<usize>)> = traces
+            .iter()
+            .map(|t: &Range<usize>| (places[t.start].channel, t.clone()))
+            .collect();
         let mut model = Self {
             section,
             spacings,
@@ -73,7 +79,7 @@ impl FourierScans {
             coefficients: DVector::zeros(0),
             // A difference of two readings.
             noise: noise.map(|sigma| sigma * 2f64.sqrt()),
-            seen: Arc::new(seen),
+            seen: Arc::new(in_other_repeats(seen, &traces_of_all)),
         };
         let columns = model.design();
         let gram = columns.tr_mul(&columns);
@@ -159,7 +165,8 @@ impl FourierScans {
     /// The probes with readings, from 1.
     pub(super) fn probes(&self) -> impl Iterator<Item = usize> + use<> {
         let third = self.record.places.iter().any(|p| self.beyond(p));
-        1..if third { 4 } else { 3 }
+        let count = if third { 3 } else { 2 };
+        1..if self.seen.is_empty() { 1 } else { count + 1 }
     }
 
     /// What a change of a probe's reading changes in a difference, zero where it has no part in it.
@@ -169,7 +176,9 @@ impl FourierScans {
         } else {
             2
         };
-        let [first, second] = self.seen[row];
+        let Some([first, second]) = self.seen.get(row).copied() else {
+            return 0.0;
+        };
         match probe {
             1 => of(first),
             _ if probe == other => -of(second),
@@ -229,6 +238,29 @@ impl FourierScans {
             })
             .sum()
     }
+}
+
+/// For each reading of the probes the mean of the other repeats with the same spacing there: what a probe
+/// reads is as noisy as what is judged, and a signature that holds the same noise would find itself in it.
+fn in_other_repeats(seen: Vec<[f64; 2]>, scans: &[(usize, Range<usize>)]) -> Vec<[f64; 2]> {
+    let mut others = Vec::with_capacity(seen.len());
+    for (k, (channel, scan)) in scans.iter().enumerate() {
+        let alike = || {
+            let same = scans.iter().enumerate();
+            same.filter(move |(j, (c, s))| *j != k && c == channel && s.len() == scan.len())
+        };
+        let count = alike().count() as f64;
+        if count == 0.0 {
+            return Vec::new();
+        }
+        for at in 0..scan.len() {
+            let sum = |probe: usize| -> f64 {
+                alike().map(|(_, (_, s))| seen[s.start + at][probe]).sum()
+            };
+            others.push([sum(0) / count, sum(1) / count]);
+        }
+    }
+    others
 }
 
 impl FittedModel for FourierScans {

@@ -1,4 +1,6 @@
 //! The gain of one probe is wrong.
+//!
+//! What the probe reads comes from the other repeats; without any it is not looked for.
 
 use super::FourierScans;
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};

@@ -1,4 +1,6 @@
 //! The characteristic of one probe is bent.
+//!
+//! What the probe reads comes from the other repeats; without any it is not looked for.
 
 use super::FourierScans;
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};

@@ -25,7 +25,8 @@ pub struct Args {
     /// The result (result.json, or what --format json printed); a machine (TOML) for the 21 errors.
     #[arg(value_name = "RESULT.json")]
     result: PathBuf,
-    /// The file; FILE.about.json beside it says sign, unit and what was left out.
+    /// The file; FILE.about.json beside it says sign, unit and what was left out, FILE.lis is the list in which
+    /// isg-volumetric finds it.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Name or number of the axis for the controller; for siemens-cec X:Z, the axis that moves and the one
@@ -50,7 +51,7 @@ pub struct Args {
     /// Laboratory, person, item, customer and dates of a certificate (TOML).
     #[arg(long, value_name = "ADMIN.toml")]
     admin: Option<PathBuf>,
-    /// Replace the two files if they are there.
+    /// Replace the files if they are there.
     #[arg(long)]
     force: bool,
     /// How to print what was written.
@@ -120,7 +121,8 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             Message::bad_input("--reference or --step is not finite").remedy("give a number")
         );
     }
-    let about_path = about_path(&args.out);
+    let about_path = beside(&args.out, ".about.json");
+    let list_path = beside(&args.out, ".lis");
     if args.admin.is_some() && format.takes != Kind::Numbers {
         return Err(
             Message::bad_input(format!("{} has no use for --admin", format.name))
@@ -141,15 +143,29 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         .content(format)
         .map_err(|message| message.in_file(&args.result))?;
     let exported = (format.write)(content, &request(args)?)?;
+    let list = match &exported.list {
+        Some(text) => Some((place(&list_path)?, text)),
+        None => None,
+    };
     let mut about = exported.about(format.name);
+    about["list"] = json!(list.as_ref().map(|_| list_path.display().to_string()));
     let provenance = Provenance::of(&[], inputs.iter().map(PathBuf::as_path), None)?;
     let provenance = serde_json::to_value(&provenance).map_err(|e| unwritable(&e))?;
     about["result"] = json!({"schema": loaded.schema, "sha256": provenance["inputs"][0]["sha256"]});
     let pretty = serde_json::to_string_pretty(&about).map_err(|e| unwritable(&e))?;
     about_file.write((printable::json(&pretty) + "\n").as_bytes())?;
-    if let Err(message) = file.write(exported.text.as_bytes()) {
-        // Without its file the side file tells of nothing.
+    // Without its file the side file and the list tell of nothing.
+    if let Some((place, text)) = list
+        && let Err(message) = place.write(text.as_bytes())
+    {
         let _ = std::fs::remove_file(&about_path);
+        return Err(message);
+    }
+    if let Err(message) = file.write(exported.text.as_bytes()) {
+        let _ = std::fs::remove_file(&about_path);
+        if exported.list.is_some() {
+            let _ = std::fs::remove_file(&list_path);
+        }
         return Err(message);
     }
     let text = in_words(args, format.name, &exported, &about_path);
@@ -184,14 +200,19 @@ fn request(args: &Args) -> Result<Request, Message> {
             (None, None) => None,
         },
         travel: args.travel.clone(),
+        file_name: args
+            .out
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned())
+            .unwrap_or_default(),
         admin: args.admin.as_deref().map(Admin::read).transpose()?,
     })
 }
 
-/// `FILE.about.json`.
-fn about_path(file: &Path) -> PathBuf {
+/// `FILE.about.json` and `FILE.lis`.
+fn beside(file: &Path, ending: &str) -> PathBuf {
     let mut name: OsString = file.as_os_str().to_owned();
-    name.push(".about.json");
+    name.push(ending);
     name.into()
 }
 
@@ -232,6 +253,9 @@ fn in_words(args: &Args, format: &str, exported: &Exported, about: &Path) -> Str
         exported.unit,
         exported.exported.join(", ")
     );
+    if exported.list.is_some() {
+        text += &format!("  list        {}\n", beside(&args.out, ".lis").display());
+    }
     for (name, why) in &exported.not_exported {
         text += &format!("  left out    {name}: {why}\n");
     }

@@ -2,6 +2,8 @@
 //!
 //! A block an axis: a header of the argument and the component errors, white space between; `#` opens
 //! the next block, `//` a comment. Values in mm and rad over mm. Errors of location have a block of one row.
+//! The list names the file, the logical numbers of the axes and the chain: a key and its value a line, `#` a
+//! comment.
 
 use super::volumetric::{tables, unit_of};
 use super::{Content, Exported, Format, Kind, Request, Rounder};
@@ -47,9 +49,9 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
             .unzip();
         parts.push(format!("{}\n{}\n", names.join(" "), values.join(" ")));
     }
-    let chain = "chain and workpiece_axes as the machine is built (workpiece_axes from the workpiece to the frame)";
     Ok(Exported {
         text: parts.join("#\n"),
+        list: Some(list(&request.file_name, tables.errors.chain.as_deref())?),
         unit: "mm, rad".to_owned(),
         sign: SIGN.to_owned(),
         moves: tables.errors.moves.clone(),
@@ -57,13 +59,42 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
         not_exported: tables.errors.missing.clone(),
         rounding: (rounder.largest, "mm or rad".to_owned()),
         load: vec![
-            "in the list file: file[0] = the file, file_format[0] ISG_CSV".to_owned(),
-            chain.to_owned(),
+            "in the list file: file[0] with the folder of the controller in which the file stands"
+                .to_owned(),
+            "X, Y and Z with the logical numbers of the axes, where they are not 1, 2 and 3"
+                .to_owned(),
+            match tables.errors.chain {
+                Some(_) => CHAIN_KNOWN,
+                None => CHAIN_UNKNOWN,
+            }
+            .to_owned(),
             "negate with the names of errors whose sign is the other one".to_owned(),
         ],
         verify: VERIFY.to_owned(),
         ..Exported::default()
     })
+}
+
+const CHAIN_KNOWN: &str =
+    "chain and workpiece_axes are those of the result, from the workpiece to the tool";
+const CHAIN_UNKNOWN: &str = "add chain and workpiece_axes as the machine is built (the axes from the workpiece to the tool, and how many of them carry \
+     the workpiece): the result does not tell them";
+
+/// The list in which the controller finds the file.
+fn list(file: &str, chain: Option<&str>) -> Result<String, Message> {
+    if file.contains(char::is_whitespace) {
+        return Err(Message::bad_input(
+            "a name with white space cannot stand in the list of the controller",
+        )
+        .remedy("give --out without white space"));
+    }
+    let mut text = "# Volumetric compensation\nX 1\nY 2\nZ 3\n".to_owned();
+    if let Some(chain) = chain {
+        let (work, _) = chain.split_once('F').unwrap_or(("", chain));
+        let axes = chain.replace('F', "");
+        text += &format!("chain {axes}\nworkpiece_axes {}\n", work.len());
+    }
+    Ok(text + &format!("file[0] {file}\nfile_format[0] ISG_CSV\n"))
 }
 
 pub(super) const SIGN: &str = "Errors as ISO 230-1 names them, unchanged: of the moving component, actual less nominal. The controller's \

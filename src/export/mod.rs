@@ -144,6 +144,8 @@ pub struct Request {
     pub grid: Option<Grid>,
     /// Travels of axes whose errors have no positions of their own: axis letter, from, to, mm.
     pub travel: Vec<(char, f64, f64)>,
+    /// Name of the file, without its folder.
+    pub file_name: String,
     /// What a certificate says beside the numbers.
     pub admin: Option<Admin>,
 }
@@ -179,6 +181,8 @@ impl Request {
 pub struct Exported {
     /// The file.
     pub text: String,
+    /// The list with which a controller finds the file, where it takes one; it is written beside.
+    pub list: Option<String>,
     /// The axis, as the file names it.
     pub axis: Option<String>,
     /// Unit of the values in the file.

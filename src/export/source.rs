@@ -67,6 +67,8 @@ pub struct MachineErrors {
     pub missing: Vec<(String, String)>,
     /// Which side each axis carries, where that is known.
     pub moves: Option<String>,
+    /// The axes in the order from the workpiece to the tool with F for the frame, where that is known.
+    pub chain: Option<String>,
 }
 
 /// Reads a result (JSON), or a machine (TOML).
@@ -247,6 +249,7 @@ fn step_diagonal(result: &Value) -> Option<MachineErrors> {
 fn machine_result(result: &Value) -> Option<MachineErrors> {
     let mut found = MachineErrors {
         moves: result["chain"].as_str().and_then(moves_of),
+        chain: result["chain"].as_str().and_then(chain_of),
         ..MachineErrors::default()
     };
     for error in result["errors"].as_array()? {
@@ -276,6 +279,7 @@ fn machine_result(result: &Value) -> Option<MachineErrors> {
 fn machine(machine: &errsep_models::machine::Machine) -> MachineErrors {
     let mut found = MachineErrors {
         moves: moves_of(&machine.chain().to_string()),
+        chain: Some(machine.chain().to_string()),
         ..MachineErrors::default()
     };
     for error in machine.errors() {
@@ -308,6 +312,12 @@ impl MachineErrors {
             }
         }
     }
+}
+
+/// A chain as it is written, where it is one.
+fn chain_of(text: &str) -> Option<String> {
+    let chain = errsep_models::machine::Chain::parse(text).ok()?;
+    Some(chain.to_string())
 }
 
 /// "X table-carrying, Y table-carrying, Z tool-carrying" of a chain.

@@ -180,6 +180,61 @@ fn what_cannot_be_told_is_asked_for() {
     }
 }
 
+/// A size that the effect's own parameter in the catalogue cannot have is refused with value, unit and bounds.
+#[test]
+fn a_size_that_cannot_be_is_not_simulated() {
+    let folder = Folder::with(&[(
+        "m.toml",
+        "chain = \"XYFZ\"\n[errors.EXX]\npolynomial = [0.1]\n",
+    )]);
+    let design = ["--design", "0/0,180/0,0/180,180/180"];
+    let machine = ["m.toml", "--from", "0", "--to", "100"];
+    for (kind, more, effect, told) in [
+        (
+            "reversal",
+            &[][..],
+            "taper=5",
+            ["half-angle", "5 rad", "-0.1 to 0.1 rad"],
+        ),
+        (
+            "reversal",
+            &design,
+            "taper=-0.2",
+            ["half-angle", "-0.2 rad", "-0.1 to 0.1 rad"],
+        ),
+        (
+            "reversal",
+            &[],
+            "hysteresis=-1",
+            ["width", "-1 um", "0 to 50 um"],
+        ),
+        (
+            "reversal",
+            &design,
+            "common-gain=2",
+            ["gain", "cannot be 2", "-0.5 to 0.5"],
+        ),
+        (
+            "machine",
+            &machine,
+            "thermal-expansion=1",
+            ["scale", "cannot be 1", "-0.001 to 0.001"],
+        ),
+    ] {
+        let arguments = [&["simulate", kind][..], more, &["--effect", effect]].concat();
+        bad_input(&folder, &arguments, &told);
+    }
+    for (more, effect) in [
+        (&[][..], "taper=0.1"),
+        (&design, "hysteresis=50"),
+        (&design, "taper=1e-5"),
+    ] {
+        let arguments = [&["simulate", "reversal"][..], more, &["--effect", effect]].concat();
+        let out = run(&folder, &arguments);
+        assert_eq!(out.status, 0, "{effect}: {}", out.stderr);
+    }
+}
+
 #[test]
 fn one_effect_may_be_withheld_by_name_only() {
     let folder = Folder::with(&[]);

@@ -24,6 +24,7 @@ mod simulate;
 
 pub use chain::{Chain, Sense, Side, Slide};
 pub use component::{Axis, COMPONENTS, Component, Kind};
+pub use effects::amplitude;
 pub use function::{ErrorFunction, PolynomialBasis};
 pub use kinematics::{exact_deviation, sensitivity};
 pub use measured_parts::MeasuredParts;

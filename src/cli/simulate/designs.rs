@@ -5,11 +5,13 @@ use errsep_models::reversal::designs::simulate::{
     DESIGN_EFFECTS, DesignEffect, DesignEffectKind, DesignPlan, frame, simulate,
 };
 use errsep_models::reversal::designs::{Design, SLOPES, angle_name};
+use errsep_models::reversal::effects::amplitude_of_design;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Map, Value, json};
 
 use super::reversal::Args;
+use super::sizes;
 use crate::cli::Answer;
 use crate::io::message::nearest;
 use crate::io::{CsvTable, Message};
@@ -201,6 +203,12 @@ fn effects(args: &Args, plan: &DesignPlan) -> Result<Vec<(String, DesignEffect)>
             ));
         }
         let drawn = DesignEffect::named(name, size, &plan.design, &frame, &mut random);
+        if let Some(effect) = &drawn {
+            // What the simulation has in another unit than the catalogue is another quantity.
+            let parameter =
+                amplitude_of_design(&plan.design, name).filter(|p| p.unit == effect.unit());
+            sizes::possible(name, size, parameter.as_ref())?;
+        }
         drawn.map(|effect| (name.to_owned(), effect)).ok_or_else(|| {
             refused(
                 format!("{name} belongs to the second position of the spindle, and this design has one"),

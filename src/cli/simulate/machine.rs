@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use errsep_models::machine::{
-    Characterization, MachineError, PartDisturbance, simulate_characterization,
+    Characterization, MachineError, PartDisturbance, amplitude, simulate_characterization,
     simulate_parts_disturbed,
 };
 use serde_json::json;
@@ -120,9 +120,10 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
             "value",
             readings.iter().map(|(_, o)| o.value).collect::<Vec<_>>(),
         );
-    let disturbances = super::effects(
+    let disturbances = super::effects_within(
         &args.effects,
         &PartDisturbance::NAMES,
+        amplitude,
         PartDisturbance::named,
     )?;
     if points.is_empty() && !disturbances.is_empty() {

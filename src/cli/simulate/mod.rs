@@ -9,6 +9,7 @@ pub mod fourier;
 pub mod machine;
 pub mod positioning;
 pub mod reversal;
+mod sizes;
 pub mod step_diagonal;
 pub mod turning_bar;
 
@@ -16,6 +17,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use clap::Subcommand;
+use errsep_models::model::Parameter;
 use serde_json::{Value, json};
 
 use super::answer::SETUP;
@@ -168,6 +170,16 @@ pub(super) fn few_enough(counts: &[usize], options: &str) -> Result<(), Message>
 pub(super) fn effects<E>(
     texts: &[String],
     known: &[&str],
+    make: impl FnMut(&str, f64) -> Option<E>,
+) -> Result<Vec<E>, Message> {
+    effects_within(texts, known, |_| None, make)
+}
+
+/// The same, each of a size that its parameter in the catalogue, `parameter` by its name, can have.
+pub(super) fn effects_within<E>(
+    texts: &[String],
+    known: &[&str],
+    parameter: impl Fn(&str) -> Option<Parameter>,
     mut make: impl FnMut(&str, f64) -> Option<E>,
 ) -> Result<Vec<E>, Message> {
     let example = known.first().copied().unwrap_or("NAME");
@@ -188,6 +200,7 @@ pub(super) fn effects<E>(
                 .ok()
                 .filter(|v: &f64| v.is_finite())
                 .ok_or_else(|| bad(format!("`{value}` is not a number")))?;
+            sizes::possible(name, size, parameter(name).as_ref())?;
             make(name, size).ok_or_else(|| {
                 Message::bad_input(format!("there is no effect `{name}`")).remedy(
                     match nearest(name, known.iter().copied()) {

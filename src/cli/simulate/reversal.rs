@@ -2,6 +2,7 @@
 
 use errsep_models::basis::bspline::CubicBSpline;
 use errsep_models::reversal::Direction;
+use errsep_models::reversal::effects::amplitude;
 use errsep_models::reversal::exact_readings::Injection;
 use errsep_models::reversal::injected::{Injected, Undisturbed};
 use errsep_models::reversal::simulate::{
@@ -11,6 +12,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
+use super::sizes;
 use crate::cli::{Answer, CommonArgs};
 use crate::io::{CsvTable, Message};
 
@@ -314,6 +316,8 @@ fn effects(args: &Args, undisturbed: &Undisturbed) -> Result<Vec<(String, Inject
                 .ok()
                 .filter(|v: &f64| v.is_finite())
                 .ok_or_else(|| bad(format!("`{value}` is not a number")))?;
+            let parameter = amplitude(name.trim());
+            sizes::possible(name.trim(), size, parameter.as_ref())?;
             let effect = Injection::named(name.trim(), size, &undisturbed.frame, &mut random)
                 .ok_or_else(|| bad(format!("there is no effect `{name}`")))?;
             Ok((name.trim().to_owned(), effect))

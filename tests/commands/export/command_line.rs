@@ -1,5 +1,7 @@
 //! The command: which results it takes, what it writes beside, what it replaces.
 
+use std::collections::BTreeMap;
+
 use crate::command::{Folder, bad_input, run};
 use serde_json::Value;
 
@@ -146,6 +148,63 @@ fn results_become_files() {
     assert_eq!(
         json["provenance"]["inputs"][0]["sha256"],
         json["result"]["sha256"]
+    );
+}
+
+/// The list as the controller reads it: a key and its value a line, `#` a comment, no key twice.
+fn controllers_list(text: &str) -> BTreeMap<String, String> {
+    let mut list = BTreeMap::new();
+    for line in text.lines().map(|l| l.split('#').next().unwrap().trim()) {
+        if let Some((key, value)) = line.split_once(char::is_whitespace) {
+            let before = list.insert(key.to_owned(), value.trim().to_owned());
+            assert!(before.is_none(), "{key} twice");
+        } else {
+            assert!(line.is_empty(), "{line} has no value");
+        }
+    }
+    list
+}
+
+/// The list names the file, its format, the axes and, of a machine whose chain is known, the chain from the
+/// workpiece to the tool with the number of axes that carry the workpiece.
+#[test]
+fn the_list_of_isg_finds_its_file() {
+    let folder = with_results();
+    for (source, file, chain) in [
+        ("machine.toml", "x.csv", Some(("XYZ", "2"))),
+        ("machine.json", "y.csv", Some(("XYZ", "2"))),
+        ("steps.json", "z.csv", None),
+    ] {
+        let told = done(
+            &folder,
+            &format!("export isg-volumetric {source} --out {file}"),
+        );
+        let list = controllers_list(&folder.read(&format!("{file}.lis")));
+        let of = |key: &str| list.get(key).map(String::as_str);
+        assert_eq!(of("file[0]"), Some(file));
+        assert!(folder.path().join(of("file[0]").unwrap()).is_file());
+        assert_eq!(of("file_format[0]"), Some("ISG_CSV"));
+        assert_eq!(["X", "Y", "Z"].map(of), [Some("1"), Some("2"), Some("3")]);
+        assert_eq!(of("chain").zip(of("workpiece_axes")), chain, "{source}");
+        assert_eq!(list.len(), if chain.is_some() { 7 } else { 5 }, "{list:?}");
+        assert!(told.contains(&format!("{file}.lis")), "{told}");
+        let about: Value =
+            serde_json::from_str(&folder.read(&format!("{file}.about.json"))).unwrap();
+        assert_eq!(about["list"], format!("{file}.lis"));
+    }
+    // What is there already stays, and nothing else is written.
+    folder.write("w.csv.lis", "mine");
+    let arguments = "export isg-volumetric machine.toml --out w.csv";
+    let words: Vec<&str> = arguments.split(' ').collect();
+    bad_input(&folder, &words, &["w.csv.lis", "exists already"]);
+    assert_eq!(folder.read("w.csv.lis"), "mine");
+    assert!(
+        !folder.path().join("w.csv").exists() && !folder.path().join("w.csv.about.json").exists()
+    );
+    bad_input(
+        &folder,
+        &["export", "isg-volumetric", "machine.toml", "--out", "a b"],
+        &["white space"],
     );
 }
 

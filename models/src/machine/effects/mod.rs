@@ -13,7 +13,7 @@ mod thermal_expansion;
 use nalgebra::DMatrix;
 
 use super::MeasuredParts;
-use crate::model::{Effect, Estimate};
+use crate::model::{Effect, Estimate, Parameter};
 
 /// The catalogue.
 pub(super) fn all() -> Vec<Box<dyn Effect<MeasuredParts>>> {
@@ -28,6 +28,13 @@ pub(super) fn all() -> Vec<Box<dyn Effect<MeasuredParts>>> {
         Box::new(squareness_change::SquarenessChange),
         Box::new(thermal_expansion::ThermalExpansion),
     ]
+}
+
+/// What the size of an effect on parts is: its first amplitude. `None` where the catalogue has no such effect.
+pub fn amplitude(effect: &str) -> Option<Parameter> {
+    let catalogue = all();
+    let own = catalogue.iter().find(|known| known.name() == effect)?;
+    own.amplitudes().into_iter().next()
 }
 
 /// Root mean square of every `step`-th amplitude from `first` on, with its standard uncertainty.

@@ -55,7 +55,7 @@ const FORMS_OF_FOUR: [&str; 3] = ["M", "S_A", "S_B"];
 
 impl Arrangement {
     /// The channels of a design; `four`: how the slopes of 1A, 1B, 2A, 2B are read, where all are such.
-    pub(super) fn new(design: Design, zero: Zero, four: Option<Convention>) -> Self {
+    pub(in crate::reversal) fn new(design: Design, zero: Zero, four: Option<Convention>) -> Self {
         let (indicators, positions) = (design.indicators(), design.positions());
         let determined = Determined::of(&design, zero);
         let seats: Vec<Seat> = (design.channels().iter().enumerate())

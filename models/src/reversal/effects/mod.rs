@@ -28,9 +28,11 @@ mod zero_jump;
 
 use nalgebra::DMatrix;
 
+use super::Channel;
+use super::designs::{Design, DesignChannel, Zero};
 use super::diagnosable::{Arrangement, Linearised};
 use super::simultaneous;
-use crate::model::{Effect, Shape};
+use crate::model::{Effect, Parameter, Shape};
 use indicators::Indicators;
 
 /// The catalogue for readings of these channels.
@@ -61,6 +63,21 @@ pub fn all(channels: &Arrangement) -> Vec<Box<dyn Effect<Linearised>>> {
         effects.push(Box::new(oval_cone::OvalCone::new(channels)));
     }
     effects
+}
+
+/// What the size of an effect on readings of the four channels is: its first amplitude. `None` where the
+/// catalogue has no such effect.
+pub fn amplitude(effect: &str) -> Option<Parameter> {
+    let channels = Channel::ALL.map(DesignChannel::from).to_vec();
+    amplitude_of_design(&Design::new(channels).ok()?, effect)
+}
+
+/// The same for readings of a design.
+pub fn amplitude_of_design(design: &Design, effect: &str) -> Option<Parameter> {
+    let channels = Arrangement::new(design.clone(), Zero::Reset, None);
+    let catalogue = all(&channels);
+    let own = catalogue.iter().find(|known| known.name() == effect)?;
+    own.amplitudes().into_iter().next()
 }
 
 /// Whether `simultaneous::effects` has an effect too, in the variant that a diagnosis tells in words: a

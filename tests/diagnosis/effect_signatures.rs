@@ -209,9 +209,6 @@ fn fourier() {
         ("probe-spacing", 1e-3, 2, 5e-3),
         // Truncation: tan of 10⁻⁵ rad.
         ("yaw", 1e-5, 0, 1e-6),
-        // The readings hold the effect themselves: 10⁻⁴ and 10⁻³ of it.
-        ("probe-gain", 1e-4, 1, 1e-3),
-        ("probe-nonlinearity", 1e-3, 1, 1e-2),
         // The time of the simulation is 200 of 201 steps a scan.
         ("drift", 1.0, 0, 0.02),
         ("thermal-bending", 1.0, 0, 0.02),

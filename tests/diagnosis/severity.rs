@@ -50,12 +50,12 @@ fn a_drift_far_above_the_noise_is_strong() {
 /// first sentence says so, and whole diagnoses of the rivals say it as often as the score stage.
 #[test]
 fn a_drift_that_any_smooth_function_of_time_imitates_is_weak() {
-    let put = drifting(1.3);
+    let put = drifting(2.0);
     // Near the limit not every measurement is given a name: the first that is.
-    let made = (2..12).map(|seed| calibration_line_made(&put, seed, 1.0));
+    let made = (2..32).map(|seed| calibration_line_made(&put, seed, 1.0));
     let named = made.map(|line| (diagnose(&line, &options(0)), line));
     let mut alone = named.filter(|(d, _)| d.verdict.causes() == [["drift"]]);
-    let (_, line) = alone.next().expect("one of ten drifts is named alone");
+    let (_, line) = alone.next().expect("one of thirty drifts is named alone");
     let diagnosis = diagnose(&line, &options(256));
     let severity = only(&diagnosis);
     assert_eq!(severity.effect, "drift");

@@ -80,8 +80,6 @@ pub const MAKERS: [Maker; 6] = [
         effects: &[
             "drift",
             "height-difference",
-            "probe-gain",
-            "probe-nonlinearity",
             "probe-spacing",
             "thermal-bending",
             "travel-scale",

@@ -5,7 +5,6 @@
 //! step at the joint for the slope of the workpiece, common to all scans.
 
 use std::f64::consts::TAU;
-use std::ops::Range;
 use std::sync::Arc;
 
 use errsep_solvers::linear::limited;
@@ -27,9 +26,6 @@ pub struct FourierScans {
     solver: Arc<DMatrix<f64>>,
     coefficients: DVector<f64>,
     noise: Option<f64>,
-    /// What the first probe and the one it is compared with read in the other repeats, µm; nothing where
-    /// some scan has no other repeat.
-    seen: Arc<Vec<[f64; 2]>>,
 }
 
 impl FourierScans {
@@ -44,7 +40,6 @@ impl FourierScans {
         }
         let spacings = spacings(scans);
         let (mut places, mut traces, mut values) = (Vec::new(), Vec::new(), Vec::new());
-        let mut seen = Vec::new();
         for (channel, spacing) in spacings.iter().enumerate() {
             let first_cell = channel << 32;
             for scan in scans.iter().filter(|s| s.spacing == *spacing) {
@@ -52,8 +47,6 @@ impl FourierScans {
                 let start = places.len();
                 for (k, value) in joined.difference.iter().enumerate() {
                     values.push(*value);
-                    let first = scan.readings[k].m1;
-                    seen.push([first, first - value]);
                     places.push(Place {
                         channel,
                         x: section.length * k as f64 / joined.difference.len() as f64,
@@ -66,10 +59,6 @@ impl FourierScans {
                 traces.push(start..places.len());
             }
         }
-        let traces_of_all: Vec<(usize, Range<usize>)> = traces
-            .iter()
-            .map(|t: &Range<usize>| (places[t.start].channel, t.clone()))
-            .collect();
         let mut model = Self {
             section,
             spacings,
@@ -79,7 +68,6 @@ impl FourierScans {
             coefficients: DVector::zeros(0),
             // A difference of two readings.
             noise: noise.map(|sigma| sigma * 2f64.sqrt()),
-            seen: Arc::new(in_other_repeats(seen, &traces_of_all)),
         };
         let columns = model.design();
         let gram = columns.tr_mul(&columns);
@@ -162,58 +150,6 @@ impl FourierScans {
         place.time / (self.record.places.len().max(2) - 1) as f64
     }
 
-    /// The probes with readings, from 1.
-    pub(super) fn probes(&self) -> impl Iterator<Item = usize> + use<> {
-        let third = self.record.places.iter().any(|p| self.beyond(p));
-        let count = if third { 3 } else { 2 };
-        1..if self.seen.is_empty() { 1 } else { count + 1 }
-    }
-
-    /// What a change of a probe's reading changes in a difference, zero where it has no part in it.
-    pub(super) fn seen_by(&self, probe: usize, row: usize, of: impl Fn(f64) -> f64) -> f64 {
-        let other = if self.beyond(&self.record.places[row]) {
-            3
-        } else {
-            2
-        };
-        let Some([first, second]) = self.seen.get(row).copied() else {
-            return 0.0;
-        };
-        match probe {
-            1 => of(first),
-            _ if probe == other => -of(second),
-            _ => 0.0,
-        }
-    }
-
-    /// The readings of a probe.
-    fn readings_of(&self, probe: usize) -> impl Iterator<Item = f64> + '_ {
-        let rows = self.seen.iter().zip(self.record.places.iter());
-        rows.filter_map(move |([first, second], place)| {
-            let other = if self.beyond(place) { 3 } else { 2 };
-            match probe {
-                1 => Some(*first),
-                _ if probe == other => Some(*second),
-                _ => None,
-            }
-        })
-    }
-
-    /// Mean reading of a probe, µm.
-    pub(super) fn mean_reading(&self, probe: usize) -> f64 {
-        let count = self.readings_of(probe).count().max(1) as f64;
-        self.readings_of(probe).sum::<f64>() / count
-    }
-
-    /// Greatest reading of a probe off its mean, µm.
-    pub(super) fn reach_of(&self, probe: usize) -> f64 {
-        let mean = self.mean_reading(probe);
-        let off = self
-            .readings_of(probe)
-            .map(|reading| (reading - mean).abs());
-        off.fold(f64::MIN_POSITIVE, f64::max)
-    }
-
     /// Slope of the fitted workpiece under the first probe, µm/mm.
     pub(super) fn slope_here(&self, place: &Place) -> f64 {
         self.slope_at(place.x)
@@ -238,29 +174,6 @@ impl FourierScans {
             })
             .sum()
     }
-}
-
-/// For each reading of the probes the mean of the other repeats with the same spacing there: what a probe
-/// reads is as noisy as what is judged, and a signature that holds the same noise would find itself in it.
-fn in_other_repeats(seen: Vec<[f64; 2]>, scans: &[(usize, Range<usize>)]) -> Vec<[f64; 2]> {
-    let mut others = Vec::with_capacity(seen.len());
-    for (k, (channel, scan)) in scans.iter().enumerate() {
-        let alike = || {
-            let same = scans.iter().enumerate();
-            same.filter(move |(j, (c, s))| *j != k && c == channel && s.len() == scan.len())
-        };
-        let count = alike().count() as f64;
-        if count == 0.0 {
-            return Vec::new();
-        }
-        for at in 0..scan.len() {
-            let sum = |probe: usize| -> f64 {
-                alike().map(|(_, (_, s))| seen[s.start + at][probe]).sum()
-            };
-            others.push([sum(0) / count, sum(1) / count]);
-        }
-    }
-    others
 }
 
 impl FittedModel for FourierScans {

@@ -84,10 +84,6 @@ pub enum Disturbance {
     },
     /// The slide turns by a sine over the section, rad.
     Yaw(f64),
-    /// P2 reads too much by this share.
-    ProbeGain(f64),
-    /// P2 reads too much by the square of its reading, by so much at its greatest, µm.
-    ProbeNonlinearity(f64),
     /// P1 settles by so much over all scans, µm, with a time constant of 0.15 of them; the zero of each
     /// scan stays in it.
     Drift(f64),
@@ -101,11 +97,9 @@ pub enum Disturbance {
 
 impl Disturbance {
     /// The names that [`Self::named`] knows.
-    pub const NAMES: [&'static str; 9] = [
+    pub const NAMES: [&'static str; 7] = [
         "drift",
         "height-difference",
-        "probe-gain",
-        "probe-nonlinearity",
         "probe-spacing",
         "thermal-bending",
         "travel-scale",
@@ -127,8 +121,6 @@ impl Disturbance {
                 error: size,
             },
             "yaw" => Self::Yaw(size),
-            "probe-gain" => Self::ProbeGain(size),
-            "probe-nonlinearity" => Self::ProbeNonlinearity(size),
             "drift" => Self::Drift(size),
             "zero-jump" => Self::ZeroJump(size),
             "travel-scale" => Self::TravelScale(size),
@@ -144,8 +136,6 @@ struct Here {
     height: f64,
     error: f64,
     yaw: f64,
-    gain: f64,
-    bent: f64,
     drift: f64,
     jump: f64,
     scale: f64,
@@ -166,8 +156,6 @@ impl Here {
                 }
                 Disturbance::HeightDifference { .. } | Disturbance::ProbeSpacing { .. } => {}
                 Disturbance::Yaw(angle) => here.yaw += angle,
-                Disturbance::ProbeGain(share) => here.gain += share,
-                Disturbance::ProbeNonlinearity(size) => here.bent += size,
                 Disturbance::Drift(size) => here.drift += size,
                 Disturbance::ZeroJump(size) if is_last => here.jump += size,
                 Disturbance::ZeroJump(_) => {}
@@ -280,11 +268,6 @@ pub fn simulate_disturbed(
                 |x: f64, arm: f64| 1e3 * arm * (here.yaw * (TAU * x / length + 0.7).sin()).tan();
             // One step before the joint, so that it can be interpolated where it is off the grid.
             let third_from = joint - 1.5 * length / what.samples as f64;
-            let second =
-                |i: usize| what.height_difference + workpiece(grid(i) + spacing) + slide(grid(i));
-            let reach = (0..=what.samples)
-                .map(|i| second(i).abs())
-                .fold(1e-9, f64::max);
             let readings = (0..=what.samples)
                 .map(|i| {
                     let x = grid(i);
@@ -301,8 +284,8 @@ pub fn simulate_disturbed(
                     let m2 = what.height_difference
                         + probed(stands + spacing + here.error)
                         + slide(x)
-                        + lift(x, spacing + here.error);
-                    let m2 = m2 * (1.0 + here.gain) + here.bent * (m2 / reach).powi(2) + noise();
+                        + lift(x, spacing + here.error)
+                        + noise();
                     ScanReading {
                         x,
                         m1,

@@ -2,8 +2,6 @@
 
 mod drift;
 mod height_difference;
-mod probe_gain;
-mod probe_nonlinearity;
 mod probe_spacing;
 mod thermal_bending;
 mod travel_scale;
@@ -18,8 +16,6 @@ pub(super) fn all() -> Vec<Box<dyn Effect<FourierScans>>> {
     vec![
         Box::new(drift::Drift),
         Box::new(height_difference::HeightDifference),
-        Box::new(probe_gain::ProbeGain),
-        Box::new(probe_nonlinearity::ProbeNonlinearity),
         Box::new(probe_spacing::ProbeSpacing),
         Box::new(thermal_bending::ThermalBending),
         Box::new(travel_scale::TravelScale),

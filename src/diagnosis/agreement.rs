@@ -8,6 +8,7 @@ use crate::diagnosis::attribution::examined::examined;
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::fitted::without_misfit;
 use crate::diagnosis::diagnose::diagnose;
+use crate::diagnosis::noise::spikes::calmed;
 use crate::diagnosis::options::Options;
 use crate::diagnosis::severity::rivals::{Drawn, Family};
 use crate::diagnosis::severity::stage::Name;
@@ -30,9 +31,13 @@ pub struct Agreement {
 /// Names what is in a model's readings, draws rivals of every name, `each` of each family, and names
 /// every one by the score stage and by a diagnosis of its own. One row for each name and family.
 pub fn agreement<M: FittedModel>(model: &M, options: &Options, each: usize) -> Vec<Agreement> {
-    let catalogue = model.effects();
+    let is_known = |name: &str| !options.without.iter().any(|out| out == name);
+    let mut catalogue = model.effects();
+    catalogue.retain(|effect| is_known(effect.name()));
+    let (calmed, calm) = calmed(model);
+    let model = calmed.as_ref().unwrap_or(model);
     let readings = model.linearised();
-    let law = estimate(model, &readings);
+    let law = estimate(model, &readings).with_tails(calm.tails);
     let context = Context::new(model, &catalogue, law, options.draws, options.seed);
     examined(&context, &readings, options.false_alarm, |found| {
         let Some(answer) = found.found.filter(|answer| answer.complete) else {

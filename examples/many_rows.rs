@@ -5,7 +5,8 @@ use std::error::Error;
 use std::io::{BufWriter, Write};
 use std::time::Instant;
 
-use errsep::io::reversal::{ColumnMap, read};
+use errsep::io::ColumnMap;
+use errsep::io::reversal::read;
 use errsep_models::reversal::staged::{Options, solve};
 
 fn main() -> Result<(), Box<dyn Error>> {

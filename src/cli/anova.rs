@@ -9,7 +9,7 @@ use errsep_models::anova::{AnovaError, Group, Groups, OneWay, analyse};
 use serde_json::{Value, json};
 
 use super::quantity::{expanded_words, with_expanded};
-use super::{Answer, CommonArgs};
+use super::{Answer, ColumnArgs, CommonArgs};
 use crate::io::replicates::{Replicates, read_replicates};
 use crate::io::units::{per_cent, symbol};
 use crate::io::{CsvTable, Message, Status};
@@ -39,6 +39,8 @@ pub struct Args {
     /// Adds the figures as NISTIR 6868 forms them.
     #[arg(long, value_enum)]
     recipe: Option<RecipeName>,
+    #[command(flatten)]
+    columns: ColumnArgs,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
@@ -82,7 +84,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         ))
         .remedy("give a number between 0 and 1, such as 0.95"));
     }
-    let analysed = read_replicates(&args.replicates)?
+    let analysed = read_replicates(&args.replicates, &args.columns.map())?
         .into_iter()
         .map(|feature| analyse_feature(feature, args))
         .collect::<Result<Vec<_>, _>>()?;

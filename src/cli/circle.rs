@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::diagnose::joined::{self, Given};
 use super::quantity::{measured_words, quantity_json, unexpandable};
-use super::{Answer, CommonArgs};
+use super::{Answer, ColumnArgs, CommonArgs};
 use crate::io::circle::read_points;
 use crate::io::{CsvTable, Message, Status};
 use crate::report::circle::{CircleView, page, zones};
@@ -42,6 +42,8 @@ pub struct Args {
     #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
     with: Vec<String>,
     #[command(flatten)]
+    columns: ColumnArgs,
+    #[command(flatten)]
     pub(super) common: CommonArgs,
 }
 
@@ -56,7 +58,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
                 .remedy("give a number greater than zero, in µm"),
         );
     }
-    let points = read_points(&args.points)?;
+    let points = read_points(&args.points, &args.columns.map())?;
     let refused = |e: CircleError| refused(&e, args);
     let fit = orthogonal_fit(&points, args.noise).map_err(refused)?;
     let zones_found = circularity(&points, fit.circle).map_err(refused)?;
@@ -119,6 +121,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         answer,
         &Given {
             noise: args.noise,
+            columns: args.columns.clone(),
             ..Given::to("circle", &args.points, &args.with, &args.common)
         },
     )

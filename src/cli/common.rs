@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::io::CsvTable;
+use crate::io::{ColumnMap, CsvTable};
 use crate::report::Page;
 
 /// How the answer is printed.
@@ -38,6 +38,29 @@ pub struct CommonArgs {
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+}
+
+/// How the columns of the readings are named, where not as the command has them.
+#[derive(Debug, Clone, Default, Args)]
+pub struct ColumnArgs {
+    /// Names and units of the columns, as role=column:unit,...; units are nm, um, mm, m, inch, uinch, ms,
+    /// s, min, h. Columns that are not named are not read.
+    #[arg(long, value_name = "ROLE=COLUMN:UNIT,...")]
+    columns: Option<ColumnMap>,
+}
+
+impl ColumnArgs {
+    /// The names and units; none where the columns are named as the command has them.
+    #[must_use]
+    pub fn map(&self) -> ColumnMap {
+        self.columns.clone().unwrap_or_default()
+    }
+
+    /// Whether any are given.
+    #[must_use]
+    pub fn are_given(&self) -> bool {
+        self.columns.is_some()
+    }
 }
 
 /// What a program that calls a command wants of its answer.

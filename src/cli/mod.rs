@@ -30,7 +30,7 @@ use std::io::Write;
 use clap::{Parser, Subcommand};
 
 pub use answer::{Answer, Report, Traced, result_json};
-pub use common::{CommonArgs, Format, progress};
+pub use common::{ColumnArgs, CommonArgs, Format, progress};
 
 use crate::io::source::begin_record;
 use crate::io::{Message, OutFolder, Status, printable};

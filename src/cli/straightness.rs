@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use errsep_models::straightness::{NoStraightness, ReferenceLine, Straightness, straightness};
 use serde_json::json;
 
-use super::{Answer, CommonArgs};
-use crate::io::{CsvTable, Message, Status, TableReader};
+use super::{Answer, ColumnArgs, CommonArgs};
+use crate::io::{ColumnMap, CsvTable, Message, Status, TableReader};
 use crate::report;
 
 /// Straightness of a profile: least-squares, end-point and minimum-zone reference lines.
@@ -28,8 +28,10 @@ pub struct Args {
     #[arg(value_name = "PROFILE.csv")]
     profile: PathBuf,
     /// The column with the deviations, where other columns stand beside it: a form of `profiles.csv`.
-    #[arg(long, value_name = "COLUMN")]
+    #[arg(long, value_name = "COLUMN", conflicts_with = "columns")]
     of: Option<String>,
+    #[command(flatten)]
+    columns: ColumnArgs,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
@@ -39,7 +41,7 @@ pub struct Args {
 /// # Errors
 /// The file is no table of positions and deviations.
 pub fn run(args: &Args) -> Result<Answer, Message> {
-    let (x, y) = read(&args.profile, args.of.as_deref())?;
+    let (x, y) = read(&args.profile, &args.columns.map(), args.of.as_deref())?;
     let results = ReferenceLine::ALL
         .into_iter()
         .map(|reference| straightness(&x, &y, reference))
@@ -100,8 +102,8 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     })
 }
 
-fn read(path: &Path, of: Option<&str>) -> Result<(Vec<f64>, Vec<f64>), Message> {
-    let mut table = TableReader::open(path)?;
+fn read(path: &Path, map: &ColumnMap, of: Option<&str>) -> Result<(Vec<f64>, Vec<f64>), Message> {
+    let mut table = TableReader::open_as(path, map)?;
     if of.is_none() {
         table.only(&["x", "deviation"]).map_err(|message| {
             message.remedy("name the column of the deviations with --of, such as --of M")

@@ -7,10 +7,8 @@ use errsep_models::reversal::turning::{NoTraces, Sample, Turning, find_turning, 
 use errsep_models::reversal::{Direction, Observations};
 use serde_json::json;
 
-use super::{Answer, CommonArgs};
-use crate::io::reversal::ColumnMap;
-use crate::io::units::LengthUnit;
-use crate::io::{Column, CsvTable, Message, Status, TableReader};
+use super::{Answer, ColumnArgs, CommonArgs};
+use crate::io::{ColumnMap, CsvTable, Message, Status, TableReader};
 use crate::report::number::{measured, plain};
 use crate::report::plot::{Axis, Chart, Series};
 use crate::report::{Figure, KeyFigure, Page, Section, Standing};
@@ -29,9 +27,8 @@ pub struct Args {
     /// The run.
     #[arg(value_name = "RUN.csv")]
     run: PathBuf,
-    /// Names and units of the columns, as role=column:unit,...
-    #[arg(long, value_name = "ROLE=COLUMN:UNIT,...")]
-    columns: Option<ColumnMap>,
+    #[command(flatten)]
+    columns: ColumnArgs,
     /// Spindle angle of channel 1A, degrees after the highest reading of the once-per-turn wave.
     #[arg(
         long,
@@ -77,8 +74,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         "--rpm is not a speed",
         "give turns a minute",
     )?;
-    let map = args.columns.clone().unwrap_or_default();
-    let samples = read(&args.run, &map)?;
+    let samples = read(&args.run, &args.columns.map())?;
     let refuse = |why: NoTraces| {
         Message::bad_input(why.to_string())
             .in_file(&args.run)
@@ -96,23 +92,16 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
 }
 
 fn read(path: &Path, map: &ColumnMap) -> Result<Vec<Sample>, Message> {
-    let mut table = TableReader::open(path)?;
-    if map.is_empty() {
-        table.only(&["time", "x", "reading"])?;
-    }
-    let needed = |role: &'static str| table.column(map.column(role).unwrap_or(role));
-    let time = needed("time")?.in_s();
-    let (x, reading) = (needed("x")?, needed("reading")?);
-    let own = |role: &str, column: &Column| map.unit(role).or(column.length_unit());
-    let x_mm = own("x", &x).unwrap_or(LengthUnit::Mm).in_mm();
-    let reading_um = own("reading", &reading).unwrap_or(LengthUnit::Um).in_um();
-    let (x, reading) = (x.as_written(), reading.as_written());
+    let mut table = TableReader::open_as(path, map)?;
+    table.only(&["time", "x", "reading"])?;
+    let time = table.column("time")?.in_s();
+    let (x, reading) = (table.column("x")?.in_mm(), table.column("reading")?.in_um());
     let mut samples: Vec<Sample> = Vec::new();
     while let Some(row) = table.next_row()? {
         let sample = Sample {
             time: row.number(&time)?,
-            x: row.number(&x)? * x_mm,
-            value: row.number(&reading)? * reading_um,
+            x: row.number(&x)?,
+            value: row.number(&reading)?,
         };
         if samples.last().is_some_and(|last| sample.time <= last.time) {
             return Err(row.error(&time, "time does not grow").remedy(

@@ -4,15 +4,15 @@ use std::path::Path;
 
 use errsep_models::circle::{LARGEST, Point};
 
-use super::{Message, TableReader};
+use super::{ColumnMap, Message, TableReader};
 
 /// Reads the columns `x` and `y`, mm; a column `repeat` may stand beside them.
 ///
 /// # Errors
 /// The table lacks a column, has an unknown one, holds something that is no number, a number beyond
 /// [`LARGEST`], or no row.
-pub fn read_points(path: &Path) -> Result<Vec<Point>, Message> {
-    let mut table = TableReader::open(path)?;
+pub fn read_points(path: &Path, map: &ColumnMap) -> Result<Vec<Point>, Message> {
+    let mut table = TableReader::open_as(path, map)?;
     table.only(&["x", "y", "repeat"])?;
     let (x, y) = (table.column("x")?.in_mm(), table.column("y")?.in_mm());
     let mut points = Vec::new();

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::message::list;
-use super::{Column, Message, SetupFile, TableReader};
+use super::{Column, ColumnMap, Message, SetupFile, TableReader};
 
 /// The set-up of a step-diagonal test.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -126,9 +126,10 @@ impl DiagonalSetup {
 /// of its run or repeats one.
 pub fn read_readings(
     path: &Path,
+    map: &ColumnMap,
     target: Option<Target>,
 ) -> Result<(WorkZone, Vec<DiagonalReading>), Message> {
-    let mut table = TableReader::open(path)?;
+    let mut table = TableReader::open_as(path, map)?;
     table.only(&[
         "diagonal",
         "sequence",

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::message::Place;
-use super::{Column, Message, SetupFile, TableReader};
+use super::{Column, ColumnMap, Message, SetupFile, TableReader};
 
 /// The set-up of a Fourier separation.
 #[derive(Debug, Clone, Default)]
@@ -217,8 +217,12 @@ pub fn told(error: &FourierError) -> Message {
 ///
 /// # Errors
 /// The table cannot be read, or the spacing is nowhere.
-pub fn read_scans(path: &Path, given: Option<f64>) -> Result<Vec<LocatedScan>, Message> {
-    let mut table = TableReader::open(path)?;
+pub fn read_scans(
+    path: &Path,
+    map: &ColumnMap,
+    given: Option<f64>,
+) -> Result<Vec<LocatedScan>, Message> {
+    let mut table = TableReader::open_as(path, map)?;
     table.only(&["x", "m1", "m2", "m3", "spacing", "repeat"])?;
     let x = table.column("x")?.in_mm();
     let (m1, m2) = (table.column("m1")?.in_um(), table.column("m2")?.in_um());
@@ -240,7 +244,8 @@ pub fn read_scans(path: &Path, given: Option<f64>) -> Result<Vec<LocatedScan>, M
             None => 1,
         };
         let own = match (&spacing, given) {
-            (Some(column), _) => row.number(column)?,
+            // To the picometre: a spacing in inch is the same number in mm in every row and every message.
+            (Some(column), _) => (row.number(column)? * 1e9).round() / 1e9,
             (None, Some(given)) => given,
             (None, None) => continue,
         };

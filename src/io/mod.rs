@@ -1,6 +1,7 @@
 //! The edge of the program: files in, files out, units and messages.
 
 pub mod circle;
+pub mod columns;
 pub mod diagonal;
 pub mod dialect;
 pub mod folder;
@@ -20,6 +21,7 @@ pub mod table;
 pub mod turning;
 pub mod units;
 
+pub use columns::ColumnMap;
 pub use folder::{OutFile, OutFolder};
 pub use message::{Message, Status, Trouble};
 pub use output::CsvTable;

@@ -8,7 +8,7 @@ use toml::Spanned;
 
 use super::message::{Place, list};
 use super::units::{ARCSEC_PER_DEG, LengthUnit};
-use super::{Column, Message, Row, SetupFile, TableReader};
+use super::{Column, ColumnMap, Message, Row, SetupFile, TableReader};
 
 /// Positions beyond this and deviations beyond its thousandfold are a slip of the unit, mm or degrees.
 const FARTHEST: f64 = 1e9;
@@ -232,10 +232,11 @@ const COLUMNS: [&str; 7] = [
 /// name, or a number beyond any axis.
 pub fn read_readings(
     path: &Path,
+    map: &ColumnMap,
     kind: AxisKind,
     unit: LengthUnit,
 ) -> Result<PositioningData, Message> {
-    let mut table = TableReader::open(path)?;
+    let mut table = TableReader::open_as(path, map)?;
     table.only(&COLUMNS)?;
     let columns = Columns::of(&table, kind, unit)?;
     let mut data = PositioningData {

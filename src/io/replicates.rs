@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use super::columns::ColumnMap;
 use super::message::Message;
 use super::table::{Column, TableReader};
 
@@ -28,8 +29,8 @@ pub struct Replicates {
 /// # Errors
 /// A column that is missing or unknown, a field that cannot be read, a reading given twice, a
 /// feature in two units, a table without rows.
-pub fn read_replicates(path: &Path) -> Result<Vec<Replicates>, Message> {
-    let mut table = TableReader::open(path)?;
+pub fn read_replicates(path: &Path, map: &ColumnMap) -> Result<Vec<Replicates>, Message> {
+    let mut table = TableReader::open_as(path, map)?;
     let known: Vec<&str> = KEYS
         .into_iter()
         .chain(["part", "replicate", "value", "unit"])
@@ -37,6 +38,10 @@ pub fn read_replicates(path: &Path) -> Result<Vec<Replicates>, Message> {
     table.only(&known)?;
     let (part, value) = (table.column("part")?, table.column("value")?);
     let (replicate, unit) = (table.optional("replicate"), table.optional("unit"));
+    let value = match unit {
+        Some(_) => value,
+        None => value.in_um(),
+    };
     let keys: Vec<Column> = KEYS.iter().filter_map(|key| table.optional(key)).collect();
 
     let mut features: Vec<Replicates> = Vec::new();

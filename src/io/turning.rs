@@ -8,9 +8,8 @@ use errsep_models::reversal::turning_bar::{
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::reversal::ColumnMap;
 use super::units::LengthUnit;
-use super::{Column, Message, SetupFile, TableReader};
+use super::{Column, ColumnMap, Message, SetupFile, TableReader};
 
 /// Columns of a run.
 const COLUMNS: [&str; 4] = ["time", "x", "reading", "spindle"];
@@ -33,15 +32,12 @@ pub struct TurningFile {
 /// # Errors
 /// A column is missing or unknown, a field is no number, there is neither a time nor an angle.
 pub fn read(path: &Path, map: &ColumnMap) -> Result<TurningFile, Message> {
-    let mut table = TableReader::open(path)?;
-    if map.is_empty() {
-        table.only(&["time", "t", "x", "z", "reading", "spindle"])?;
-    }
-    let named = |role: &'static str| map.column(role).unwrap_or(role);
+    let mut table = TableReader::open_as(path, map)?;
+    table.only(&["time", "t", "x", "z", "reading", "spindle"])?;
     let found = |role: &'static str| {
-        let also = ALSO.iter().find(|(of, _)| *of == role && map.is_empty());
+        let also = ALSO.iter().find(|(of, _)| *of == role);
         table
-            .optional(named(role))
+            .optional(role)
             .or_else(|| also.and_then(|(_, other)| table.optional(other)))
     };
     let time = found("time").map(Column::in_s);
@@ -56,12 +52,11 @@ pub fn read(path: &Path, map: &ColumnMap) -> Result<TurningFile, Message> {
     }
     let needed = |role: &'static str| match found(role) {
         Some(column) => Ok(column),
-        None => table.column(named(role)),
+        None => table.column(role),
     };
     let (x, reading) = (needed("x")?, needed("reading")?);
-    let own = |role: &str, column: &Column| map.unit(role).or(column.length_unit());
-    let x_mm = own("x", &x).unwrap_or(LengthUnit::Mm).in_mm();
-    let reading_um = own("reading", &reading).unwrap_or(LengthUnit::Um).in_um();
+    let x_mm = x.length_unit().unwrap_or(LengthUnit::Mm).in_mm();
+    let reading_um = reading.length_unit().unwrap_or(LengthUnit::Um).in_um();
     let (x, reading) = (x.as_written(), reading.as_written());
     let mut file = TurningFile {
         readings: Vec::new(),

@@ -3,6 +3,7 @@
 mod anova;
 mod batch;
 mod circle;
+mod columns;
 #[path = "../command/mod.rs"]
 mod command;
 mod designs;

@@ -105,7 +105,7 @@ fn wrong_arguments() {
             "possible values: shear, rotation, auto",
         ),
         (
-            &["reversal", "data.csv", "--columns", "y=q"],
+            &["reversal", "data.csv", "--columns", "y=x"],
             "no column holds `y`",
         ),
         (

@@ -3,7 +3,8 @@
 
 use std::io::Write;
 
-use errsep::io::reversal::{ColumnMap, ReversalSetup, read};
+use errsep::io::ColumnMap;
+use errsep::io::reversal::{ReversalSetup, read};
 use errsep_models::reversal::staged::{Interpolation, Options, Removal, solve};
 use proptest::prelude::*;
 

@@ -114,15 +114,14 @@ fn every_table_takes_the_units_that_stand_beside_its_names() {
 #[test]
 fn a_unit_that_nobody_takes_is_refused_where_it_stands() {
     let folder = Folder::with(&[
-        ("line.csv", "x_mm,y\n0,0\n1,2\n2,4.1\n3,5.9\n"),
+        ("time.csv", "x (s),y\n0,0\n1,2\n2,4.1\n3,5.9\n"),
         ("twice.csv", "x,x_mm,y\n0,0,1\n1,1,2\n2,2,1\n3,3,7\n"),
         ("unknown.csv", "x (furlong),y\n0,1\n1,2\n2,1\n3,7\n"),
     ]);
-    let line = ["diagnose", "line.csv", "--model", "calibration-line"];
     bad_input(
         &folder,
-        &line,
-        &["line.csv:1:1", "`x` is not taken in other units"],
+        &["circle", "time.csv"],
+        &["time.csv:1:1", "`x` is not taken in other units"],
     );
     bad_input(
         &folder,

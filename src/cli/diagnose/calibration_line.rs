@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::Args;
 use super::case::Case;
 use crate::cli::Answer;
-use crate::io::{Message, SetupFile, TableReader};
+use crate::io::{ColumnMap, Message, SetupFile, TableReader};
 use crate::report::number::{plain, probability};
 
 /// The set-up.
@@ -33,7 +33,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         None => Setup::default(),
     };
     super::positive(setup.line.noise, "[line] noise", args)?;
-    let readings = read(&args.data)?;
+    let readings = read(&args.data, &args.columns.map())?;
     let noise = setup.line.noise;
     let model = fitted(&readings, noise, args)?;
     let mut notes = vec![
@@ -61,7 +61,10 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         inputs: Vec::new(),
     }
     .answer_with(args, |plan| {
-        Some(read(&plan.data).and_then(|readings| fitted(&readings, noise, plan)))
+        Some(
+            read(&plan.data, &ColumnMap::default())
+                .and_then(|readings| fitted(&readings, noise, plan)),
+        )
     })
 }
 
@@ -89,11 +92,14 @@ fn test_in_words(test: &LackOfFit) -> String {
     )
 }
 
-/// Columns x and y, and where they apply set and time.
-fn read(path: &Path) -> Result<Vec<CalibrationReading>, Message> {
-    let mut table = TableReader::open(path)?;
+/// Columns x and y, in units of their own, and where they apply set and time.
+fn read(path: &Path, map: &ColumnMap) -> Result<Vec<CalibrationReading>, Message> {
+    let mut table = TableReader::open_as(path, map)?;
     table.only(&["x", "y", "set", "time"])?;
-    let (x, y) = (table.column("x")?, table.column("y")?);
+    let (x, y) = (
+        table.column("x")?.as_written(),
+        table.column("y")?.as_written(),
+    );
     let (set, time) = (table.optional("set"), table.optional("time"));
     let mut readings = Vec::new();
     while let Some(row) = table.next_row()? {

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::Args;
 use super::case::Case;
 use crate::cli::Answer;
-use crate::io::{Message, SetupFile, TableReader};
+use crate::io::{ColumnMap, Message, SetupFile, TableReader};
 
 /// The set-up.
 #[derive(Debug, Default, Deserialize)]
@@ -35,7 +35,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     };
     super::positive(setup.circle.noise, "[circle] noise", args)?;
     let noise = args.noise.or(setup.circle.noise);
-    let points = read(&args.data)?;
+    let points = read(&args.data, &args.columns.map())?;
     if points.len() > MOST {
         return Err(Message::bad_input(format!(
             "{} points are more than the {MOST} that are diagnosed together",
@@ -74,8 +74,8 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
 }
 
 /// Columns x and y, mm, and where it applies repeat.
-fn read(path: &Path) -> Result<Vec<(Point, u32)>, Message> {
-    let mut table = TableReader::open(path)?;
+fn read(path: &Path, map: &ColumnMap) -> Result<Vec<(Point, u32)>, Message> {
+    let mut table = TableReader::open_as(path, map)?;
     table.only(&["x", "y", "repeat"])?;
     let (x, y) = (table.column("x")?.in_mm(), table.column("y")?.in_mm());
     let repeat = table.optional("repeat");

@@ -20,7 +20,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         );
     };
     let setup = Setup::read(SetupFile::read(path)?)?;
-    let measured = read(&args.data, &setup)?;
+    let measured = read(&args.data, &args.columns.map(), &setup)?;
     let points = measured.outputs.geometry().point_count();
     if points > MOST {
         return Err(Message::bad_input(format!(

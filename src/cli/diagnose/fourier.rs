@@ -28,7 +28,11 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         orders: setup.section.orders.unwrap_or(ORDERS),
     };
     let mut scans: Vec<Scan> = Vec::new();
-    for located in read_scans(&args.data, setup.probe.spacing.first().copied())? {
+    for located in read_scans(
+        &args.data,
+        &args.columns.map(),
+        setup.probe.spacing.first().copied(),
+    )? {
         located.check(section, Compensation::None)?;
         scans.push(located.scan);
     }

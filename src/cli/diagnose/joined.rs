@@ -9,10 +9,9 @@ use serde_json::Value;
 use super::case::{Case, catalogue, residuals};
 use super::words::{moved, number, shown};
 use super::{Args, page, recognise};
-use crate::cli::{Answer, CommonArgs, progress};
+use crate::cli::{Answer, ColumnArgs, CommonArgs, progress};
 use crate::diagnosis::{Joined, JoinedEffect, NotJoined, Options, for_people, joined};
 use crate::io::message::{list, nearest};
-use crate::io::reversal::ColumnMap;
 use crate::io::{CsvTable, Message, Status};
 use crate::report::diagnosis as sheet;
 use crate::report::number::probability;
@@ -85,8 +84,8 @@ pub(in crate::cli) struct Given<'a> {
     pub noise: Option<f64>,
     /// Length of the section, mm, where an option states it.
     pub length: Option<f64>,
-    /// Names and units of the columns of a reversal.
-    pub columns: Option<&'a ColumnMap>,
+    /// Names and units of the columns.
+    pub columns: ColumnArgs,
     pub common: &'a CommonArgs,
 }
 
@@ -105,7 +104,7 @@ impl<'a> Given<'a> {
             with,
             noise: None,
             length: None,
-            columns: None,
+            columns: ColumnArgs::default(),
             common,
         }
     }
@@ -137,7 +136,7 @@ impl Given<'_> {
             setup: given.setup.map(Path::to_owned),
             model: Some(given.model.to_owned()),
             points: None,
-            columns: given.columns.cloned(),
+            columns: given.columns.clone(),
             without: Vec::new(),
             with: given.with.to_vec(),
             effects: None,

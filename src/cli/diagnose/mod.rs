@@ -25,9 +25,8 @@ use std::sync::Arc;
 
 use errsep_models::model::{FittedModel, Place};
 
-use super::{Answer, CommonArgs};
+use super::{Answer, ColumnArgs, CommonArgs};
 use crate::io::Message;
-use crate::io::reversal::ColumnMap;
 use crate::io::source::want_digests;
 
 /// Where does the gap between model and machine lie, which effect causes it, how far does it
@@ -73,9 +72,8 @@ pub struct Args {
     /// Points of the parts (columns point, x, y and z, mm).
     #[arg(long, value_name = "POINTS.csv")]
     points: Option<PathBuf>,
-    /// Names and units of the columns of a reversal, as role=column:unit,...
-    #[arg(long, value_name = "ROLE=COLUMN:UNIT,...")]
-    columns: Option<ColumnMap>,
+    #[command(flatten)]
+    columns: ColumnArgs,
     /// Leave an effect out of the catalogue; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,

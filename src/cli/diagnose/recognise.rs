@@ -113,13 +113,7 @@ pub(super) fn model(args: &Args) -> Result<&'static Model, Message> {
         let asked = MODELS.iter().find(|m| m.name == name);
         return asked.ok_or_else(|| Message::bad_input(format!("there is no model `{name}`")));
     }
-    if let Some(map) = &args.columns {
-        let of_a_reversal = ["channel", "1A", "1B", "2A", "2B"];
-        let turns = (map.names("time") || map.names("spindle")) && map.names("reading");
-        let run = of_a_run().filter(|_| turns && !of_a_reversal.iter().any(|r| map.names(r)));
-        return Ok(run.unwrap_or(&MODELS[0]));
-    }
-    let table = TableReader::open(&args.data)?;
+    let table = TableReader::open_as(&args.data, &args.columns.map())?;
     let found: Vec<&str> = table.bare_names().collect();
     let tables = args
         .setup

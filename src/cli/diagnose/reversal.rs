@@ -24,8 +24,8 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         Some(path) => ReversalSetup::read(path)?,
         None => ReversalSetup::default(),
     };
-    if let Some(columns) = &args.columns {
-        setup.columns = columns.clone();
+    if args.columns.are_given() {
+        setup.columns = args.columns.map();
     }
     let data = match read_any(&args.data, &setup)? {
         Readings::Four(data) => data,
@@ -84,7 +84,7 @@ fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<An
             command += &format!(" --setup {}", setup.display());
         }
         command += &format!(" --simultaneous --with {}", names.join(","));
-        if args.columns.is_some() {
+        if args.columns.are_given() {
             command += ", with the same --columns";
         }
         told_command(&mut answer, command);
@@ -238,7 +238,7 @@ fn with_command(args: &Args, diagnosis: &Value) -> Option<String> {
         command += &format!(" --setup {}", setup.display());
     }
     command += &format!(" --simultaneous --with {}", names.join(","));
-    if args.columns.is_some() {
+    if args.columns.are_given() {
         command += ", with the same --columns";
     }
     Some(command)

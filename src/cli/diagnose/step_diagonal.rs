@@ -14,7 +14,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         Some(path) => DiagonalSetup::read(path)?,
         None => (DiagonalSetup::default(), Vec::new()),
     };
-    let (zone, readings) = read_readings(&args.data, setup.test.target)?;
+    let (zone, readings) = read_readings(&args.data, &args.columns.map(), setup.test.target)?;
     let model = DiagonalRuns::new(&zone, &readings, &zero, setup.test.noise_um())
         .map_err(|e| Message::bad_input(e.to_string()).in_file(&args.data))?;
     let mut notes = vec!["No times are known: the readings are taken to follow each other evenly in the order of the file.".to_owned()];

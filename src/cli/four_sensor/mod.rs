@@ -15,7 +15,7 @@ use errsep_models::four_sensor::{
 use errsep_models::uncertainty::DegreesOfFreedom;
 
 use super::diagnose::joined::{self, Given};
-use super::{Answer, CommonArgs};
+use super::{Answer, ColumnArgs, CommonArgs};
 use crate::io::{CsvTable, Message, SetupFile, Status};
 use read::Measured;
 use setup::Setup;
@@ -54,6 +54,8 @@ pub struct Args {
     /// and with them, with one covariance.
     #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
     with: Vec<String>,
+    #[command(flatten)]
+    columns: ColumnArgs,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
@@ -119,7 +121,7 @@ fn how_well_known(
 /// The files are no outputs and set-up of four sensors, or the outputs cannot be separated.
 pub fn run(args: &Args) -> Result<Answer, Message> {
     let mut setup = Setup::read(SetupFile::read(&args.setup)?)?;
-    let measured = read::read(&args.data, &setup)?;
+    let measured = read::read(&args.data, &args.columns.map(), &setup)?;
     let noise_stated = setup.settings.noise.is_some();
     let of_mean = |noise: f64| noise / (measured.repeats as f64).sqrt();
     setup.settings.noise = setup.settings.noise.map(of_mean).or(measured.noise);
@@ -188,6 +190,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         answer,
         &Given {
             setup: Some(&args.setup),
+            columns: args.columns.clone(),
             ..Given::to("four-sensor", &args.data, &args.with, &args.common)
         },
     )

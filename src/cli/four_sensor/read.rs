@@ -6,7 +6,7 @@ use std::path::Path;
 use errsep_models::four_sensor::{Geometry, Outputs};
 
 use super::setup::Setup;
-use crate::io::{Message, TableReader};
+use crate::io::{ColumnMap, Message, TableReader};
 
 /// Outputs and what their repeats say of the noise.
 #[derive(Debug)]
@@ -29,8 +29,12 @@ struct Reading {
     line: usize,
 }
 
-pub(in crate::cli) fn read(path: &Path, setup: &Setup) -> Result<Measured, Message> {
-    let mut table = TableReader::open(path)?;
+pub(in crate::cli) fn read(
+    path: &Path,
+    map: &ColumnMap,
+    setup: &Setup,
+) -> Result<Measured, Message> {
+    let mut table = TableReader::open_as(path, map)?;
     let readings = if table.optional("sensor").is_some() {
         tidy(&mut table)?
     } else {

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use self::weighing::{methods, remarks};
 use super::diagnose::joined::{self, Given};
 use super::quantity::{COVERAGE, coverage_json, coverage_words, unexpandable};
-use super::{Answer, CommonArgs};
+use super::{Answer, ColumnArgs, CommonArgs};
 use crate::io::fourier::{FourierSetup, read_scans, told};
 use crate::io::{CsvTable, Message, Status};
 use crate::report::fourier::{FourierView, Method, page, peak_to_valley};
@@ -63,6 +63,8 @@ pub struct Args {
     #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
     with: Vec<String>,
     #[command(flatten)]
+    columns: ColumnArgs,
+    #[command(flatten)]
     pub(super) common: CommonArgs,
 }
 
@@ -105,7 +107,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let asked = setup.method.compensation;
     let mut scans = Vec::new();
     for (index, path) in args.data.iter().enumerate() {
-        for located in read_scans(path, spacings.get(index).copied())? {
+        for located in read_scans(path, &args.columns.map(), spacings.get(index).copied())? {
             located.check(section, asked)?;
             scans.push(located.scan);
         }
@@ -157,6 +159,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         &Given {
             setup: args.setup.as_deref(),
             length: args.length,
+            columns: args.columns.clone(),
             ..Given::to("fourier", data, &args.with, &args.common)
         },
     )

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use errsep_models::positioning::{Direction, Positioning, analyse};
 
-use super::{Answer, CommonArgs};
+use super::{Answer, ColumnArgs, CommonArgs};
 use crate::io::positioning::{AxisKind, PositioningData, PositioningSetup, read_readings};
 use crate::io::units::LengthUnit;
 use crate::io::{CsvTable, Message, Status};
@@ -56,6 +56,8 @@ pub struct Args {
     #[arg(long, value_enum, value_name = "mm|inch")]
     unit: Option<UnitName>,
     #[command(flatten)]
+    columns: ColumnArgs,
+    #[command(flatten)]
     pub(super) common: CommonArgs,
 }
 
@@ -86,7 +88,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         None => PositioningSetup::default(),
     };
     let unit = unit(args, &setup)?;
-    let data = read_readings(&args.data, setup.kind, unit)?;
+    let data = read_readings(&args.data, &args.columns.map(), setup.kind, unit)?;
     let result = analyse(&data.readings, &setup.influences, args.common.seed)
         .map_err(|e| data.refused(&e))?;
     let found = Found {

@@ -22,8 +22,8 @@ use errsep_models::reversal::simultaneous::Simultaneous;
 use errsep_models::reversal::staged::Removal;
 use serde_json::Value;
 
-use super::{Answer, CommonArgs};
-use crate::io::reversal::{ColumnMap, Readings, ReversalData, ReversalSetup, read_any};
+use super::{Answer, ColumnArgs, CommonArgs};
+use crate::io::reversal::{Readings, ReversalData, ReversalSetup, read_any};
 use crate::io::{Message, OutFile, Status};
 use diagnosed::Diagnosed;
 use outcome::Outcome;
@@ -75,9 +75,8 @@ pub struct Args {
     /// Say as well where and why model and readings disagree, as `errsep diagnose` does, by this fit.
     #[arg(long, requires = "simultaneous", conflicts_with = "with")]
     diagnose: bool,
-    /// Names and units of the columns, as role=column:unit,...
-    #[arg(long, value_name = "ROLE=COLUMN:UNIT,...")]
-    columns: Option<ColumnMap>,
+    #[command(flatten)]
+    columns: ColumnArgs,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }
@@ -101,8 +100,8 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         Some(path) => ReversalSetup::read(path)?,
         None => ReversalSetup::default(),
     };
-    if let Some(columns) = &args.columns {
-        setup.columns = columns.clone();
+    if args.columns.are_given() {
+        setup.columns = args.columns.map();
     }
     let corrected = args
         .corrected
@@ -199,7 +198,7 @@ fn pointer(args: &Args, o: &Outcome) -> Option<String> {
     if let Some(setup) = &args.setup {
         command += &format!(" --setup {}", setup.display());
     }
-    if args.columns.is_some() {
+    if args.columns.are_given() {
         command += ", with the same --columns";
     }
     Some(format!("to see where they disagree and why: {command}"))

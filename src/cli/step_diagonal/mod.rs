@@ -14,7 +14,7 @@ use errsep_models::diagonal::{
 use errsep_models::uncertainty::DegreesOfFreedom;
 
 use super::diagnose::joined::{self, Given};
-use super::{Answer, CommonArgs};
+use super::{Answer, ColumnArgs, CommonArgs};
 use crate::io::diagonal::{DiagonalSetup, read_readings};
 use crate::io::{Message, Status};
 use crate::report::step_diagonal::{StepDiagonalView, page};
@@ -64,6 +64,8 @@ pub struct Args {
     #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
     with: Vec<String>,
     #[command(flatten)]
+    columns: ColumnArgs,
+    #[command(flatten)]
     pub(super) common: CommonArgs,
 }
 
@@ -86,7 +88,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         Some(path) => DiagonalSetup::read(path)?,
         None => (DiagonalSetup::default(), Vec::new()),
     };
-    let (zone, readings) = read_readings(&args.data, setup.test.target)?;
+    let (zone, readings) = read_readings(&args.data, &args.columns.map(), setup.test.target)?;
     let assumptions = Assumptions {
         zero,
         slopes: setup
@@ -148,6 +150,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         answer,
         &Given {
             setup: args.setup.as_deref(),
+            columns: args.columns.clone(),
             ..Given::to("step-diagonal", &args.data, &args.with, &args.common)
         },
     )

@@ -3,13 +3,12 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::columns::ColumnMap;
 use super::data::{Readings, channel_of, find_columns};
 use super::designs::wide_columns;
 use super::setup::ReversalSetup;
 use crate::io::dialect::{BYTE_ORDER_MARK, Decimal, Dialect, LineEnd};
 use crate::io::units::LengthUnit;
-use crate::io::{Column, Message, Row, TableReader};
+use crate::io::{Column, ColumnMap, Message, Row, TableReader};
 
 /// The table of `path` with `changes` (µm, one a reading in the order of the file) taken out of its
 /// readings, below a comment. Every other field stays as it is; comments and blank lines of the file are
@@ -24,8 +23,8 @@ pub fn corrected(
     changes: &[f64],
     comment: &str,
 ) -> Result<Vec<u8>, Message> {
-    let table = TableReader::open(path)?;
-    let columns = find_columns(&table, map)?;
+    let table = TableReader::open_as(path, map)?;
+    let columns = find_columns(&table)?;
     let scales = columns.scales.reading_um;
     rewritten(table, path, dialect, changes, comment, |row| {
         Ok(match &columns.readings {
@@ -54,7 +53,7 @@ pub fn corrected_design(
     changes: &[f64],
     comment: &str,
 ) -> Result<Vec<u8>, Message> {
-    let table = TableReader::open(path)?;
+    let table = TableReader::open_as(path, &setup.columns)?;
     let wide = wide_columns(&table, setup);
     if !wide.is_empty() {
         return rewritten(table, path, dialect, changes, comment, |row| {
@@ -62,10 +61,8 @@ pub fn corrected_design(
             Ok(read.map(|(_, column, in_um)| (column, *in_um)).collect())
         });
     }
-    let map = &setup.columns;
-    let reading = table.column(map.column("reading").unwrap_or("reading"))?;
-    let unit = map.unit("reading").or(reading.length_unit());
-    let in_um = unit.unwrap_or(LengthUnit::Um).in_um();
+    let reading = table.column("reading")?;
+    let in_um = reading.length_unit().unwrap_or(LengthUnit::Um).in_um();
     let reading = reading.as_written();
     rewritten(table, path, dialect, changes, comment, |_| {
         Ok(vec![(&reading, in_um)])

@@ -4,11 +4,24 @@ use std::path::Path;
 
 use errsep_models::reversal::{Channel, Direction, Observations, Reading};
 
-use super::columns::{ColumnMap, ROLES};
 use crate::io::dialect::Dialect;
 use crate::io::message::{Place, list};
 use crate::io::units::LengthUnit;
-use crate::io::{Column, Message, Row, TableReader};
+use crate::io::{Column, ColumnMap, Message, Row, TableReader};
+
+/// What a column can hold.
+pub(super) const ROLES: [&str; 10] = [
+    "channel",
+    "repeat",
+    "direction",
+    "time",
+    "x",
+    "reading",
+    "1A",
+    "1B",
+    "2A",
+    "2B",
+];
 
 /// How the readings are laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,12 +105,12 @@ pub(super) enum Readings {
 /// The file is no table, a column is unknown or missing, a field is not what its column holds, a
 /// reading is there twice, a channel's column is empty.
 pub fn read(path: &Path, map: &ColumnMap) -> Result<ReversalData, Message> {
-    read_table(TableReader::open(path)?, map)
+    read_table(TableReader::open_as(path, map)?)
 }
 
 /// The same from a table that is open.
-pub(super) fn read_table(mut table: TableReader, map: &ColumnMap) -> Result<ReversalData, Message> {
-    let columns = find_columns(&table, map)?;
+pub(super) fn read_table(mut table: TableReader) -> Result<ReversalData, Message> {
+    let columns = find_columns(&table)?;
     let mut data = ReversalData {
         observations: Observations::default(),
         dialect: table.dialect(),
@@ -105,7 +118,7 @@ pub(super) fn read_table(mut table: TableReader, map: &ColumnMap) -> Result<Reve
             Readings::Tidy { .. } => Layout::Tidy,
             Readings::Wide(_) => Layout::Wide,
         },
-        ignored: ignored(&table, map),
+        ignored: table.ignored(),
         gaps: 0,
         first: [const { None }; 4],
     };
@@ -138,21 +151,14 @@ pub(super) fn read_table(mut table: TableReader, map: &ColumnMap) -> Result<Reve
     Ok(data)
 }
 
-pub(super) fn find_columns(table: &TableReader, map: &ColumnMap) -> Result<Columns, Message> {
-    if map.is_empty() {
-        table.only(&ROLES)?;
-    }
-    let optional = |role: &str| map.column(role).and_then(|name| table.optional(name));
-    let needed = |role: &str| table.column(map.column(role).unwrap_or(role));
-    let mapped = |role: &str| !map.is_empty() && map.column(role).is_some();
+pub(super) fn find_columns(table: &TableReader) -> Result<Columns, Message> {
+    table.only(&ROLES)?;
     let tidy = ["channel", "reading"]
         .iter()
-        .any(|role| optional(role).is_some() || mapped(role));
+        .any(|role| table.optional(role).is_some());
     let mut wide = Vec::new();
     for channel in Channel::ALL {
-        if mapped(channel.name()) {
-            wide.push((channel, needed(channel.name())?));
-        } else if let Some(column) = optional(channel.name()) {
+        if let Some(column) = table.optional(channel.name()) {
             wide.push((channel, column));
         }
     }
@@ -170,31 +176,27 @@ pub(super) fn find_columns(table: &TableReader, map: &ColumnMap) -> Result<Colum
         }
         (false, Some(_)) => Readings::Wide(wide),
         (_, None) => Readings::Tidy {
-            channel: needed("channel")?,
-            reading: needed("reading")?,
+            channel: table.column("channel")?,
+            reading: table.column("reading")?,
         },
     };
-    let x = needed("x")?;
-    let reading_unit = |role: &str, column: &Column| {
-        let own = map.unit(role).or(column.length_unit());
-        own.unwrap_or(LengthUnit::Um).in_um()
-    };
+    let x = table.column("x")?;
+    let in_um = |column: &Column| column.length_unit().unwrap_or(LengthUnit::Um).in_um();
     let mut reading_um = [1.0; 4];
     match &readings {
-        Readings::Tidy { reading, .. } => reading_um = [reading_unit("reading", reading); 4],
+        Readings::Tidy { reading, .. } => reading_um = [in_um(reading); 4],
         Readings::Wide(wide) => {
             for (channel, column) in wide {
-                reading_um[channel.index()] = reading_unit(channel.name(), column);
+                reading_um[channel.index()] = in_um(column);
             }
         }
     }
-    let x_mm = map.unit("x").or(x.length_unit());
     Ok(Columns {
-        repeat: optional("repeat"),
-        direction: optional("direction"),
-        time: optional("time").map(Column::in_s),
+        repeat: table.optional("repeat"),
+        direction: table.optional("direction"),
+        time: table.optional("time").map(Column::in_s),
         scales: Scales {
-            x_mm: x_mm.unwrap_or(LengthUnit::Mm).in_mm(),
+            x_mm: x.length_unit().unwrap_or(LengthUnit::Mm).in_mm(),
             reading_um,
         },
         x: x.as_written(),
@@ -210,21 +212,6 @@ pub(super) fn find_columns(table: &TableReader, map: &ColumnMap) -> Result<Colum
             ),
         },
     })
-}
-
-fn ignored(table: &TableReader, map: &ColumnMap) -> Vec<String> {
-    if map.is_empty() {
-        return Vec::new();
-    }
-    let read = ROLES
-        .iter()
-        .filter_map(|role| map.column(role))
-        .collect::<Vec<_>>();
-    table
-        .names()
-        .filter(|name| !read.contains(name))
-        .map(str::to_owned)
-        .collect()
 }
 
 fn read_row(row: Row<'_>, columns: &Columns, data: &mut ReversalData) -> Result<(), Message> {

@@ -73,10 +73,10 @@ const ROLES: [&str; 8] = [
 /// As [`read`](super::read); and angles that are missing, two channels of one pair of angles, or a
 /// channel without angles.
 pub fn read_any(path: &Path, setup: &ReversalSetup) -> Result<Readings, Message> {
-    let table = TableReader::open(path)?;
-    let has = |name: &str| setup.columns.is_empty() && table.optional(name).is_some();
+    let table = TableReader::open_as(path, &setup.columns)?;
+    let has = |name: &str| table.optional(name).is_some();
     if setup.channels.is_empty() && !has("indicator") && !has("spindle") {
-        return read_table(table, &setup.columns).map(Readings::Four);
+        return read_table(table).map(Readings::Four);
     }
     let data = read_design(table, setup)?;
     let channels = data.observations.design.channels();
@@ -116,14 +116,8 @@ pub(super) fn wide_columns(
     setup: &ReversalSetup,
 ) -> Vec<(String, Column, f64)> {
     let of = |name: String| {
-        let renamed = setup.columns.names(&name);
-        let written = match renamed {
-            true => setup.columns.column(&name).unwrap_or(&name),
-            false => &name,
-        };
-        let column = table.optional(written)?;
-        let unit = setup.columns.unit(&name).or(column.length_unit());
-        let in_um = unit.unwrap_or(LengthUnit::Um).in_um();
+        let column = table.optional(&name)?;
+        let in_um = column.length_unit().unwrap_or(LengthUnit::Um).in_um();
         Some((name, column.as_written(), in_um))
     };
     let mut wide: Vec<_> = channel_names(setup).into_iter().filter_map(of).collect();
@@ -137,14 +131,11 @@ pub(super) fn wide_columns(
 /// # Errors
 /// Columns that are missing, or that belong to different layouts.
 fn fields(table: &TableReader, setup: &ReversalSetup) -> Result<Fields, Message> {
-    let column = |role: &str| setup.columns.column(role).unwrap_or(role).to_owned();
-    let needed = |role: &str| table.column(&column(role));
-    let optional = |role: &str| table.optional(&column(role));
     let wide = wide_columns(table, setup);
     let tidy = ["channel", "indicator", "spindle", "reading"];
     match (
         wide.first(),
-        tidy.iter().find(|role| optional(role).is_some()),
+        tidy.iter().find(|role| table.optional(role).is_some()),
     ) {
         (Some((name, column, _)), Some(role)) => {
             let what = format!(
@@ -158,11 +149,11 @@ fn fields(table: &TableReader, setup: &ReversalSetup) -> Result<Fields, Message>
         (None, _) => {}
     }
     let naming = match (
-        optional("indicator"),
-        optional("spindle"),
-        optional("channel"),
+        table.optional("indicator"),
+        table.optional("spindle"),
+        table.optional("channel"),
     ) {
-        (None, None, _) => Naming::Name(needed("channel")?),
+        (None, None, _) => Naming::Name(table.column("channel")?),
         (Some(angle), _, Some(_)) | (None, Some(angle), Some(_)) => {
             return Err(table
                 .at_column(&angle, "a column `channel` stands beside the angles")
@@ -170,29 +161,22 @@ fn fields(table: &TableReader, setup: &ReversalSetup) -> Result<Fields, Message>
                     "keep `indicator` and `spindle`, or `channel` with [channels] in the set-up",
                 ));
         }
-        _ => Naming::Angles(needed("indicator")?, needed("spindle")?),
+        _ => Naming::Angles(table.column("indicator")?, table.column("spindle")?),
     };
-    let reading = needed("reading")?;
-    let unit = setup.columns.unit("reading").or(reading.length_unit());
-    let in_um = unit.unwrap_or(LengthUnit::Um).in_um();
+    let reading = table.column("reading")?;
+    let in_um = reading.length_unit().unwrap_or(LengthUnit::Um).in_um();
     Ok(Fields::One(naming, reading.as_written(), in_um))
 }
 
 fn read_design(mut table: TableReader, setup: &ReversalSetup) -> Result<DesignData, Message> {
-    if setup.columns.is_empty() {
-        let names = channel_names(setup);
-        let names = names.iter().map(|name| &name[..]);
-        table.only(&ROLES.into_iter().chain(names).collect::<Vec<_>>())?;
-    }
-    let column = |role: &str| setup.columns.column(role).unwrap_or(role).to_owned();
-    let needed = |role: &str| table.column(&column(role));
-    let optional = |role: &str| table.optional(&column(role));
+    let names = channel_names(setup);
+    let names = names.iter().map(|name| &name[..]);
+    table.only(&ROLES.into_iter().chain(names).collect::<Vec<_>>())?;
     let fields = fields(&table, setup)?;
-    let x = needed("x")?;
-    let (repeat, way) = (optional("repeat"), optional("direction"));
-    let time = optional("time").map(Column::in_s);
-    let unit = |role: &str, column: &Column| setup.columns.unit(role).or(column.length_unit());
-    let x_mm = unit("x", &x).unwrap_or(LengthUnit::Mm).in_mm();
+    let x = table.column("x")?;
+    let (repeat, way) = (table.optional("repeat"), table.optional("direction"));
+    let time = table.optional("time").map(Column::in_s);
+    let x_mm = x.length_unit().unwrap_or(LengthUnit::Mm).in_mm();
     let x = x.as_written();
     let mut found = Found {
         known: setup.channels.clone(),

@@ -1,12 +1,10 @@
 //! Readings and set-up of a reversal, as files hold them.
 
-mod columns;
 mod corrected;
 mod data;
 mod designs;
 mod setup;
 
-pub use columns::ColumnMap;
 pub use corrected::{corrected, corrected_design};
 pub use data::{Layout, ReversalData, read};
 pub use designs::{DesignData, Readings, read_any};

@@ -9,8 +9,8 @@ use errsep_models::reversal::staged::Interpolation;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::ColumnMap;
-use crate::io::{Message, SetupFile};
+use super::data::ROLES;
+use crate::io::{ColumnMap, Message, SetupFile};
 
 /// What is known beside the readings.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -83,6 +83,8 @@ struct Model {
     knots: Option<Spanned<u32>>,
 }
 
+/// Columns of the angles of a channel.
+const OF_ANGLES: [&str; 2] = ["indicator", "spindle"];
 /// A thicker artefact is a slip of the unit, mm.
 const THICKEST: f64 = 1e5;
 
@@ -121,13 +123,16 @@ impl ReversalSetup {
                 "give 1 or more cells, or leave it out to have their number chosen",
             ));
         }
+        let channels = channels(&setup, &file.channels)?;
+        let own = channels.iter().map(|channel| channel.name.as_str());
+        let roles: Vec<&str> = ROLES.into_iter().chain(OF_ANGLES).chain(own).collect();
         let mut columns = ColumnMap::default();
         for (role, column) in &file.columns {
             columns
                 .add(role.as_ref(), column.as_ref())
+                .and_then(|()| columns.only(&roles))
                 .map_err(|(what, remedy)| setup.bad(role.span(), what, remedy))?;
         }
-        let channels = channels(&setup, &file.channels)?;
         Ok(Self {
             channels,
             zero: match file.indicator.zero {

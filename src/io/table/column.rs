@@ -4,7 +4,7 @@ use crate::io::units::LengthUnit;
 
 /// A unit that may stand beside the name of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Unit {
+pub(in crate::io) enum Unit {
     /// A length.
     Length(LengthUnit),
     /// A time, in seconds.
@@ -12,7 +12,13 @@ pub(super) enum Unit {
 }
 
 impl Unit {
-    fn from_name(name: &str) -> Option<Self> {
+    /// The names that files and options may use.
+    pub const NAMES: [&'static str; 10] = [
+        "nm", "um", "mm", "m", "inch", "uinch", "ms", "s", "min", "h",
+    ];
+
+    /// The unit of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
         let time = match name {
             "ms" => Some(1e-3),
             "s" => Some(1.0),

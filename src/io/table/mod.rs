@@ -12,11 +12,13 @@ use std::cell::Cell;
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
+use super::columns::ColumnMap;
 use super::dialect::{BYTE_ORDER_MARK, Decimal, Delimiter, Dialect, NotATable};
 use super::message::{Message, Place, list, nearest};
 use super::source::Source;
 pub use column::Column;
 use column::Heading;
+pub(super) use column::Unit;
 pub use row::Row;
 use trouble::{cannot_read, count, not_a_table, place_of_field};
 
@@ -37,6 +39,7 @@ pub struct TableReader {
     field_count: usize,
     names: Vec<String>,
     headings: Vec<Heading>,
+    map: ColumnMap,
     header: String,
     header_number: usize,
 }
@@ -75,11 +78,55 @@ impl TableReader {
             field_count: 0,
             names: Vec::new(),
             headings: Vec::new(),
+            map: ColumnMap::default(),
             header: String::new(),
             header_number: 0,
         };
         table.read_header()?;
         Ok(table)
+    }
+
+    /// The same where columns have other names and units than the documentation gives them: from here on
+    /// they go by what they hold, and columns that `map` does not name are not there.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open); a column of `map` that the file does not have.
+    pub fn open_as(path: &Path, map: &ColumnMap) -> Result<Self, Message> {
+        let mut table = Self::open(path)?;
+        if map.is_empty() {
+            return Ok(table);
+        }
+        let not_read = Heading {
+            name: String::new(),
+            unit: None,
+        };
+        let mut headings = vec![not_read; table.names.len()];
+        for entry in map.entries() {
+            let column = table.column(&entry.column)?;
+            let index = column.index();
+            if !headings[index].name.is_empty() {
+                return Err(table
+                    .at_column(
+                        &column,
+                        format!("column `{}` is given two roles", entry.column),
+                    )
+                    .remedy("give each column one role"));
+            }
+            headings[index] = Heading {
+                name: entry.role.clone(),
+                unit: entry.unit.or(table.headings[index].unit),
+            };
+        }
+        table.headings = headings;
+        table.map = map.clone();
+        Ok(table)
+    }
+
+    /// The columns that are not read, since others were named in their place.
+    pub fn ignored(&self) -> Vec<String> {
+        let columns = self.names().zip(self.bare_names());
+        let ignored = columns.filter(|(_, bare)| bare.is_empty());
+        ignored.map(|(name, _)| name.to_owned()).collect()
     }
 
     fn read_header(&mut self) -> Result<(), Message> {
@@ -146,7 +193,8 @@ impl TableReader {
         self.names.iter().map(String::as_str)
     }
 
-    /// The names of the columns without the units that some of them carry.
+    /// What the columns hold: their names without the units that some of them carry, or their roles; empty
+    /// for columns that are not read.
     pub fn bare_names(&self) -> impl Iterator<Item = &str> {
         self.headings.iter().map(|heading| heading.name.as_str())
     }
@@ -154,7 +202,10 @@ impl TableReader {
     /// A column that may be absent: one of this name, or of this name with a unit, `x (mm)`, `x [mm]` or
     /// `x_mm`.
     pub fn optional(&self, name: &str) -> Option<Column> {
-        let as_written = self.names.iter().position(|n| n == name);
+        let as_written = self
+            .names
+            .iter()
+            .position(|n| n == name && self.map.is_empty());
         let index = as_written.or_else(|| self.bare_names().position(|n| n == name))?;
         Some(Column::new(index, name, self.headings.get(index)?.unit))
     }
@@ -166,6 +217,14 @@ impl TableReader {
     pub fn column(&self, name: &str) -> Result<Column, Message> {
         self.optional(name).ok_or_else(|| {
             let found = self.names().collect::<Vec<_>>();
+            if !self.map.is_empty() {
+                return self
+                    .in_header(0, format!("no column is given for `{name}`"))
+                    .remedy(format!(
+                        "add {name}=COLUMN to the names of the columns; the file has {}",
+                        list(&found)
+                    ));
+            }
             let remedy = match nearest(name, found.iter().copied()) {
                 Some(near) => {
                     format!("rename column `{near}` to `{name}` if that is what it holds")
@@ -180,8 +239,13 @@ impl TableReader {
     /// Refuses columns that nobody will read.
     ///
     /// # Errors
-    /// A column that is none of `known`; the message names the nearest that is.
+    /// A column that is none of `known`; the message names the nearest that is. Where columns were given
+    /// roles: a role that is none of `known`.
     pub fn only(&self, known: &[&str]) -> Result<(), Message> {
+        if !self.map.is_empty() {
+            let refuse = |(what, remedy): (String, String)| self.in_header(0, what).remedy(remedy);
+            return self.map.only(known).map_err(refuse);
+        }
         for (i, (name, bare)) in self.names().zip(self.bare_names()).enumerate() {
             if self.bare_names().take(i).any(|before| before == bare) && known.contains(&bare) {
                 return Err(self

@@ -21,7 +21,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         Some(path) => read_setup(path)?,
         None => errsep_models::reversal::turning_bar::Plan::default(),
     };
-    let map = args.columns.clone().unwrap_or_default();
+    let map = args.columns.map();
     let file = read(&args.data, &map)?;
     for r in &file.readings {
         let at = format!("x = {:e}", r.x);

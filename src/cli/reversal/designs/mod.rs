@@ -94,7 +94,7 @@ pub fn answer(
     }
     let given = Given {
         setup: args.setup.as_deref(),
-        columns: args.columns.as_ref(),
+        columns: args.columns.clone(),
         ..Given::to("reversal", &args.data, &args.with, &args.common)
     };
     let (answer, changes) = design_with(answer, &given, setup, data, fit)?;

@@ -28,7 +28,27 @@ struct MachineFile {
     #[serde(default)]
     tool_offset: Option<Spanned<[f64; 3]>>,
     #[serde(default)]
+    part: PartTable,
+    #[serde(default)]
     errors: BTreeMap<String, Spanned<Entry>>,
+}
+
+/// What is known of the parts.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct PartTable {
+    align: Align,
+}
+
+/// To what the zero and the turn of a part belong.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Align {
+    /// To the causes: parts are measured in the frame that the machine is to keep.
+    #[default]
+    Fixed,
+    /// To the model: each part is aligned anew.
+    Free,
 }
 
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
@@ -85,6 +105,8 @@ const HIGHEST_DEGREE: usize = 30;
 pub struct FiledMachine {
     /// The machine.
     pub machine: Machine,
+    /// To what zero and turn of measured parts belong.
+    pub align: Align,
     file: SetupFile,
     /// Where the entry of each component stands, by its index.
     entries: BTreeMap<usize, Range<usize>>,
@@ -168,6 +190,7 @@ pub fn read_filed(path: &Path, components: Option<&Path>) -> Result<FiledMachine
     match Machine::new(chain, sense, errors) {
         Ok(machine) => Ok(FiledMachine {
             machine,
+            align: content.part.align,
             file,
             entries,
         }),

@@ -10,6 +10,9 @@ mod models;
 mod noise;
 #[path = "../other_models/mod.rs"]
 mod other_models;
+#[path = "../plate/mod.rs"]
+mod plate;
+mod plates;
 mod positions;
 #[path = "../realisations/mod.rs"]
 mod realisations;

@@ -20,6 +20,8 @@ pub struct MeasuredParts {
     record: Record,
     parts: Vec<String>,
     expected: Arc<[Column]>,
+    /// Columns of the zeros and turns of the parts, where these belong to the model.
+    pub(super) alignment: Option<DMatrix<f64>>,
 }
 
 impl MeasuredParts {
@@ -76,6 +78,7 @@ impl MeasuredParts {
                 names.into_iter().map(|(_, name)| name).collect()
             },
             expected,
+            alignment: None,
             readings,
         })
     }
@@ -90,6 +93,11 @@ impl MeasuredParts {
     #[must_use]
     pub fn parts(&self) -> &[String] {
         &self.parts
+    }
+
+    /// What the machine's model leaves of the readings, µm.
+    pub(super) fn left(&self) -> DVector<f64> {
+        &self.record.observed - &self.predicted
     }
 
     /// The signature with a value for each reading of some parts.
@@ -192,13 +200,16 @@ impl FittedModel for MeasuredParts {
 
     fn freedom(&self) -> Freedom {
         Freedom {
-            columns: DMatrix::zeros(self.record.observed.len(), 0),
+            columns: match &self.alignment {
+                Some(columns) => columns.clone(),
+                None => DMatrix::zeros(self.record.observed.len(), 0),
+            },
             profiles: None,
         }
     }
 
     fn linearised(&self) -> DVector<f64> {
-        &self.record.observed - &self.predicted
+        self.left()
     }
 
     fn expected_scatter(&self) -> &[Column] {
@@ -245,6 +256,9 @@ impl FittedModel for MeasuredParts {
     }
 
     fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
-        effects::all()
+        match self.is_aligned() {
+            true => effects::of_aligned_parts(),
+            false => effects::all(),
+        }
     }
 }

@@ -9,6 +9,7 @@
 pub mod features;
 pub mod names;
 
+mod alignment;
 mod chain;
 mod component;
 mod effects;
@@ -22,6 +23,7 @@ mod propagation;
 mod regression;
 mod simulate;
 
+pub use alignment::Alignment;
 pub use chain::{Chain, Sense, Side, Slide};
 pub use component::{Axis, COMPONENTS, Component, Kind};
 pub use effects::amplitude;

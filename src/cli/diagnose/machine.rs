@@ -1,13 +1,17 @@
 //! A machine against the parts made on it.
 
-use errsep_models::machine::MeasuredParts;
+use std::collections::BTreeMap;
+
+use errsep_models::machine::{Alignment, MeasuredParts};
 
 use super::Args;
 use super::case::Case;
 use crate::cli::Answer;
 use crate::io::Message;
-use crate::io::machine::{read_filed, read_points};
+use crate::io::machine::{Align, read_filed, read_points};
 use crate::io::parts::read_parts;
+use crate::io::units::urad_from_rad;
+use crate::report::number::measured;
 
 pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     let needed = |what: &str, option: &str| {
@@ -28,18 +32,61 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     let count = readings.len();
     let model = MeasuredParts::new(&filed.machine, readings)
         .map_err(|e| filed.wrong(&e, "keep the points within the tables of the machine"))?;
+    let model = match filed.align {
+        Align::Fixed => model,
+        Align::Free => model.aligned(),
+    };
+    let mut notes = vec![
+        "The machine is not fitted to the parts. The noise is that of measuring a part again; what differs between parts is gap.".to_owned(),
+    ];
+    notes.extend(alignment_in_words(&model));
     Case {
         readings: format!(
-            "{count} readings of {} parts, against {}",
-            model.parts().len(),
+            "{count} readings of {}, against {}",
+            match model.parts().len() {
+                1 => "one part".to_owned(),
+                many => format!("{many} parts"),
+            },
             machine_file.display()
         ),
         along: "coordinate",
-        notes: vec![
-            "The machine is not fitted to the parts. The noise is that of measuring a part again; what differs between parts is gap.".to_owned(),
-        ],
+        notes,
         inputs: vec![points_file.clone()],
         model,
     }
     .answer(args)
+}
+
+/// Where the parts lay, for parts that are aligned anew.
+fn alignment_in_words(model: &MeasuredParts) -> Vec<String> {
+    let (found, open) = model.alignments();
+    let mut of_part: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for one in &found {
+        of_part.entry(&one.part).or_default().push(in_words(one));
+    }
+    let mut notes = Vec::new();
+    if model.is_aligned() {
+        notes.push(
+            "Zero and turn of each part belong to the model and are no causes; they are told of the middle of the part's \
+             points, with the standard uncertainty from all that is left there, gap included."
+                .to_owned(),
+        );
+    }
+    for part in model.parts() {
+        if let Some(words) = of_part.get(part.as_str()) {
+            notes.push(format!("Part {part}: {}.", words.join("; ")));
+        }
+    }
+    if !open.is_empty() {
+        notes.push(format!("The points do not determine: {}.", open.join(", ")));
+    }
+    notes
+}
+
+fn in_words(one: &Alignment) -> String {
+    let (value, std, unit) = match one.unit {
+        "rad" => (urad_from_rad(one.value), urad_from_rad(one.std), "µrad"),
+        _ => (one.value, one.std, "µm"),
+    };
+    format!("{} {} {unit}", one.name, measured(value, Some(std)))
 }

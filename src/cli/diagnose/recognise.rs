@@ -70,7 +70,7 @@ pub(super) const MODELS: &[Model] = &[
     },
     Model {
         name: "machine",
-        tables: &["chain", "errors"],
+        tables: &["chain", "errors", "part"],
         columns: &[&["part", "point", "axis", "value"]],
         reading: None,
         run: machine::run,

@@ -1,5 +1,6 @@
 //! What a fixed machine model leaves out of the parts made on it: one file an effect.
 
+mod along_axes;
 mod angular_error_times_height;
 mod axis_scale;
 mod bad_part;
@@ -7,7 +8,10 @@ mod datum_offset;
 mod datum_rotation;
 mod part_rotation;
 mod part_zero;
+mod positioning;
+mod scale_by_axis;
 mod squareness_change;
+mod straightness;
 mod thermal_expansion;
 
 use nalgebra::DMatrix;
@@ -26,6 +30,20 @@ pub(super) fn all() -> Vec<Box<dyn Effect<MeasuredParts>>> {
         Box::new(part_rotation::PartRotation),
         Box::new(part_zero::PartZero),
         Box::new(squareness_change::SquarenessChange),
+        Box::new(thermal_expansion::ThermalExpansion),
+    ]
+}
+
+/// The catalogue of parts whose zeros and turns belong to the model: the errors of the machine that a plate
+/// shows in a frame of its own.
+pub(super) fn of_aligned_parts() -> Vec<Box<dyn Effect<MeasuredParts>>> {
+    vec![
+        Box::new(angular_error_times_height::AngularErrorTimesHeight),
+        Box::new(bad_part::BadPart),
+        Box::new(positioning::Positioning),
+        Box::new(scale_by_axis::ScaleByAxis),
+        Box::new(squareness_change::SquarenessChange),
+        Box::new(straightness::Straightness),
         Box::new(thermal_expansion::ThermalExpansion),
     ]
 }

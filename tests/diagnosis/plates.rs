@@ -1,0 +1,79 @@
+//! Plates whose zero and turn belong to the model: the machine's scales, squareness and bends are named.
+
+use errsep::diagnosis::{Kind, Options, diagnose};
+
+use crate::plate::{Wrong, line, plate};
+
+fn options() -> Options {
+    Options {
+        draws: 400,
+        ..Options::default()
+    }
+}
+
+const WRONG: Wrong = Wrong {
+    scale_x: 8e-6,
+    scale_y: -5e-6,
+    squareness: 7e-6,
+    sagitta: 2e-3,
+};
+
+#[test]
+fn scales_squareness_and_a_bend_are_named_together() {
+    let model = plate(WRONG, 0.3, 3);
+    let found = diagnose(&model, &options());
+    let mut names = found.verdict.effects.clone();
+    names.sort();
+    assert_eq!(
+        names,
+        ["scale-by-axis", "squareness-change", "straightness"]
+    );
+    assert!(found.verdict.indistinguishable.is_empty());
+    for (effect, which, truth) in [
+        ("scale-by-axis", 0, WRONG.scale_x),
+        ("scale-by-axis", 1, WRONG.scale_y),
+        ("squareness-change", 0, WRONG.squareness),
+    ] {
+        let of = found
+            .candidates
+            .iter()
+            .find(|c| c.effect == effect)
+            .unwrap();
+        let size = &of.parameters[which];
+        // k·u with k = 4: one in 16 000 by chance.
+        assert!(
+            (size.value - truth).abs() < 4.0 * size.std,
+            "{effect}: {size:?}"
+        );
+    }
+}
+
+#[test]
+fn a_pose_alone_is_no_gap() {
+    let found = diagnose(&plate(Wrong::default(), 0.3, 5), &options());
+    assert_eq!(found.verdict.kind, Kind::None);
+}
+
+#[test]
+fn poses_are_told_and_what_points_on_a_line_do_not_tell() {
+    let (found, open) = plate(Wrong::default(), 0.3, 7).alignments();
+    let names: Vec<&str> = found.iter().map(|a| a.name.as_str()).collect();
+    assert_eq!(names, ["zero of x", "zero of y", "turn about z"]);
+    assert!(open.is_empty());
+    // The maker's shift and turn of this seed: 6 × 6 points about their middle, where a turn shifts too.
+    let truth = crate::plate::pose(7);
+    let turn = &found[2];
+    assert!((turn.value - truth.turn).abs() < 4.0 * turn.std, "{turn:?}");
+    assert!(turn.std > 0.0 && turn.std < 1e-6);
+    for (zero, expected) in found.iter().zip(truth.middle_um) {
+        // k·u with k = 4.
+        assert!(
+            (zero.value - expected).abs() < 4.0 * zero.std,
+            "{zero:?}, not {expected}"
+        );
+    }
+    let (found, open) = line().alignments();
+    let names: Vec<&str> = found.iter().map(|a| a.name.as_str()).collect();
+    assert_eq!(names, ["zero of y", "turn about z"]);
+    assert_eq!(open, ["zero of z of part rod", "turn about y of part rod"]);
+}

@@ -410,3 +410,55 @@ fn one_thing_wrong_with_the_points_or_the_feature() {
         &["memory"],
     );
 }
+
+/// A plate that lies turned: with `align = "free"` the pose is told and is no cause.
+#[test]
+fn the_pose_of_a_plate_belongs_to_the_model() {
+    let folder = TempDir::new().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let (mut plate, mut points) = (
+        String::from("part,point,axis,replicate,value\n"),
+        String::from("point,x,y,z\n"),
+    );
+    for k in 0..16 {
+        let (x, y) = (50.0 * f64::from(k % 4), 50.0 * f64::from(k / 4));
+        points += &format!("P{k},{x},{y},0\n");
+        for replicate in 1..=3 {
+            // A turn of 100 µrad about the datum and a shift of (30, -20) µm; 0.1 µm of noise, repeatable.
+            let noise =
+                |way: i32| 0.1 * f64::from((k * 7 + replicate * 5 + way * 3) % 11 - 5) / 3.0;
+            let (dx, dy) = (30.0 - 0.1 * y + noise(0), -20.0 + 0.1 * x + noise(1));
+            plate += &format!("plug,P{k},x,{replicate},{dx}\nplug,P{k},y,{replicate},{dy}\n");
+        }
+    }
+    let (plate, points) = (write("plate.csv", &plate), write("points.csv", &points));
+    let told = |machine: &str| {
+        let setup = write("cmm.toml", machine);
+        let output = errsep(&["diagnose", &plate, "--setup", &setup, "--points", &points]);
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let free = told("chain = \"FXYZ\"\n[part]\nalign = \"free\"\n");
+    assert!(free.contains("No significant misfit"), "{free}");
+    // The middle is at (75, 75): 30 - 7.5 and -20 + 7.5 µm.
+    for words in [
+        "Part plug: zero of x 22.",
+        "zero of y −12.",
+        "turn about z 100.",
+    ] {
+        let other = words.replace("22.", "23.").replace("100.", "99.");
+        assert!(
+            free.contains(words) || free.contains(&other),
+            "{words}: {free}"
+        );
+    }
+    let fixed = told("chain = \"FXYZ\"\n[part]\nalign = \"fixed\"\n");
+    assert!(
+        fixed.contains("datum-offset") && fixed.contains("datum-rotation"),
+        "{fixed}"
+    );
+    assert!(!fixed.contains("Part plug: zero"), "{fixed}");
+}

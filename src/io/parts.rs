@@ -5,6 +5,7 @@ use std::path::Path;
 
 use errsep_models::machine::{Axis, PartReading, Position};
 
+use super::columns::ColumnMap;
 use super::message::Message;
 use super::table::TableReader;
 
@@ -12,12 +13,16 @@ use super::table::TableReader;
 ///
 /// # Errors
 /// A file that cannot be read, a point that is not among `points`, an axis other than x, y, z.
-pub fn read_parts(path: &Path, points: &[(String, Position)]) -> Result<Vec<PartReading>, Message> {
+pub fn read_parts(
+    path: &Path,
+    map: &ColumnMap,
+    points: &[(String, Position)],
+) -> Result<Vec<PartReading>, Message> {
     let places: HashMap<&str, Position> = points.iter().map(|(n, p)| (n.as_str(), *p)).collect();
-    let mut table = TableReader::open(path)?;
+    let mut table = TableReader::open_as(path, map)?;
     table.only(&["part", "point", "axis", "value", "replicate"])?;
     let (part, point) = (table.column("part")?, table.column("point")?);
-    let (axis, value) = (table.column("axis")?, table.column("value")?);
+    let (axis, value) = (table.column("axis")?, table.column("value")?.in_um());
     let replicate = table.optional("replicate");
     let mut readings = Vec::new();
     while let Some(row) = table.next_row()? {

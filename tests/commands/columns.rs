@@ -215,6 +215,42 @@ fn four_sensors_and_two_probes() {
 }
 
 #[test]
+fn parts_of_a_machine() {
+    let mut plate = String::from("part,point,axis,replicate,value\n");
+    let mut points = String::from("point,x,y,z\n");
+    for k in 0..9 {
+        let (x, y) = (f64::from(50 * (k % 3)), f64::from(50 * (k / 3)));
+        points += &format!("P{k},{x},{y},0\n");
+        for replicate in 1..=3 {
+            // Fractional parts of multiples of two irrational numbers: no pattern that repeats.
+            let noise = |root: f64| (root * f64::from(100 * replicate + k)).fract() - 0.5;
+            plate += &format!(
+                "plug,P{k},x,{replicate},{}\n",
+                0.05 * x + noise(2f64.sqrt())
+            );
+            plate += &format!(
+                "plug,P{k},y,{replicate},{}\n",
+                0.02 * y + noise(3f64.sqrt())
+            );
+        }
+    }
+    let machine = "chain = \"FXYZ\"\n[part]\nalign = \"free\"\n";
+    let folder = Folder::with(&[("points.csv", &points), ("cmm.toml", machine)]);
+    let columns = [
+        text("part", "piece"),
+        text("point", "hole"),
+        text("axis", "along"),
+        text("replicate", "n"),
+        length("value", "off", UM_IN_INCH),
+    ];
+    let parts = ["machine", "cmm.toml", "parts"];
+    let at = ["--points", "points.csv"];
+    same_answer(&folder, &parts, &plate, &at, &columns);
+    let at = ["--setup", "cmm.toml", "--points", "points.csv"];
+    same_answer(&folder, &["diagnose"], &plate, &at, &columns);
+}
+
+#[test]
 fn a_calibration_line_has_units_of_its_own() {
     let folder = Folder::with(&[]);
     let line = simulated(&folder, &["calibration-line"]);

@@ -40,7 +40,7 @@ impl Process {
     fn of(file: &str) -> Self {
         let machine = read_machine(&fixture("machine.toml"), None).unwrap();
         let points = read_points(&fixture("holes.csv")).unwrap();
-        let readings = read_parts(&fixture(file), &points).unwrap();
+        let readings = read_parts(&fixture(file), &Default::default(), &points).unwrap();
         let residuals = part_residuals(&machine, &readings).unwrap();
         let mut cells: BTreeMap<(&str, &str, bool), Vec<f64>> = BTreeMap::new();
         let mut places = BTreeMap::new();

@@ -28,7 +28,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         .ok_or_else(|| needed("the table of the points", "--points POINTS.csv"))?;
     let filed = read_filed(machine_file, None)?;
     let points = read_points(points_file)?;
-    let readings = read_parts(&args.data, &points)?;
+    let readings = read_parts(&args.data, &args.columns.map(), &points)?;
     let count = readings.len();
     let model = MeasuredParts::new(&filed.machine, readings)
         .map_err(|e| filed.wrong(&e, "keep the points within the tables of the machine"))?;

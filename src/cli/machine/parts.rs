@@ -7,7 +7,7 @@ use errsep_models::machine::{Axis, PartReading, PartResidual, part_residuals};
 use serde_json::{Value, json};
 
 use super::{Context, PropagationArgs};
-use crate::cli::{Answer, CommonArgs};
+use crate::cli::{Answer, ColumnArgs, CommonArgs};
 use crate::io::machine::read_points;
 use crate::io::parts::read_parts;
 use crate::io::{CsvTable, Message, Status};
@@ -28,6 +28,8 @@ pub(super) struct Args {
     /// The points (columns point, x, y and z, mm).
     #[arg(long, value_name = "POINTS.csv")]
     points: PathBuf,
+    #[command(flatten)]
+    columns: ColumnArgs,
     #[command(flatten)]
     pub(super) propagation: PropagationArgs,
     #[command(flatten)]
@@ -65,7 +67,7 @@ impl Feature<'_> {
 
 pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
     let points = read_points(&args.points)?;
-    let readings: Vec<PartReading> = read_parts(&args.readings, &points)?;
+    let readings: Vec<PartReading> = read_parts(&args.readings, &args.columns.map(), &points)?;
     let residuals =
         part_residuals(context.machine, &readings).map_err(|error| context.wrong(&error))?;
     let mut features: Vec<Feature> = Vec::new();

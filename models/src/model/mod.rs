@@ -284,10 +284,16 @@ pub trait FittedModel: Clone + Send + Sync {
         self.clone()
     }
 
-    /// The same model with a draw of what its fit, where it smooths, may have taken away of the
-    /// truth. `noise`: a draw of the readings' noise that has no part in the fit.
+    /// A draw of what the fit of a state as smooth as this one may have taken away of the truth, in the
+    /// model's own terms; nothing where it does not smooth. `noise`: a draw of the readings' noise that
+    /// has no part in the fit.
+    fn smoothed_away(&self, _noise: &DVector<f64>) -> Option<DMatrix<f64>> {
+        None
+    }
+
+    /// The same model with such a draw added to its state.
     #[must_use]
-    fn roughened(self, _noise: &DVector<f64>) -> Self {
+    fn roughened(self, _away: &DMatrix<f64>) -> Self {
         self
     }
 

@@ -12,12 +12,11 @@ use nalgebra::{DMatrix, DVector};
 /// The smoother of one set of positions: found once, used for every profile over them.
 #[derive(Debug, Clone)]
 pub struct Smoother {
-    positions: Arc<Vec<f64>>,
     /// Columns: the Demmler–Reinsch basis.
     basis: Arc<DMatrix<f64>>,
     roughness: Arc<DVector<f64>>,
-    /// γ = `curvature` · g: second derivatives at the inner positions from the values.
-    curvature: Arc<DMatrix<f64>>,
+    /// Between neighbouring positions.
+    gaps: Arc<Vec<f64>>,
 }
 
 /// A smooth profile at its positions.
@@ -113,26 +112,25 @@ impl Smoother {
         if n < 4 || positions.windows(2).any(|w| w[1] <= w[0]) {
             return None;
         }
-        let gap: Vec<f64> = positions.windows(2).map(|w| w[1] - w[0]).collect();
+        let gaps: Vec<f64> = positions.windows(2).map(|w| w[1] - w[0]).collect();
         let mut differences = DMatrix::zeros(n, n - 2);
         let mut gram = DMatrix::zeros(n - 2, n - 2);
         for j in 0..n - 2 {
-            differences[(j, j)] = 1.0 / gap[j];
-            differences[(j + 1, j)] = -1.0 / gap[j] - 1.0 / gap[j + 1];
-            differences[(j + 2, j)] = 1.0 / gap[j + 1];
-            gram[(j, j)] = (gap[j] + gap[j + 1]) / 3.0;
+            for (k, weight) in second_difference(&gaps, j).into_iter().enumerate() {
+                differences[(j + k, j)] = weight;
+            }
+            gram[(j, j)] = (gaps[j] + gaps[j + 1]) / 3.0;
             if j + 1 < n - 2 {
-                gram[(j, j + 1)] = gap[j + 1] / 6.0;
-                gram[(j + 1, j)] = gap[j + 1] / 6.0;
+                gram[(j, j + 1)] = gaps[j + 1] / 6.0;
+                gram[(j + 1, j)] = gaps[j + 1] / 6.0;
             }
         }
         let curvature = gram.cholesky()?.solve(&differences.transpose());
         let eigen = symmetric_eigen(&differences * &curvature)?;
         Some(Self {
-            positions: Arc::new(positions.to_vec()),
             basis: Arc::new(eigen.eigenvectors),
             roughness: Arc::new(eigen.eigenvalues.map(|v| v.max(0.0))),
-            curvature: Arc::new(curvature),
+            gaps: Arc::new(gaps),
         })
     }
 
@@ -199,23 +197,44 @@ impl Smoother {
         self.smoothed(&self.basis.tr_mul(mean), weight)
     }
 
-    /// The profile of other values, as smooth as a given one.
+    /// The profile of other values, as smooth as a given one: with R and Q of the natural spline and
+    /// w its weight, (R + w QᵀQ) γ = Qᵀy and g = y − w Q γ (Reinsch's algorithm), linear in the positions.
     pub fn smooth_as(&self, profile: &SmoothProfile, values: &DVector<f64>) -> SmoothProfile {
-        self.smoothed(&self.basis.tr_mul(values), profile.weight)
+        let weight = profile.weight;
+        if weight == 0.0 {
+            return self.through(values.clone());
+        }
+        let curvatures = self.curvatures(values, weight);
+        let mut smooth = values.clone();
+        for j in 0..self.gaps.len() - 1 {
+            for (k, of) in second_difference(&self.gaps, j).into_iter().enumerate() {
+                smooth[j + k] -= weight * of * curvatures[j + 1];
+            }
+        }
+        SmoothProfile {
+            slopes: self.slopes(&smooth, &curvatures),
+            values: smooth,
+            weight,
+        }
     }
 
-    /// The profile with a draw of what smoothing may have taken away of the form. A component of
+    /// A draw of what smoothing as strong as a given profile's may have taken away of the form. A component of
     /// the basis kept by a part k has the posterior variance kσ² (Wahba, Journal of the Royal
     /// Statistical Society B 45 (1983) 133), of which the noise that is kept makes k²σ²; the rest,
     /// k(1 − k)σ², is form that was taken for noise. `noise`: that of the values, drawn anew.
-    pub fn roughened(&self, profile: &SmoothProfile, noise: &DVector<f64>) -> SmoothProfile {
+    pub fn smoothed_away(&self, profile: &SmoothProfile, noise: &DVector<f64>) -> DVector<f64> {
         let draw = self.basis.tr_mul(noise).zip_map(&self.roughness, |c, d| {
             let kept = 1.0 / (1.0 + profile.weight * d);
             (kept * (1.0 - kept)).sqrt() * c
         });
+        &*self.basis * draw
+    }
+
+    /// The profile with such a draw added.
+    pub fn roughened(&self, profile: &SmoothProfile, away: &DVector<f64>) -> SmoothProfile {
         SmoothProfile {
             weight: profile.weight,
-            ..self.through(&profile.values + &*self.basis * draw)
+            ..self.through(&profile.values + away)
         }
     }
 
@@ -229,25 +248,86 @@ impl Smoother {
 
     /// The natural cubic spline through given values.
     pub fn through(&self, values: DVector<f64>) -> SmoothProfile {
+        let curvatures = self.curvatures(&values, 0.0);
+        SmoothProfile {
+            slopes: self.slopes(&values, &curvatures),
+            values,
+            weight: 0.0,
+        }
+    }
+
+    /// Second derivatives of the smoothing spline of a weight at all positions, none at the ends: the
+    /// band R + w QᵀQ is decomposed as L D Lᵀ while it is made.
+    fn curvatures(&self, values: &DVector<f64>, weight: f64) -> Vec<f64> {
+        let gaps = &self.gaps;
         let n = values.len();
-        let inner = &*self.curvature * &values;
-        let mut curvatures = DVector::zeros(n);
-        curvatures.rows_mut(1, n - 2).copy_from(&inner);
+        let mut solved = vec![0.0; n];
+        // Of each row the pivot and the multipliers one and two below it.
+        let mut factor = vec![[0.0; 3]; n];
+        for j in 0..n - 2 {
+            let own = second_difference(gaps, j);
+            let mut right: f64 = (0..3).map(|k| own[k] * values[j + k]).sum();
+            let square = |other: [f64; 3], apart: usize| -> f64 {
+                (apart..3).map(|k| own[k] * other[k - apart]).sum()
+            };
+            let mut pivot = (gaps[j] + gaps[j + 1]) / 3.0 + weight * square(own, 0);
+            let mut next = gaps[j + 1] / 6.0;
+            if weight > 0.0 && j + 1 < n - 2 {
+                next += weight * square(second_difference(gaps, j + 1), 1);
+            }
+            let mut second = 0.0;
+            if weight > 0.0 && j + 2 < n - 2 {
+                second = weight * square(second_difference(gaps, j + 2), 2);
+            }
+            if j >= 1 {
+                let [above, first, skip] = factor[j - 1];
+                pivot -= above * first * first;
+                next -= above * first * skip;
+                right -= first * solved[j];
+            }
+            if j >= 2 {
+                let [above, _, skip] = factor[j - 2];
+                pivot -= above * skip * skip;
+                right -= skip * solved[j - 1];
+            }
+            second /= pivot;
+            factor[j] = [pivot, next / pivot, second];
+            solved[j + 1] = right;
+        }
+        for j in (0..n - 2).rev() {
+            let [pivot, first, second] = factor[j];
+            let mut value = solved[j + 1] / pivot;
+            if j + 1 < n - 2 {
+                value -= first * solved[j + 2];
+            }
+            if j + 2 < n - 2 {
+                value -= second * solved[j + 3];
+            }
+            solved[j + 1] = value;
+        }
+        solved
+    }
+
+    /// First derivatives of the spline of given values and second derivatives.
+    fn slopes(&self, values: &DVector<f64>, curvatures: &[f64]) -> DVector<f64> {
+        let n = values.len();
         let mut slopes = DVector::zeros(n);
         for k in 0..n - 1 {
-            let h = self.positions[k + 1] - self.positions[k];
+            let h = self.gaps[k];
             let chord = (values[k + 1] - values[k]) / h;
             slopes[k] = chord - h * (2.0 * curvatures[k] + curvatures[k + 1]) / 6.0;
             if k + 2 == n {
                 slopes[k + 1] = chord + h * (curvatures[k] + 2.0 * curvatures[k + 1]) / 6.0;
             }
         }
-        SmoothProfile {
-            values,
-            slopes,
-            weight: 0.0,
-        }
+        slopes
     }
+}
+
+/// The weights of three neighbouring values, from the j-th on, in their second difference.
+fn second_difference(gaps: &[f64], j: usize) -> [f64; 3] {
+    let (left, right) = (1.0 / gaps[j], 1.0 / gaps[j + 1]);
+    [left, -left - right, right]
 }
 
 /// The weights to choose from, the greatest eigenvalue of the roughness given.
@@ -337,7 +417,8 @@ mod tests {
             missed += (profile.slopes - truth.slopes).norm_squared();
             let noise = smoother.smoothed(&normal(), weight);
             kept += noise.slopes.norm_squared();
-            drawn += smoother.roughened(&noise, &normal()).slopes.norm_squared();
+            let away = smoother.smoothed_away(&noise, &normal());
+            drawn += smoother.roughened(&noise, &away).slopes.norm_squared();
         }
         // k·u: 400 forms of some twenty components each, √(2/8000) = 1.6 % a sum.
         assert!((drawn / missed - 1.0).abs() < 0.1, "{drawn} {missed}");
@@ -369,6 +450,25 @@ mod tests {
                     assert_eq!((spot.left, spot.right), ends, "{x} from {near}");
                 }
             }
+        }
+    }
+
+    /// The band solves what the basis decomposes.
+    #[test]
+    fn a_weight_in_the_band_is_that_in_the_basis() {
+        let x: Vec<f64> = (0..90)
+            .map(|k| f64::from(k) + 0.3 * f64::from(k % 3))
+            .collect();
+        let smoother = Smoother::new(&x).unwrap();
+        let values = DVector::from_fn(90, |k, _| (0.2 * x[k]).sin() + (7919.0 * x[k]).cos());
+        let coefficients = smoother.basis.tr_mul(&values);
+        let top = smoother.roughness.max();
+        for weight in [0.0, 1e-3 / top, 1.0 / top, 1e4 / top, 1e8 / top] {
+            let dense = smoother.smoothed(&coefficients, weight);
+            let banded = smoother.smooth_as(&dense, &values);
+            // Epsilons, times the condition of QᵀQ (90⁴).
+            assert!((&dense.values - &banded.values).amax() < 1e-8, "{weight}");
+            assert!((&dense.slopes - &banded.slopes).amax() < 1e-8, "{weight}");
         }
     }
 

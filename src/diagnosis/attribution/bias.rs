@@ -93,7 +93,7 @@ pub(in crate::diagnosis) fn biases<M: FittedModel>(
         .as_ref()
         .and_then(|taken| taken.sizes.draws.as_ref())
         .map_or_else(Vec::new, |draws| {
-            let [_, moved] = &draws.in_readings;
+            let moved = &draws.moved_as_read;
             (0..moved.ncols().min(STATES))
                 .into_par_iter()
                 .map(|draw| profiles_of(&corrected - moved.column(draw)))
@@ -213,9 +213,10 @@ impl Taken {
         let Some(draws) = &self.sizes.draws else {
             return ByState::default();
         };
-        let [noise, moved] = draws.in_readings.each_ref().map(|m| m.tr_mul(weights));
+        let in_readings = [draws.noise_in_readings(), &draws.moved_as_read];
+        let [noise, moved] = in_readings.map(|m| m.tr_mul(weights));
         let known = draws.errors(&self.sizes.gain).tr_mul(gradient);
-        let plain = (&self.sizes.gain * &draws.noise).tr_mul(gradient);
+        let plain = (&self.sizes.gain * draws.projected_noise()).tr_mul(gradient);
         let all = &known + moved;
         let count = all.len().max(1) as f64;
         ByState {

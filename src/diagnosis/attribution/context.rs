@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use rayon::prelude::*;
 
-use crate::diagnosis::attribution::doubt::Doubt;
+use crate::diagnosis::attribution::doubt::{DRAWS, Doubt, NoiseOnce};
 use crate::diagnosis::detection::dictionary::{
     Dictionary, Entry, Meaning, Places, statistic, surprise,
 };
@@ -28,6 +28,8 @@ pub(in crate::diagnosis) struct Context<'a, M: FittedModel> {
     pub space: Space,
     pub dictionary: Dictionary,
     pub null: Arc<NullLaw>,
+    /// Draws of the noise for the doubt about the state.
+    pub noise: NoiseOnce,
 }
 
 /// A cause at a shape, with its whitened, projected signature.
@@ -84,6 +86,7 @@ impl<'a, M: FittedModel> Context<'a, M> {
             space,
             dictionary,
             null,
+            noise: NoiseOnce::new(),
         }
     }
 
@@ -104,6 +107,7 @@ impl<'a, M: FittedModel> Context<'a, M> {
             space,
             dictionary,
             null: Arc::clone(&self.null),
+            noise: NoiseOnce::new(),
         }
     }
 
@@ -132,6 +136,11 @@ impl<'a, M: FittedModel> Context<'a, M> {
     /// The same with the doubt about the state at which the causes' signatures are taken, where
     /// that can make the difference.
     pub fn judged(&self, readings: &DVector<f64>, causes: &[Cause]) -> Remainder {
+        self.judged_by(readings, causes, DRAWS)
+    }
+
+    /// The same with the doubt by a number of draws of the state.
+    pub fn judged_by(&self, readings: &DVector<f64>, causes: &[Cause], draws: usize) -> Remainder {
         let plain = self.remainder(readings, causes);
         if causes.is_empty() || self.adequate(causes, &plain) {
             return plain;
@@ -146,7 +155,7 @@ impl<'a, M: FittedModel> Context<'a, M> {
         if far(&plain.residual) && far(&Doubt::of_open(&open).trusted(&plain.residual)) {
             return plain;
         }
-        let doubt = self.doubt(readings, causes, &basis, open);
+        let doubt = self.doubt(readings, (causes, &basis), open, draws);
         if doubt.weights.is_empty() {
             return plain;
         }

@@ -9,6 +9,8 @@
 //! each eigenvector of B Bᵀ with eigenvalue λ a part λ/(1 + λ) of every product is taken away. The
 //! same draws give what the noise of the state adds to the uncertainty of the causes' sizes.
 
+use std::sync::{Arc, OnceLock};
+
 use errsep_models::model::{Column, FittedModel};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::SeedableRng;
@@ -18,10 +20,15 @@ use rayon::prelude::*;
 use crate::diagnosis::attribution::context::{Cause, Context};
 
 /// Draws of the state.
-const DRAWS: usize = 128;
-/// Rounds of fitting a drawn state without the causes' change at that state: noise of the state
+pub(in crate::diagnosis) const DRAWS: usize = 128;
+/// Draws of the state behind the doubt about a rival: many rivals are judged, none of them told.
+pub(in crate::diagnosis) const FEW_DRAWS: usize = 32;
+/// Most rounds of fitting a drawn state without the causes' change at that state: noise of the state
 /// comes back by the change that is taken out, greatest where the causes hide the state.
 pub(in crate::diagnosis) const ROUNDS: usize = 4;
+/// Relative change of a draw by a further round at which no more are made: it is of the order of what
+/// 128 draws leave open of a standard deviation (6 %).
+const SETTLED: f64 = 0.03;
 /// Eigenvalues below this change no product by more than three hundredths.
 const LEAST: f64 = 0.03;
 /// Greatest number of directions.
@@ -66,74 +73,108 @@ impl Doubt {
     }
 }
 
+/// Draws of noise, the same for all causes at one state and law.
+pub(in crate::diagnosis) struct NoiseDraws {
+    /// As it stands in the readings, readings × draws.
+    in_readings: DMatrix<f64>,
+    /// Whitened and projected, likewise.
+    projected: DMatrix<f64>,
+    /// What smoothing may have taken away of the state, by draw.
+    away: Vec<Option<DMatrix<f64>>>,
+}
+
+/// Noise that is drawn once it is asked for.
+pub(in crate::diagnosis) type NoiseOnce = OnceLock<Arc<NoiseDraws>>;
+
 /// Draws of noise over readings that are free of causes.
 pub(in crate::diagnosis) struct StateDraws {
-    /// The noise, whitened and projected, readings × draws.
-    pub noise: DMatrix<f64>,
-    /// How the causes' change moves with the state that is fitted to it, likewise.
+    noise: Arc<NoiseDraws>,
+    /// How the causes' change moves with the state that is fitted to it, whitened and projected, readings ×
+    /// draws.
     pub moved: DMatrix<f64>,
-    /// Noise as it stands in the readings, and how the causes' change there moves with the state, as
-    /// read where the change is linear in it.
-    pub in_readings: [DMatrix<f64>; 2],
+    /// The same as it stands in the readings, with the state as read where the change is linear in it.
+    pub moved_as_read: DMatrix<f64>,
 }
 
 impl<M: FittedModel> Context<'_, M> {
-    /// Draws of the state; nothing where the causes' change does not depend on it.
-    pub fn state_draws(&self, readings: &DVector<f64>, causes: &[Cause]) -> Option<StateDraws> {
-        let (amplitudes, _) = self.amplitudes(readings, causes)?;
-        let changes = self.changes(readings, causes)?;
-        let clean = self.without(readings, causes, &changes);
-        let change_at = |state: &M, read: &M| {
-            let mut changed = DMatrix::zeros(readings.len(), causes.len());
-            let mut at = 0;
-            for k in 0..causes.len() {
-                for column in self.columns_at(k, (state, read), causes, &changes) {
-                    for (&row, value) in column.rows.iter().zip(&column.values) {
-                        changed[(row, k)] += amplitudes[at] * value;
-                    }
-                    at += 1;
-                }
-            }
-            changed
-        };
-        let fitted = self.model.refit_as_smooth(clean);
-        let base = change_at(&fitted, &fitted).column_sum();
-        let base_as_read = change_at(&fitted, &fitted.as_read()).column_sum();
+    /// The noise of all draws.
+    fn noise_draws(&self) -> Arc<NoiseDraws> {
         let drawn = |draw: u64| {
             let mut random = ChaCha8Rng::seed_from_u64(SEED);
             random.set_stream(draw);
             let noise = self.law.draw(self.model, &mut random);
             let other = self.law.draw(self.model, &mut random);
-            let noisy = readings + &noise;
-            let mut moved = changes.clone();
-            let mut as_read = moved.clone();
-            for _ in 0..ROUNDS {
-                let clean = self.without(&noisy, causes, &moved);
-                let fitted = self.model.refit_as_smooth(clean);
-                let read = fitted.as_read();
-                let state = fitted.roughened(&other);
-                moved = change_at(&state, &state);
-                as_read = change_at(&state, &read);
-            }
-            [
-                noise,
-                moved.column_sum() - &base,
-                as_read.column_sum() - &base_as_read,
-            ]
+            (noise, self.model.smoothed_away(&other))
         };
-        if drawn(0)[1].norm() <= 1e-9 * base.norm() {
-            return None;
+        let all = || {
+            let draws = (0..DRAWS as u64).into_par_iter().map(drawn);
+            let (noise, away): (Vec<DVector<f64>>, Vec<_>) = draws.unzip();
+            let in_readings = DMatrix::from_columns(&noise);
+            Arc::new(NoiseDraws {
+                projected: self.space.forward(in_readings.clone()).0,
+                in_readings,
+                away,
+            })
+        };
+        if let Some(known) = self.noise.get() {
+            return Arc::clone(known);
         }
-        let all: Vec<[DVector<f64>; 3]> = (0..DRAWS as u64).into_par_iter().map(drawn).collect();
-        let [noise, moved, as_read] = [0, 1, 2].map(|which| {
-            let own: Vec<DVector<f64>> = all.iter().map(|draw| draw[which].clone()).collect();
-            DMatrix::from_columns(&own)
-        });
+        // Not held locked meanwhile, as in `best`.
+        let drawn = all();
+        let _ = self.noise.set(Arc::clone(&drawn));
+        drawn
+    }
+
+    /// Draws of the state; nothing where the causes' change does not depend on it.
+    pub fn state_draws(&self, readings: &DVector<f64>, causes: &[Cause]) -> Option<StateDraws> {
+        let (moved, moved_as_read) = self.moved_states(readings, causes, DRAWS)?;
         Some(StateDraws {
             moved: self.space.forward(moved).0,
-            noise: self.space.forward(noise.clone()).0,
-            in_readings: [noise, as_read],
+            noise: self.noise_draws(),
+            moved_as_read,
         })
+    }
+
+    /// How the causes' change moves with the drawn states, as it stands in the readings, and the same with
+    /// the state as read where the change is linear in it: readings × draws.
+    fn moved_states(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+        draws: usize,
+    ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+        let (amplitudes, _) = self.amplitudes(readings, causes)?;
+        let changes = self.changes(readings, causes)?;
+        let noise = self.noise_draws();
+        let states = States {
+            context: self,
+            readings,
+            causes,
+            amplitudes: &amplitudes,
+            changes: &changes,
+            noise: &noise,
+        };
+        let fitted = self
+            .model
+            .refit_as_smooth(self.without(readings, causes, &changes));
+        let base = states.change_at((&fitted, &fitted)).column_sum();
+        let base_as_read = states.change_at((&fitted, &fitted.as_read())).column_sum();
+        let rounds = states.rounds(&base)?;
+        let all: Vec<[DVector<f64>; 2]> = (0..draws)
+            .into_par_iter()
+            .map(|draw| {
+                let (moved, as_read) = states.moved(draw, rounds);
+                [moved.column_sum() - &base, as_read - &base_as_read]
+            })
+            .collect();
+        let [moved, moved_as_read] = [0, 1].map(|which| {
+            let mut columns = DMatrix::zeros(readings.len(), draws);
+            for (mut column, draw) in columns.column_iter_mut().zip(&all) {
+                column.copy_from(&draw[which]);
+            }
+            columns
+        });
+        Some((moved, moved_as_read))
     }
 
     /// The signatures of one of the causes at a state, taken at the state as read where they are
@@ -179,24 +220,25 @@ impl<M: FittedModel> Context<'_, M> {
     pub fn doubt(
         &self,
         readings: &DVector<f64>,
-        causes: &[Cause],
-        basis: &DMatrix<f64>,
+        (causes, basis): (&[Cause], &DMatrix<f64>),
         open: DMatrix<f64>,
+        draws: usize,
     ) -> Doubt {
-        let Some(StateDraws { mut moved, .. }) = self.state_draws(readings, causes) else {
+        let Some((moved, _)) = self.moved_states(readings, causes, draws) else {
             return Doubt::of_open(&open);
         };
+        let mut moved = self.space.forward(moved).0;
         let along = basis.tr_mul(&moved);
         moved.gemm(-1.0, basis, &along, 1.0);
         if open.ncols() > 0 {
             let at = open.ncols();
-            let mut all = open.resize_horizontally(at + DRAWS, 0.0);
-            all.columns_mut(at, DRAWS)
-                .copy_from(&(moved / (DRAWS as f64).sqrt()));
+            let mut all = open.resize_horizontally(at + draws, 0.0);
+            all.columns_mut(at, draws)
+                .copy_from(&(moved / (draws as f64).sqrt()));
             return Doubt::of_open(&all);
         }
-        let eigen = SymmetricEigen::new(moved.tr_mul(&moved) / DRAWS as f64);
-        let mut order: Vec<usize> = (0..DRAWS)
+        let eigen = SymmetricEigen::new(moved.tr_mul(&moved) / draws as f64);
+        let mut order: Vec<usize> = (0..draws)
             .filter(|k| eigen.eigenvalues[*k] > LEAST)
             .collect();
         order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
@@ -207,10 +249,90 @@ impl<M: FittedModel> Context<'_, M> {
             let direction = &moved * eigen.eigenvectors.column(k);
             doubt
                 .directions
-                .push(direction / (value * DRAWS as f64).sqrt());
+                .push(direction / (value * draws as f64).sqrt());
             doubt.weights.push(value / (1.0 + value));
         }
         doubt
+    }
+}
+
+/// What drawn states are made of.
+struct States<'s, M: FittedModel> {
+    context: &'s Context<'s, M>,
+    readings: &'s DVector<f64>,
+    causes: &'s [Cause],
+    amplitudes: &'s DVector<f64>,
+    changes: &'s DMatrix<f64>,
+    noise: &'s NoiseDraws,
+}
+
+impl<M: FittedModel> States<'_, M> {
+    /// What each cause changes at a state, and at the state as read, readings × causes.
+    fn change_at(&self, states: (&M, &M)) -> DMatrix<f64> {
+        let mut changed = DMatrix::zeros(self.readings.len(), self.causes.len());
+        let mut at = 0;
+        for (k, mut changed) in changed.column_iter_mut().enumerate() {
+            let columns = self
+                .context
+                .columns_at(k, states, self.causes, self.changes);
+            for column in columns {
+                let amplitude = self.amplitudes[at];
+                at += 1;
+                for (&row, value) in column.rows.iter().zip(&column.values) {
+                    changed[row] += amplitude * value;
+                }
+            }
+        }
+        changed
+    }
+
+    /// The state fitted to noisy readings less a change, and the same with a draw of what its smoothing may
+    /// have taken away.
+    fn fitted(&self, draw: usize, noisy: &DVector<f64>, change: &DMatrix<f64>) -> (M, M) {
+        let clean = self.context.without(noisy, self.causes, change);
+        let fitted = self.context.model.refit_as_smooth(clean);
+        let state = match &self.noise.away[draw] {
+            Some(away) => fitted.clone().roughened(away),
+            None => fitted.clone(),
+        };
+        (fitted, state)
+    }
+
+    fn noisy(&self, draw: usize) -> DVector<f64> {
+        self.readings + self.noise.in_readings.column(draw)
+    }
+
+    /// The rounds that a draw needs until its change rests; nothing where it does not depend on the state.
+    fn rounds(&self, base: &DVector<f64>) -> Option<usize> {
+        let noisy = self.noisy(0);
+        let mut before: Option<DVector<f64>> = None;
+        let mut changes = self.changes.clone();
+        for round in 1..=ROUNDS {
+            let (_, state) = self.fitted(0, &noisy, &changes);
+            changes = self.change_at((&state, &state));
+            let moved = changes.column_sum() - base;
+            if moved.norm() <= 1e-9 * base.norm() {
+                return None;
+            }
+            if before.is_some_and(|b| (&moved - b).norm() <= SETTLED * moved.norm()) {
+                return Some(round - 1);
+            }
+            before = Some(moved);
+        }
+        Some(ROUNDS)
+    }
+
+    /// The causes' changes at the state that is drawn, and their sum as read.
+    fn moved(&self, draw: usize, rounds: usize) -> (DMatrix<f64>, DVector<f64>) {
+        let noisy = self.noisy(draw);
+        let mut changes = self.changes.clone();
+        for _ in 1..rounds {
+            let (_, state) = self.fitted(draw, &noisy, &changes);
+            changes = self.change_at((&state, &state));
+        }
+        let (fitted, state) = self.fitted(draw, &noisy, &changes);
+        let as_read = self.change_at((&state, &fitted.as_read())).column_sum();
+        (self.change_at((&state, &state)), as_read)
     }
 }
 
@@ -219,13 +341,23 @@ impl StateDraws {
     /// whitened, projected readings: the same noise is in readings and state, so it may also take
     /// away.
     pub fn added(&self, gain: &DMatrix<f64>) -> DMatrix<f64> {
-        let own = gain * &self.noise;
+        let own = gain * &self.noise.projected;
         let all = self.errors(gain);
         (&all * all.transpose() - &own * own.transpose()) / DRAWS as f64
     }
 
+    /// The noise as it stands in the readings, readings × draws.
+    pub fn noise_in_readings(&self) -> &DMatrix<f64> {
+        &self.noise.in_readings
+    }
+
+    /// The same whitened and projected.
+    pub fn projected_noise(&self) -> &DMatrix<f64> {
+        &self.noise.projected
+    }
+
     /// The errors of such estimates, estimates × draws.
     pub fn errors(&self, gain: &DMatrix<f64>) -> DMatrix<f64> {
-        gain * (&self.noise - &self.moved)
+        gain * (&self.noise.projected - &self.moved)
     }
 }

@@ -84,10 +84,17 @@ impl Components {
             return;
         }
         let mut state = self.correlated.sqrt() * normal();
+        // Of the last spacing, as most are equal.
+        let (mut known, mut decay, mut fresh) = (f64::NAN, 0.0, 0.0);
         for (k, value) in noise.iter_mut().enumerate() {
             if k > 0 {
-                let decay = (-(positions[k] - positions[k - 1]).abs() / self.length).exp();
-                state = decay * state + (self.correlated * (1.0 - decay * decay)).sqrt() * normal();
+                let spacing = (positions[k] - positions[k - 1]).abs();
+                if spacing != known {
+                    known = spacing;
+                    decay = (-spacing / self.length).exp();
+                    fresh = (self.correlated * (1.0 - decay * decay)).sqrt();
+                }
+                state = decay * state + fresh * normal();
             }
             *value = shift + state + white * normal();
         }

@@ -7,6 +7,7 @@ use errsep_models::model::FittedModel;
 
 use crate::diagnosis::attribution::confidence::possible;
 use crate::diagnosis::attribution::context::{Cause, Context};
+use crate::diagnosis::attribution::doubt::FEW_DRAWS;
 use crate::diagnosis::attribution::examined::examined;
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::null::rows_of;
@@ -80,7 +81,7 @@ fn is_first<M: FittedModel>(
         .collect();
     let passes = |cause: &Cause| {
         let alone = std::slice::from_ref(cause);
-        context.adequate(alone, &context.judged(&readings, alone))
+        context.adequate(alone, &context.judged_by(&readings, alone, FEW_DRAWS))
     };
     let of_group = |cause: &Cause| name.members.contains(&cause.effect);
     let others: Vec<bool> = refined

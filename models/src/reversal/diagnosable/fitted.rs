@@ -178,11 +178,17 @@ impl FittedModel for Linearised {
         fitted
     }
 
-    fn roughened(mut self, noise: &DVector<f64>) -> Self {
+    fn smoothed_away(&self, noise: &DVector<f64>) -> Option<DMatrix<f64>> {
         let means = self.channel_means(noise, None);
-        let drawn = self.arrangement.forms(&means, self.positions.len());
-        for (form, noise) in self.forms.iter_mut().zip(drawn.iter().flatten()) {
-            *form = self.smoother.roughened(form, noise);
+        let drawn = self.arrangement.forms(&means, self.positions.len())?;
+        let away = self.forms.iter().zip(&drawn);
+        let away = away.map(|(form, noise)| self.smoother.smoothed_away(form, noise));
+        Some(DMatrix::from_columns(&away.collect::<Vec<_>>()))
+    }
+
+    fn roughened(mut self, away: &DMatrix<f64>) -> Self {
+        for (form, away) in self.forms.iter_mut().zip(away.column_iter()) {
+            *form = self.smoother.roughened(form, &away.clone_owned());
         }
         self.settle();
         self

@@ -518,8 +518,11 @@ impl Linearised {
 
     fn find_span(&self) -> f64 {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for place in self.record.places.iter() {
-            let value = self.smooth[place.cell] - self.mid_reading(place);
+        // Every trace has a reading in each of its channel's cells.
+        let n = self.positions.len();
+        let cells = self.smooth.chunks(n).zip(&self.mid_readings).enumerate();
+        let read = cells.filter(|(channel, _)| self.trace_channels.contains(channel));
+        for value in read.flat_map(|(_, (own, middle))| own.iter().map(move |v| v - middle)) {
             low = low.min(value);
             high = high.max(value);
         }

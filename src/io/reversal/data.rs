@@ -292,8 +292,11 @@ fn read_row(row: Row<'_>, columns: &Columns, data: &mut Part) -> Result<(), Mess
 }
 
 pub(super) fn channel_of(row: Row<'_>, column: &Column) -> Result<Channel, Message> {
-    let text = row.text(column);
     let names = Channel::ALL.map(Channel::name);
+    if let Some(index) = row.one_of(column, &names) {
+        return Ok(Channel::ALL[index]);
+    }
+    let text = row.text(column);
     let found = Channel::from_name(text);
     let found = found.or_else(|| Channel::from_name(&text.to_ascii_uppercase()));
     found.ok_or_else(|| {
@@ -311,12 +314,15 @@ pub(super) fn channel_of(row: Row<'_>, column: &Column) -> Result<Channel, Messa
 }
 
 pub(super) fn direction(row: Row<'_>, column: &Column) -> Result<Direction, Message> {
-    match row.text(column) {
-        "forward" => Ok(Direction::Forward),
-        "backward" => Ok(Direction::Backward),
-        other => Err(row
-            .error(column, format!("unknown direction `{other}`"))
-            .remedy("write forward (towards greater x) or backward")),
+    match row.one_of(column, &["forward", "backward"]) {
+        Some(0) => Ok(Direction::Forward),
+        Some(_) => Ok(Direction::Backward),
+        None => {
+            let other = row.text(column);
+            Err(row
+                .error(column, format!("unknown direction `{other}`"))
+                .remedy("write forward (towards greater x) or backward"))
+        }
     }
 }
 

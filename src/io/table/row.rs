@@ -115,6 +115,12 @@ impl<'a> Row<'a> {
         !is_bare(self.bytes(index)) && self.field(index).is_empty()
     }
 
+    /// Which of these names, without blanks, stands in a field.
+    pub fn one_of(self, column: &Column, names: &[&str]) -> Option<usize> {
+        let bytes = self.bytes(column.index()).trim_ascii();
+        names.iter().position(|name| name.as_bytes() == bytes)
+    }
+
     /// Whether a field is empty.
     pub fn is_empty(self, column: &Column) -> bool {
         self.is_blank(column.index())

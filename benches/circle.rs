@@ -5,7 +5,7 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use errsep_models::circle::{
     AlgebraicFit, CircleSimulation, Point, Reference, algebraic, circularity, orthogonal_fit,
-    reference_zone, simulate,
+    orthogonal_fits, reference_zone, simulate,
 };
 use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem, SolveOutcome};
 use std::hint::black_box;
@@ -40,6 +40,48 @@ fn fits(c: &mut Criterion) {
             );
         }
     }
+    group.finish();
+}
+
+/// Fits of many parts by one call, on one thread and on two, beside one call a part.
+fn batches(c: &mut Criterion) {
+    let of = |seed| {
+        let what = CircleSimulation {
+            count: 36,
+            noise_um: 20.0,
+            ..CircleSimulation::default()
+        };
+        simulate(&what, seed).unwrap_or_default()
+    };
+    let sets: Vec<Vec<Point>> = (0..4096).map(of).collect();
+    let mut group = c.benchmark_group("circles of 36 points");
+    group.throughput(Throughput::Elements(sets.len() as u64));
+    group.sample_size(10);
+    group.bench_function("one by one", |b| {
+        b.iter(|| {
+            black_box(&sets)
+                .iter()
+                .filter(|s| orthogonal_fit(s, None).is_ok())
+                .count()
+        });
+    });
+    for threads in [1, 2] {
+        let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(threads).build() else {
+            continue;
+        };
+        group.bench_function(format!("batch, threads {threads}"), |b| {
+            b.iter(|| pool.install(|| orthogonal_fits(black_box(&sets), None)));
+        });
+    }
+    group.bench_function("all four references", |b| {
+        b.iter(|| {
+            let found = black_box(&sets).iter().map(|set| {
+                let fit = algebraic(set, AlgebraicFit::Hyper)?;
+                circularity(set, fit)
+            });
+            found.filter(Result::is_ok).count()
+        });
+    });
     group.finish();
 }
 
@@ -106,5 +148,5 @@ fn least_area(points: &[Point]) -> Option<f64> {
     }
 }
 
-criterion_group!(benches, fits, reference_circles);
+criterion_group!(benches, fits, batches, reference_circles);
 criterion_main!(benches);

@@ -1,5 +1,6 @@
 //! How many simulated parts a second: the 21-error model at 36 points, on one thread and on two,
-//! beside the plain loop that evaluates function and kinematics anew for every draw.
+//! beside draws component by component, and the plain loop that evaluates function and kinematics anew
+//! for every draw.
 
 use std::hint::black_box;
 
@@ -68,6 +69,18 @@ fn plain_loop(machine: &Machine, circle: &Circle, trials: usize) -> f64 {
     sum
 }
 
+/// Draws component by component, as a single part is drawn: the earlier way.
+fn one_by_one(sampler: &Sampler, circle: &Circle, trials: usize) -> f64 {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut deviations = vec![Vector3::zeros(); circle.points().len()];
+    let mut sum = 0.0;
+    for _ in 0..trials {
+        sampler.draw(&mut rng, &mut deviations);
+        sum += circularity_of(circle, &deviations);
+    }
+    sum
+}
+
 fn bench(c: &mut Criterion) {
     let machine = machine();
     let centre = Position::new(75.0, 75.0, 0.0);
@@ -82,6 +95,9 @@ fn bench(c: &mut Criterion) {
     for independence in [Independence::Points, Independence::Scatter] {
         let sampler = Sampler::new(&machine, circle.points(), independence, Prediction::Future)
             .expect("points");
+        group.bench_function(format!("one by one, {independence:?}, threads 1"), |b| {
+            b.iter(|| one_by_one(black_box(&sampler), &circle, TRIALS));
+        });
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new()
                 .num_threads(threads)

@@ -13,6 +13,16 @@ pub enum LineEnd {
     Cr,
 }
 
+impl LineEnd {
+    /// The byte after which the next line begins.
+    pub(super) const fn last_byte(self) -> u8 {
+        match self {
+            Self::Cr => b'\r',
+            Self::Lf | Self::CrLf => b'\n',
+        }
+    }
+}
+
 /// What separates the fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Delimiter {
@@ -57,10 +67,15 @@ pub struct Dialect {
     pub delimiter: Delimiter,
     /// Decimal mark.
     pub decimal: Decimal,
+    /// It is no text but columns in a Parquet file; the rest is how its rows are written as text.
+    pub is_parquet: bool,
 }
 
 impl fmt::Display for Dialect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_parquet {
+            return f.write_str("Parquet");
+        }
         let delimiter = match self.delimiter {
             Delimiter::Comma => "comma",
             Delimiter::Semicolon => "semicolon",
@@ -147,7 +162,20 @@ impl Dialect {
             line_end,
             delimiter,
             decimal,
+            is_parquet: false,
         })
+    }
+
+    /// That of a Parquet file.
+    #[cfg(feature = "parquet")]
+    pub(super) const fn parquet() -> Self {
+        Self {
+            byte_order_mark: false,
+            line_end: LineEnd::Lf,
+            delimiter: Delimiter::Comma,
+            decimal: Decimal::Point,
+            is_parquet: true,
+        }
     }
 }
 

@@ -206,8 +206,12 @@ impl Pipe {
     }
 }
 
-impl Read for Source {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+impl Source {
+    /// Reads on, which any thread may do; that the end was met is recorded by [`Self::note_end`] alone.
+    ///
+    /// # Errors
+    /// The system's own.
+    pub(super) fn read_apart(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let n = match &mut self.bytes {
             Bytes::File(file) => file.read(buffer)?,
             Bytes::Memory(bytes) => bytes.read(buffer)?,
@@ -218,19 +222,47 @@ impl Read for Source {
                 n
             }
         };
-        if n > 0 {
-            if let Some(hash) = &mut self.hash {
-                hash.update(&buffer[..n]);
-            }
-        } else if !buffer.is_empty()
-            && let Some(hash) = self.hash.take()
+        if n > 0
+            && let Some(hash) = &mut self.hash
         {
+            hash.update(&buffer[..n]);
+        }
+        Ok(n)
+    }
+
+    /// Leaves the digest in the record of this thread, once everything has been read.
+    pub(super) fn note_end(&mut self) {
+        if let Some(hash) = self.hash.take() {
             RECORD.with_borrow_mut(|record| {
                 if let Some(record) = record {
                     let read = (self.path.clone(), hexadecimal(hash));
                     record.digests.push(read);
                 }
             });
+        }
+    }
+
+    /// Whether its digest is wanted.
+    #[cfg(feature = "parquet")]
+    pub(super) fn is_hashed(&self) -> bool {
+        self.hash.is_some()
+    }
+
+    /// The bytes of a file or of what is held in memory; unknown of a pipe.
+    pub(super) fn length(&self) -> Option<u64> {
+        match &self.bytes {
+            Bytes::File(file) => file.metadata().ok().map(|m| m.len()),
+            Bytes::Memory(bytes) => Some(bytes.get_ref().len() as u64),
+            Bytes::Pipe(..) => None,
+        }
+    }
+}
+
+impl Read for Source {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let n = self.read_apart(buffer)?;
+        if n == 0 && !buffer.is_empty() {
+            self.note_end();
         }
         Ok(n)
     }

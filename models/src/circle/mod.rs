@@ -5,6 +5,7 @@
 //! Positions are in mm; form deviations are in µm and carry `_um` in their names.
 
 mod algebraic;
+mod batch;
 mod bisector;
 mod circumscribed;
 mod contacts;
@@ -20,6 +21,7 @@ mod simulate;
 mod zone;
 
 pub use algebraic::{AlgebraicFit, algebraic};
+pub use batch::{FittedCircle, orthogonal_fits};
 pub use diagnosable::CirclePoints;
 pub use nistir::{NistirEnding, NistirFit, nistir_fit};
 pub use orthogonal::{CircleFit, OrthogonalCircle, orthogonal_fit};

@@ -14,6 +14,7 @@ mod chain;
 mod component;
 mod effects;
 mod function;
+mod joint_draws;
 mod kinematics;
 mod measured_parts;
 mod model;

@@ -11,19 +11,20 @@ use nalgebra::{DMatrix, Vector3};
 use rand::Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 
+use super::joint_draws::{Joint, Part};
 use super::model::coordinate;
 use super::{Independence, Kind, Machine, MachineError, Position, Prediction};
 use crate::uncertainty::{DegreesOfFreedom, Trials, simulate};
 
 /// A component as the sampler needs it.
 #[derive(Debug, Clone)]
-struct Influence {
+pub(super) struct Influence {
     /// Lower factor of the covariance of the coefficients.
     factor: DMatrix<f64>,
     /// Powers at each point, point after point.
     powers: Vec<f64>,
     /// Motion of each point, um per unit of the component.
-    motions: Vec<Vector3<f64>>,
+    pub(super) motions: Vec<Vector3<f64>>,
     /// Standard deviation at each point when the points are independent.
     own: Vec<f64>,
     /// Standard deviation of the scatter.
@@ -32,7 +33,7 @@ struct Influence {
     common_scatter: bool,
     /// Degrees of freedom ν of its standard deviations with the distribution of χ²_ν; `None` when they
     /// are infinite.
-    degrees: Option<(f64, ChiSquared<f64>)>,
+    pub(super) degrees: Option<(f64, ChiSquared<f64>)>,
 }
 
 /// Draws the deviations of a set of points. Everything that does not change from draw to draw is
@@ -132,6 +133,17 @@ impl Sampler {
         self.means.len()
     }
 
+    /// What many draws share; `None` where coordinates are drawn one by one.
+    fn joint(&self) -> Option<Joint<'_>> {
+        let part: fn(&Influence) -> Part<'_> = match self.independence {
+            Independence::Coordinates => return None,
+            Independence::Points => Influence::by_point,
+            Independence::Scatter => Influence::by_coefficient,
+        };
+        let parts = self.influences.iter().map(part).collect();
+        Some(Joint::new(&self.means, parts))
+    }
+
     /// Draws the deviation of every point, um. Points beyond the slice are left out.
     ///
     /// [`Independence::Coordinates`] draws each coordinate from a normal distribution, as the report
@@ -167,10 +179,45 @@ impl Sampler {
 
 impl Influence {
     /// √(ν/χ²_ν), which makes a normal deviate one of Student's; 1 for infinite degrees of freedom.
-    fn widening(&self, rng: &mut impl Rng) -> f64 {
+    pub(super) fn widening(&self, rng: &mut impl Rng) -> f64 {
         self.degrees.as_ref().map_or(1.0, |(number, squares)| {
             (number / squares.sample(rng)).sqrt()
         })
+    }
+
+    /// Every point is drawn for itself.
+    fn by_point(&self) -> Part<'_> {
+        Part {
+            influence: self,
+            own: self.own.iter().map(|u| u * u).collect(),
+            shared: Vec::new(),
+        }
+    }
+
+    /// Coefficients are drawn for all points, the scatter for each.
+    fn by_coefficient(&self) -> Part<'_> {
+        let terms = self.factor.nrows();
+        let by_deviate = |k: usize| {
+            let motions = self.motions.iter().enumerate();
+            let along = motions.map(|(i, motion)| {
+                let powers = &self.powers[i * terms..(i + 1) * terms];
+                let value = (k..terms).map(|j| self.factor[(j, k)] * powers[j]);
+                motion * value.sum::<f64>()
+            });
+            along.collect::<Vec<_>>()
+        };
+        let mut shared: Vec<_> = (0..terms).map(by_deviate).collect();
+        let mut own = Vec::new();
+        if self.common_scatter {
+            shared.push(self.motions.iter().map(|m| m * self.scatter).collect());
+        } else if self.scatter > 0.0 {
+            own = vec![self.scatter * self.scatter; self.motions.len()];
+        }
+        Part {
+            influence: self,
+            own,
+            shared,
+        }
     }
 
     fn draw_common(&self, rng: &mut impl Rng, deviations: &mut [Vector3<f64>]) {
@@ -203,7 +250,7 @@ impl Influence {
 /// Coefficients a sampled component can have.
 const MOST_TERMS: usize = 32;
 
-fn normal(rng: &mut impl Rng) -> f64 {
+pub(super) fn normal(rng: &mut impl Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
@@ -251,14 +298,26 @@ pub fn sample_features(
     seed: u64,
     features: impl Fn(&[Vector3<f64>], &mut [f64]) + Sync,
 ) -> Result<Trials, MachineError> {
-    let room = || vec![Vector3::zeros(); sampler.points()];
+    let zeros = || vec![Vector3::zeros(); sampler.points()];
+    let Some(joint) = sampler.joint() else {
+        return Ok(simulate(
+            trials,
+            results,
+            seed,
+            zeros,
+            |rng, deviations, out| {
+                sampler.draw(rng, deviations);
+                features(deviations, out);
+            },
+        )?);
+    };
     Ok(simulate(
         trials,
         results,
         seed,
-        room,
-        |rng, deviations, out| {
-            sampler.draw(rng, deviations);
+        || (joint.room(), zeros()),
+        |rng, (room, deviations), out| {
+            joint.draw(rng, room, deviations);
             features(deviations, out);
         },
     )?)

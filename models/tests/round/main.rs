@@ -1,5 +1,6 @@
 //! Circles, Fourier tests and the four-sensor system.
 
+mod circle_batch;
 mod circle_exact;
 mod circle_fit;
 mod circle_zones;

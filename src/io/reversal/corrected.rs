@@ -32,9 +32,7 @@ pub fn corrected(
                 vec![(reading, scales[channel_of(row, channel)?.index()])]
             }
             Readings::Wide(wide) => {
-                let read = wide
-                    .iter()
-                    .filter(|(_, column)| !row.text(column).is_empty());
+                let read = wide.iter().filter(|(_, column)| !row.is_empty(column));
                 read.map(|(channel, column)| (column, scales[channel.index()]))
                     .collect()
             }
@@ -57,7 +55,7 @@ pub fn corrected_design(
     let wide = wide_columns(&table, setup);
     if !wide.is_empty() {
         return rewritten(table, path, dialect, changes, comment, |row| {
-            let read = wide.iter().filter(|(_, c, _)| !row.text(c).is_empty());
+            let read = wide.iter().filter(|(_, c, _)| !row.is_empty(c));
             Ok(read.map(|(_, column, in_um)| (column, *in_um)).collect())
         });
     }
@@ -95,7 +93,7 @@ fn rewritten<'c>(
             values.push((column.index(), row.number(column)? - change / unit));
         }
         let delimiter = dialect.delimiter.byte();
-        text += &with_values(row.line_text(), delimiter, &values, dialect.decimal);
+        text += &with_values(&row.line_text(), delimiter, &values, dialect.decimal);
         text += end;
     }
     if left.next().is_some() {

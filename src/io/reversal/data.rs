@@ -124,13 +124,27 @@ pub(super) fn read_table(mut table: TableReader) -> Result<ReversalData, Message
     };
     let mut lines: Vec<u32> = Vec::new();
     let mut rows = 0_usize;
-    while let Some(row) = table.next_row()? {
-        rows += 1;
-        let before = data.observations.readings.len();
-        read_row(row, &columns, &mut data)?;
-        let line = u32::try_from(row.line()).unwrap_or(u32::MAX);
-        lines.extend((before..data.observations.readings.len()).map(|_| line));
-    }
+    let readings = &mut data.observations.readings;
+    table.gather(
+        |row, part: &mut Part| part.add(row, &columns),
+        |part, whole_to_given| {
+            rows += part.rows;
+            data.gaps += part.gaps;
+            for (first, found) in data.first.iter_mut().zip(part.first) {
+                *first = first.take().or(found);
+            }
+            if readings.capacity() < readings.len() + part.readings.len() {
+                // Room for the whole file at once: what grows step by step is copied and held twice.
+                let read = readings.len() + part.readings.len();
+                let whole = whole_to_given.unwrap_or(2.0).max(1.0) * 1.02;
+                let more = ((whole * read as f64) as usize).max(read + read / 8) - readings.len();
+                readings.reserve_exact(more);
+                lines.reserve_exact(more);
+            }
+            readings.extend(part.readings);
+            lines.extend(part.lines);
+        },
+    )?;
     if rows == 0 {
         return Err(table.no_rows());
     }
@@ -214,7 +228,28 @@ pub(super) fn find_columns(table: &TableReader) -> Result<Columns, Message> {
     })
 }
 
-fn read_row(row: Row<'_>, columns: &Columns, data: &mut ReversalData) -> Result<(), Message> {
+/// What is read from some rows that follow each other.
+#[derive(Default)]
+struct Part {
+    readings: Vec<Reading>,
+    /// The line of each reading.
+    lines: Vec<u32>,
+    rows: usize,
+    gaps: usize,
+    first: [Option<Place>; 4],
+}
+
+impl Part {
+    fn add(&mut self, row: Row<'_>, columns: &Columns) -> Result<(), Message> {
+        self.rows += 1;
+        read_row(row, columns, self)?;
+        let line = u32::try_from(row.line()).unwrap_or(u32::MAX);
+        self.lines.resize(self.readings.len(), line);
+        Ok(())
+    }
+}
+
+fn read_row(row: Row<'_>, columns: &Columns, data: &mut Part) -> Result<(), Message> {
     let x = row.number(&columns.x)? * columns.scales.x_mm;
     let repeat = match &columns.repeat {
         Some(column) => row.count(column)?,
@@ -231,7 +266,7 @@ fn read_row(row: Row<'_>, columns: &Columns, data: &mut ReversalData) -> Result<
     let mut add = |channel: Channel, column: &Column| -> Result<(), Message> {
         let value = row.number(column)? * columns.scales.reading_um[channel.index()];
         data.first[channel.index()].get_or_insert_with(|| row.place(column));
-        data.observations.readings.push(Reading {
+        data.readings.push(Reading {
             channel,
             repeat,
             direction,
@@ -245,7 +280,7 @@ fn read_row(row: Row<'_>, columns: &Columns, data: &mut ReversalData) -> Result<
         Readings::Tidy { channel, reading } => add(channel_of(row, channel)?, reading),
         Readings::Wide(channels) => {
             for (channel, column) in channels {
-                if row.text(column).is_empty() {
+                if row.is_empty(column) {
                     data.gaps += 1;
                 } else {
                     add(*channel, column)?;
@@ -257,8 +292,11 @@ fn read_row(row: Row<'_>, columns: &Columns, data: &mut ReversalData) -> Result<
 }
 
 pub(super) fn channel_of(row: Row<'_>, column: &Column) -> Result<Channel, Message> {
-    let text = row.text(column);
     let names = Channel::ALL.map(Channel::name);
+    if let Some(index) = row.one_of(column, &names) {
+        return Ok(Channel::ALL[index]);
+    }
+    let text = row.text(column);
     let found = Channel::from_name(text);
     let found = found.or_else(|| Channel::from_name(&text.to_ascii_uppercase()));
     found.ok_or_else(|| {
@@ -276,12 +314,15 @@ pub(super) fn channel_of(row: Row<'_>, column: &Column) -> Result<Channel, Messa
 }
 
 pub(super) fn direction(row: Row<'_>, column: &Column) -> Result<Direction, Message> {
-    match row.text(column) {
-        "forward" => Ok(Direction::Forward),
-        "backward" => Ok(Direction::Backward),
-        other => Err(row
-            .error(column, format!("unknown direction `{other}`"))
-            .remedy("write forward (towards greater x) or backward")),
+    match row.one_of(column, &["forward", "backward"]) {
+        Some(0) => Ok(Direction::Forward),
+        Some(_) => Ok(Direction::Backward),
+        None => {
+            let other = row.text(column);
+            Err(row
+                .error(column, format!("unknown direction `{other}`"))
+                .remedy("write forward (towards greater x) or backward"))
+        }
     }
 }
 

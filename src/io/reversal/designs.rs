@@ -209,7 +209,7 @@ fn read_design(mut table: TableReader, setup: &ReversalSetup) -> Result<DesignDa
             }
             Fields::Wide(columns) => {
                 for (name, column, in_um) in columns {
-                    if row.text(column).is_empty() {
+                    if row.is_empty(column) {
                         gaps += 1;
                     } else {
                         add(

@@ -1,47 +1,60 @@
 //! Reading a table row by row: any dialect, any length, every error with its line and column.
 //!
-//! Lines are read here and fields split by `csv-core`, so that the line at hand, its number and the
-//! place of every field are known whatever comments and blank lines came before. Memory is one line.
+//! The file is read in chunks of whole lines (`blocks.rs`). Where a chunk is plain text, as nearly all are, one
+//! look at its bytes finds the ends of all its fields (`chunk.rs`); quotes and other alphabets are split line by
+//! line by `csv-core`. The line at hand, its number and the place of every field are known whatever comments and
+//! blank lines came before. Rows come one after the other (`next_row`), or several chunks are worked at at once
+//! while the next ones are read and hashed (`gather.rs`). Memory is that of some chunks.
 
+mod blocks;
+mod chunk;
 mod column;
-mod lines;
+mod gather;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod row;
+mod sheet;
 mod trouble;
 
 use std::cell::Cell;
-use std::io::{BufRead, BufReader, Cursor, Read};
-use std::path::{Path, PathBuf};
+use std::io::Read;
+use std::path::Path;
 
 use super::columns::ColumnMap;
-use super::dialect::{BYTE_ORDER_MARK, Decimal, Delimiter, Dialect, NotATable};
+use super::dialect::{BYTE_ORDER_MARK, Decimal, Dialect, NotATable};
 use super::message::{Message, Place, list, nearest};
 use super::source::Source;
+use blocks::Blocks;
+use chunk::{Chunk, Walk, complete};
 pub use column::Column;
 use column::Heading;
 pub(super) use column::Unit;
 pub use row::Row;
-use trouble::{cannot_read, count, not_a_table, place_of_field};
+use sheet::Sheet;
+use trouble::{cannot_read, not_a_table};
 
 /// What is read ahead to detect the dialect, in bytes.
 const HEAD: u64 = 1 << 16;
 
 /// A table being read, row by row.
 pub struct TableReader {
-    path: PathBuf,
-    source: Box<dyn BufRead + Send>,
-    dialect: Dialect,
+    sheet: Sheet,
     decimal: Cell<Decimal>,
-    splitter: csv_core::Reader,
-    line: Vec<u8>,
-    line_number: usize,
-    fields: Vec<u8>,
-    ends: Vec<usize>,
-    field_count: usize,
-    names: Vec<String>,
-    headings: Vec<Heading>,
-    map: ColumnMap,
-    header: String,
-    header_number: usize,
+    rows: Rows,
+}
+
+/// Where rows come from.
+enum Rows {
+    Text(Box<Text>),
+    #[cfg(feature = "parquet")]
+    Parquet(Box<parquet::Columns>),
+}
+
+/// A text in chunks, and the walk through the one at hand.
+struct Text {
+    blocks: Blocks,
+    chunk: Chunk,
+    walk: Walk,
 }
 
 impl TableReader {
@@ -50,6 +63,12 @@ impl TableReader {
     /// # Errors
     /// A file that cannot be read, is empty, is no text, or whose first line does not name columns.
     pub fn open(path: &Path) -> Result<Self, Message> {
+        if path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("parquet"))
+        {
+            return Self::open_parquet(path);
+        }
         let unreadable = |e: std::io::Error| cannot_read(path, &e);
         let mut file = Source::open(path).map_err(unreadable)?;
         let mut head = Vec::new();
@@ -59,31 +78,58 @@ impl TableReader {
             .map_err(unreadable)?;
         let whole = (head.len() as u64) < HEAD;
         let dialect = Dialect::detect(&head, whole).map_err(|no| not_a_table(path, no))?;
-        let mut start = Cursor::new(head);
         if dialect.byte_order_mark {
-            start.set_position(BYTE_ORDER_MARK.len() as u64);
+            head.drain(..BYTE_ORDER_MARK.len());
         }
         let mut table = Self {
-            path: path.to_owned(),
-            source: Box::new(BufReader::with_capacity(1 << 16, start.chain(file))),
-            dialect,
+            sheet: Sheet {
+                path: path.to_owned(),
+                dialect,
+                names: Vec::new(),
+                headings: Vec::new(),
+                map: ColumnMap::default(),
+                header: String::new(),
+                header_number: 0,
+            },
             decimal: Cell::new(dialect.decimal),
-            splitter: csv_core::ReaderBuilder::new()
-                .delimiter(dialect.delimiter.byte())
-                .build(),
-            line: Vec::new(),
-            line_number: 0,
-            fields: Vec::new(),
-            ends: Vec::new(),
-            field_count: 0,
-            names: Vec::new(),
-            headings: Vec::new(),
-            map: ColumnMap::default(),
-            header: String::new(),
-            header_number: 0,
+            rows: Rows::Text(Box::new(Text {
+                blocks: Blocks::new(file, head, dialect.line_end.last_byte()),
+                chunk: Chunk::default(),
+                walk: Walk::default(),
+            })),
         };
         table.read_header()?;
         Ok(table)
+    }
+
+    #[cfg(feature = "parquet")]
+    fn open_parquet(path: &Path) -> Result<Self, Message> {
+        let (columns, names) = parquet::Columns::open(path)?;
+        let dialect = Dialect::parquet();
+        let sheet = Sheet {
+            path: path.to_owned(),
+            dialect,
+            headings: names.iter().map(|name| Heading::of(name)).collect(),
+            map: ColumnMap::default(),
+            header: names.join(","),
+            header_number: 0,
+            names,
+        };
+        Ok(Self {
+            sheet,
+            decimal: Cell::new(dialect.decimal),
+            rows: Rows::Parquet(Box::new(columns)),
+        })
+    }
+
+    #[cfg(not(feature = "parquet"))]
+    fn open_parquet(path: &Path) -> Result<Self, Message> {
+        Err(Message::bad_input("this errsep was built without Parquet")
+            .in_file(path)
+            .remedy(
+                "give the readings as CSV; or build errsep with it: \
+                     cargo install --path . --features parquet",
+            ))
     }
 
     /// The same where columns have other names and units than the documentation gives them: from here on
@@ -100,7 +146,7 @@ impl TableReader {
             name: String::new(),
             unit: None,
         };
-        let mut headings = vec![not_read; table.names.len()];
+        let mut headings = vec![not_read; table.sheet.names.len()];
         for entry in map.entries() {
             let column = table.column(&entry.column)?;
             let index = column.index();
@@ -114,11 +160,11 @@ impl TableReader {
             }
             headings[index] = Heading {
                 name: entry.role.clone(),
-                unit: entry.unit.or(table.headings[index].unit),
+                unit: entry.unit.or(table.sheet.headings[index].unit),
             };
         }
-        table.headings = headings;
-        table.map = map.clone();
+        table.sheet.headings = headings;
+        table.sheet.map = map.clone();
         Ok(table)
     }
 
@@ -130,11 +176,10 @@ impl TableReader {
     }
 
     fn read_header(&mut self) -> Result<(), Message> {
-        if !self.next_line()? {
-            return Err(not_a_table(&self.path, NotATable::Empty));
-        }
-        let row = Row { table: self };
-        let mut names = (0..self.field_count)
+        let Some(row) = self.next_line()? else {
+            return Err(not_a_table(self.path(), NotATable::Empty));
+        };
+        let mut names = (0..row.field_count())
             .map(|i| row.field(i).to_owned())
             .collect::<Vec<_>>();
         while names.len() > 1 && names.last().is_some_and(String::is_empty) {
@@ -163,51 +208,60 @@ impl TableReader {
                     .remedy("keep one of the two, or rename one"));
             }
         }
-        self.header = String::from_utf8_lossy(&self.line).into_owned();
-        self.header_number = self.line_number;
-        self.headings = names.iter().map(|name| Heading::of(name)).collect();
-        self.names = names;
+        let (header, number) = (row.line_text().into_owned(), row.line());
+        self.sheet.header = header;
+        self.sheet.header_number = number;
+        self.sheet.headings = names.iter().map(|name| Heading::of(name)).collect();
+        self.sheet.names = names;
         Ok(())
     }
 
     /// The file.
     pub fn path(&self) -> &Path {
-        &self.path
+        &self.sheet.path
     }
 
     /// The line that names the columns, as it stands in the file.
     pub fn header(&self) -> &str {
-        &self.header
+        &self.sheet.header
     }
 
     /// How the file is written, as far as it has been read.
     pub fn dialect(&self) -> Dialect {
         Dialect {
             decimal: self.decimal.get(),
-            ..self.dialect
+            ..self.sheet.dialect
         }
     }
 
     /// The names of the columns, in the order of the file.
     pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.names.iter().map(String::as_str)
+        self.sheet.names.iter().map(String::as_str)
     }
 
     /// What the columns hold: their names without the units that some of them carry, or their roles; empty
     /// for columns that are not read.
     pub fn bare_names(&self) -> impl Iterator<Item = &str> {
-        self.headings.iter().map(|heading| heading.name.as_str())
+        self.sheet
+            .headings
+            .iter()
+            .map(|heading| heading.name.as_str())
     }
 
     /// A column that may be absent: one of this name, or of this name with a unit, `x (mm)`, `x [mm]` or
     /// `x_mm`.
     pub fn optional(&self, name: &str) -> Option<Column> {
         let as_written = self
+            .sheet
             .names
             .iter()
-            .position(|n| n == name && self.map.is_empty());
+            .position(|n| n == name && self.sheet.map.is_empty());
         let index = as_written.or_else(|| self.bare_names().position(|n| n == name))?;
-        Some(Column::new(index, name, self.headings.get(index)?.unit))
+        Some(Column::new(
+            index,
+            name,
+            self.sheet.headings.get(index)?.unit,
+        ))
     }
 
     /// A column that must be there.
@@ -217,7 +271,7 @@ impl TableReader {
     pub fn column(&self, name: &str) -> Result<Column, Message> {
         self.optional(name).ok_or_else(|| {
             let found = self.names().collect::<Vec<_>>();
-            if !self.map.is_empty() {
+            if !self.sheet.map.is_empty() {
                 return self
                     .in_header(0, format!("no column is given for `{name}`"))
                     .remedy(format!(
@@ -242,9 +296,9 @@ impl TableReader {
     /// A column that is none of `known`; the message names the nearest that is. Where columns were given
     /// roles: a role that is none of `known`.
     pub fn only(&self, known: &[&str]) -> Result<(), Message> {
-        if !self.map.is_empty() {
+        if !self.sheet.map.is_empty() {
             let refuse = |(what, remedy): (String, String)| self.in_header(0, what).remedy(remedy);
-            return self.map.only(known).map_err(refuse);
+            return self.sheet.map.only(known).map_err(refuse);
         }
         for (i, (name, bare)) in self.names().zip(self.bare_names()).enumerate() {
             if self.bare_names().take(i).any(|before| before == bare) && known.contains(&bare) {
@@ -269,41 +323,28 @@ impl TableReader {
 
     /// A message about a column's name in the first line.
     pub fn in_header(&self, index: usize, what: impl Into<String>) -> Message {
-        let place = place_of_field(
-            &self.path,
-            self.header_number,
-            &self.header,
-            self.dialect.delimiter,
-            index,
-        );
-        Message::bad_input(what).at(place)
+        self.sheet.in_header(index, what)
     }
 
     /// A message about a column.
     pub fn at_column(&self, column: &Column, what: impl Into<String>) -> Message {
-        self.in_header(column.index(), what)
+        self.sheet.at_column(column, what)
     }
 
     /// A message about a row that was read before, known by its line number alone.
     pub fn at_line(&self, line: usize, what: impl Into<String>) -> Message {
-        Message::bad_input(what).at(Place {
-            file: self.path.clone(),
-            line,
-            column: 1,
-            text: String::new(),
-            length: 0,
-        })
+        self.sheet.at_line(line, what)
     }
 
     /// A message for a table that ends after its first line.
     pub fn no_rows(&self) -> Message {
         Message::bad_input("the file names columns but has no row of data")
             .at(Place {
-                file: self.path.clone(),
-                line: self.header_number,
+                file: self.sheet.path.clone(),
+                line: self.sheet.header_number,
                 column: 1,
-                text: self.header.clone(),
-                length: self.header.len(),
+                text: self.sheet.header.clone(),
+                length: self.sheet.header.len(),
             })
             .remedy("add the data below the first line")
     }
@@ -313,27 +354,53 @@ impl TableReader {
     /// # Errors
     /// The file cannot be read on, or the line is not a row of this table.
     pub fn next_row(&mut self) -> Result<Option<Row<'_>>, Message> {
-        if !self.next_line()? {
-            return Ok(None);
+        let Self {
+            sheet,
+            decimal,
+            rows,
+        } = self;
+        match rows {
+            Rows::Text(text) => {
+                let row = text.next(sheet, decimal)?;
+                row.map(|row| complete(sheet, row)).transpose()
+            }
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(columns) => {
+                if columns.next >= columns.batch.rows && !columns.fill(sheet)? {
+                    return Ok(None);
+                }
+                columns.next += 1;
+                Ok(Some(columns.batch.row(sheet, decimal, columns.next - 1)))
+            }
         }
-        let row = Row { table: self };
-        let expected = self.names.len();
-        let surplus_is_empty = (expected..self.field_count).all(|i| row.field(i).is_empty());
-        if self.field_count < expected || !surplus_is_empty {
-            let what = format!(
-                "the row has {}, the first line names {expected} columns",
-                count(self.field_count, "field")
-            );
-            return Err(row
-                .bad(expected.min(self.field_count.saturating_sub(1)), what)
-                .remedy(match self.dialect.delimiter {
-                    Delimiter::Comma => {
-                        "give every row one field a column; \
-                         write decimals with a point, or separate fields by `;`"
-                    }
-                    _ => "give every row one field a column",
-                }));
+    }
+
+    fn next_line(&mut self) -> Result<Option<Row<'_>>, Message> {
+        match &mut self.rows {
+            Rows::Text(text) => text.next(&self.sheet, &self.decimal),
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(_) => Ok(None),
         }
-        Ok(Some(row))
+    }
+}
+
+impl Text {
+    /// The next line that is neither blank nor a comment.
+    fn next<'a>(
+        &'a mut self,
+        sheet: &'a Sheet,
+        decimal: &'a Cell<Decimal>,
+    ) -> Result<Option<Row<'a>>, Message> {
+        let end = sheet.dialect.line_end.last_byte();
+        while !self.walk.seek(end, &self.chunk) {
+            let filled = self.blocks.fill(&mut self.chunk);
+            self.blocks.note_end();
+            if !filled.map_err(|e| cannot_read(&sheet.path, &e))? {
+                return Ok(None);
+            }
+            self.chunk.find_seams(sheet.dialect);
+            self.walk.begin(&self.chunk);
+        }
+        self.walk.next(sheet, &self.chunk, decimal)
     }
 }

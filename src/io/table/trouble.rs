@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use super::row::Row;
+use super::sheet::Sheet;
 use crate::io::dialect::{Delimiter, NotATable};
 use crate::io::message::{Message, Place};
 
@@ -37,7 +39,7 @@ pub(super) fn place_of_field(
     }
 }
 
-pub(super) fn count(n: usize, noun: &str) -> String {
+fn count(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
@@ -75,5 +77,49 @@ pub(super) fn not_a_table(path: &Path, why: NotATable) -> Message {
             text: String::new(),
             length: 0,
         })
+        .remedy(remedy)
+}
+
+/// A line with a byte that is not text.
+pub(super) fn no_text(sheet: &Sheet, number: usize, line: &[u8], byte: usize) -> Message {
+    let what = format!(
+        "byte {} of the line (0x{:02X}) is not text",
+        byte + 1,
+        line[byte]
+    );
+    let remedy = "save the file as plain text (CSV, UTF-8)";
+    sheet.at_line(number, what).remedy(remedy)
+}
+
+/// A line whose quote does not end on it.
+pub(super) fn open_quote(sheet: &Sheet, number: usize, line: &[u8]) -> Message {
+    let text = String::from_utf8_lossy(line).into_owned();
+    let quote = text.rfind('"').unwrap_or(0);
+    Message::bad_input("a quote is opened and not closed on this line")
+        .at(Place {
+            file: sheet.path.clone(),
+            line: number,
+            column: text[..quote].chars().count() + 1,
+            text,
+            length: 1,
+        })
+        .remedy("close the quote, or remove it")
+}
+
+/// A row with another number of fields than the table has columns.
+pub(super) fn wrong_count(sheet: &Sheet, row: Row<'_>, found: usize) -> Message {
+    let expected = sheet.names.len();
+    let what = format!(
+        "the row has {}, the first line names {expected} columns",
+        count(found, "field")
+    );
+    let remedy = match sheet.dialect.delimiter {
+        Delimiter::Comma => {
+            "give every row one field a column; \
+             write decimals with a point, or separate fields by `;`"
+        }
+        _ => "give every row one field a column",
+    };
+    row.bad(expected.min(found.saturating_sub(1)), what)
         .remedy(remedy)
 }

@@ -80,19 +80,37 @@ pub fn circularity_of(circle: &Circle, deviations: &[Vector3<f64>]) -> f64 {
             (from_centre(first), from_centre(second))
         })
     };
-    let mut normal = Matrix3::zeros();
+    // Sums of the rows (2u, 2v, 1) and of their right side u² + v².
+    let [mut uu, mut uv, mut vv, mut u1, mut v1] = [0.0; 5];
     let mut right = Vector3::zeros();
     for (u, v) in moved() {
-        let row = Vector3::new(2.0 * u, 2.0 * v, 1.0);
-        normal += row * row.transpose();
-        right += row * (u * u + v * v);
+        let square = u * u + v * v;
+        uu += u * u;
+        uv += u * v;
+        vv += v * v;
+        u1 += u;
+        v1 += v;
+        right += Vector3::new(2.0 * u * square, 2.0 * v * square, square);
     }
+    let count = circle.points.len() as f64;
+    let normal = Matrix3::new(
+        4.0 * uu,
+        4.0 * uv,
+        2.0 * u1,
+        4.0 * uv,
+        4.0 * vv,
+        2.0 * v1,
+        2.0 * u1,
+        2.0 * v1,
+        count,
+    );
     let Some(solution) = normal.lu().solve(&right) else {
         return f64::NAN;
     };
     let (least, greatest) = moved().fold((f64::INFINITY, 0.0_f64), |(low, high), (u, v)| {
-        let radius = (u - solution[0]).hypot(v - solution[1]);
-        (low.min(radius), high.max(radius))
+        let square = (u - solution[0]).powi(2) + (v - solution[1]).powi(2);
+        (low.min(square), high.max(square))
     });
+    let (least, greatest) = (least.sqrt(), greatest.sqrt());
     um_from_mm(greatest - least)
 }

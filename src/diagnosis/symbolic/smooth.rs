@@ -1,0 +1,154 @@
+//! What else than a law may have made a gap: smooth curves, by their evidence.
+
+use errsep_models::basis::bspline::CubicBSpline;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rayon::prelude::*;
+
+use crate::diagnosis::symbolic::function::Coordinate;
+use crate::diagnosis::symbolic::grammar::Grammar;
+use crate::diagnosis::symbolic::view::View;
+
+/// *Limit.* Cells of one curve, and unknowns of all curves together.
+const MOST_CELLS: usize = 28;
+const MOST_UNKNOWNS: usize = 200;
+/// Lengths of the curves in ranges.
+const LENGTHS: [f64; 6] = [1.0, 0.6, 0.35, 0.2, 0.12, 0.07];
+/// Sizes among which the likeliest is taken, ln of their square over that of the noise in what is seen best.
+const SIZES: [f64; 3] = [-4.0, 26.0, 0.5];
+/// Part of the greatest eigenvalue below which a mode is none.
+const NONE: f64 = 1e-10;
+
+/// Curves along one coordinate, Gaussian processes of squared-exponential covariance, one for all readings or
+/// each of some readings.
+struct Ground {
+    /// Products of the curves' coefficients with what is seen.
+    seen: DMatrix<f64>,
+    /// For each length: coefficients of independent modes, and the visible square of each.
+    lengths: Vec<(DMatrix<f64>, DVector<f64>)>,
+}
+
+/// All smooth curves.
+pub(super) struct Smooths(Vec<Ground>);
+
+impl Smooths {
+    pub fn new(grammar: &Grammar, view: &View) -> Self {
+        let channels = grammar.blocks.iter().any(|b| *b > 1);
+        let both =
+            grammar.blocks.iter().any(|b| b % 2 == 1) && grammar.blocks.iter().any(|b| b % 2 == 0);
+        let mut ways = Vec::new();
+        for c in &grammar.coordinates {
+            for by_channel in [false, true] {
+                for by_direction in [false, true] {
+                    if (channels || !by_channel) && (both || !by_direction) {
+                        ways.push((c, by_channel, by_direction));
+                    }
+                }
+            }
+        }
+        let made = ways.par_iter().filter_map(|(c, by_channel, by_direction)| {
+            let curve = |block: usize| match (by_channel, by_direction) {
+                (false, false) => 0,
+                (false, true) => block % 2,
+                (true, false) => block / 2,
+                (true, true) => block,
+            };
+            let of: Vec<usize> = grammar.blocks.iter().map(|b| curve(*b)).collect();
+            Ground::new(c, &of, view)
+        });
+        Self(made.collect())
+    }
+
+    /// The greatest logarithm of the evidence for curves over that for nothing; never below zero.
+    pub fn evidence(&self, residual: &DVector<f64>) -> f64 {
+        let of = |ground: &Ground| ground.evidence(residual);
+        self.0.par_iter().map(of).reduce(|| 0.0, f64::max)
+    }
+}
+
+impl Ground {
+    fn new(c: &Coordinate, curve_of: &[usize], view: &View) -> Option<Self> {
+        let mut curves: Vec<usize> = curve_of.to_vec();
+        curves.sort_unstable();
+        curves.dedup();
+        let room = (MOST_UNKNOWNS / curves.len()).saturating_sub(3);
+        let cells = (c.gaps().div_ceil(2)).min(MOST_CELLS).min(room);
+        if cells < 2 {
+            return None;
+        }
+        let basis = CubicBSpline::uniform(c.low(), c.high(), cells).ok()?;
+        let each = basis.coefficient_count();
+        let mut columns = DMatrix::zeros(view.rows.len(), each * curves.len());
+        for (k, row) in view.rows.iter().enumerate() {
+            let at = curves.binary_search(&curve_of[*row]).ok()?;
+            let (first, values) = basis.values(c.values[*row]);
+            for (j, v) in values.iter().enumerate() {
+                columns[(k, at * each + first + j)] = *v;
+            }
+        }
+        let seen = view.space.forward(columns).0;
+        let gram = seen.tr_mul(&seen);
+        let lengths = LENGTHS
+            .iter()
+            .filter(|length| **length * cells as f64 >= 1.0)
+            .filter_map(|length| modes(&gram, each, length * cells as f64))
+            .collect();
+        Some(Self { seen, lengths })
+    }
+
+    /// With z independent modes of variance τ², visible squares γ² and s their products with the residual, the
+    /// logarithm of the evidence is −½ Σ ln(1 + γ²τ²) − τ²s²/(1 + γ²τ²), the noise known; greatest over τ and
+    /// the lengths.
+    fn evidence(&self, residual: &DVector<f64>) -> f64 {
+        let products = self.seen.tr_mul(residual);
+        let mut most: f64 = 0.0;
+        for (modes, squares) in &self.lengths {
+            let score = modes.tr_mul(&products);
+            let [mut size, last, step] = SIZES;
+            size -= squares.max().ln();
+            let last = last - squares.max().ln();
+            while size <= last {
+                let variance = size.exp();
+                let of = |(square, s): (&f64, &f64)| {
+                    let whole = 1.0 + square * variance;
+                    variance * s * s / whole - whole.ln()
+                };
+                let sum: f64 = squares.iter().zip(score.iter()).map(of).sum();
+                most = most.max(0.5 * sum);
+                size += step;
+            }
+        }
+        most
+    }
+}
+
+/// Independent modes of curves of one length, in cells: coefficients one standard deviation each, and their
+/// visible squares.
+fn modes(gram: &DMatrix<f64>, each: usize, length: f64) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    let kernel = DMatrix::from_fn(each, each, |i, j| {
+        let apart = (i as f64 - j as f64) / length;
+        (-0.5 * apart * apart).exp()
+    });
+    let eigen = SymmetricEigen::new(kernel);
+    let kept = |values: &DVector<f64>| -> Vec<usize> {
+        let least = NONE * values.max();
+        (0..values.len()).filter(|k| values[*k] > least).collect()
+    };
+    let own = kept(&eigen.eigenvalues);
+    let root = DMatrix::from_fn(each, own.len(), |i, j| {
+        eigen.eigenvectors[(i, own[j])] * eigen.eigenvalues[own[j]].sqrt()
+    });
+    let curves = gram.nrows() / each;
+    let mut all = DMatrix::zeros(gram.nrows(), curves * own.len());
+    for k in 0..curves {
+        all.view_mut((k * each, k * own.len()), (each, own.len()))
+            .copy_from(&root);
+    }
+    let visible = all.tr_mul(&(gram * &all));
+    if !(visible.trace() > 0.0 && visible.iter().all(|v| v.is_finite())) {
+        return None;
+    }
+    let eigen = SymmetricEigen::new(visible);
+    let seen = kept(&eigen.eigenvalues);
+    let squares = DVector::from_iterator(seen.len(), seen.iter().map(|k| eigen.eigenvalues[*k]));
+    Some((all * eigen.eigenvectors.select_columns(&seen), squares))
+}

@@ -135,7 +135,7 @@ pub fn law<M: FittedModel>(
 }
 
 fn tried<M: FittedModel>(bench: &Bench<'_, M>) -> [usize; 2] {
-    let forms = bench.lens.forms();
+    let forms = bench.forms();
     [forms, forms * (forms + 1) / 2]
 }
 

@@ -168,20 +168,12 @@ impl Lens {
         Products(self.rows.iter().zip(&self.tables).map(of).collect())
     }
 
-    /// The products of a pattern of one entry with one vector.
-    fn product(
-        &self,
-        products: &Products,
-        entry: &Entry,
-        pattern: usize,
-        vector: usize,
-    ) -> [f64; 2] {
+    /// The sum of a pattern over products by block.
+    fn product(&self, blocks: &[[f64; 2]], pattern: usize) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (block, weight) in &self.weights[pattern] {
-            let own = &products.0[*block];
-            for (j, sum) in sums.iter_mut().take(entry.order).enumerate() {
-                *sum += weight * own[(entry.first + j, vector)];
-            }
+            sums[0] += weight * blocks[*block][0];
+            sums[1] += weight * blocks[*block][1];
         }
         sums
     }
@@ -195,12 +187,26 @@ impl Lens {
         beside: &[usize],
         mut found: impl FnMut(&Entry, usize, f64),
     ) {
+        let count = products.0.len();
+        // Of the vector, then of those beside it.
+        let mut blocks = vec![[0.0; 2]; count * (1 + beside.len())];
         for entry in &self.entries {
+            for (slot, k) in std::iter::once(&vector).chain(beside).enumerate() {
+                for (block, own) in products.0.iter().enumerate() {
+                    let second = if entry.order > 1 {
+                        own[(entry.first + 1, *k)]
+                    } else {
+                        0.0
+                    };
+                    blocks[slot * count + block] = [own[(entry.first, *k)], second];
+                }
+            }
+            let (own, others) = blocks.split_at(count);
             for (pattern, gram) in self.patterns[entry.kind].iter().zip(&entry.grams) {
                 let Some(mut g) = *gram else { continue };
                 let whole = g[0] + g[2];
-                for other in beside {
-                    let c = self.product(products, entry, *pattern, *other);
+                for other in others.chunks(count) {
+                    let c = self.product(other, *pattern);
                     g[0] -= c[0] * c[0];
                     g[1] -= c[0] * c[1];
                     g[2] -= c[1] * c[1];
@@ -208,7 +214,7 @@ impl Lens {
                 if g[0] + g[2] < SEPARABLE * whole {
                     continue;
                 }
-                let s = self.product(products, entry, *pattern, vector);
+                let s = self.product(own, *pattern);
                 let t = if entry.order == 1 {
                     s[0] * s[0] / g[0]
                 } else {

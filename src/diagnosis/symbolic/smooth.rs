@@ -4,13 +4,14 @@ use errsep_models::basis::bspline::CubicBSpline;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 
+use crate::diagnosis::catalogue::curve::Along;
 use crate::diagnosis::symbolic::function::Coordinate;
 use crate::diagnosis::symbolic::grammar::Grammar;
 use crate::diagnosis::symbolic::view::View;
 
 /// *Limit.* Cells of one curve, and unknowns of all curves together.
 const MOST_CELLS: usize = 28;
-const MOST_UNKNOWNS: usize = 200;
+const MOST_UNKNOWNS: usize = 120;
 /// Lengths of the curves in ranges.
 const LENGTHS: [f64; 6] = [1.0, 0.6, 0.35, 0.2, 0.12, 0.07];
 /// Sizes among which the likeliest is taken, ln of their square over that of the noise in what is seen best.
@@ -39,7 +40,8 @@ impl Smooths {
         for c in &grammar.coordinates {
             for by_channel in [false, true] {
                 for by_direction in [false, true] {
-                    if (channels || !by_channel) && (both || !by_direction) {
+                    let turns = both && c.along == Along::Position;
+                    if (channels || !by_channel) && (turns || !by_direction) {
                         ways.push((c, by_channel, by_direction));
                     }
                 }
@@ -58,10 +60,29 @@ impl Smooths {
         Self(made.collect())
     }
 
-    /// The greatest logarithm of the evidence for curves over that for nothing; never below zero.
+    /// The logarithm of the evidence for curves over that for nothing: every way to bind them and every length
+    /// with the same prior.
     pub fn evidence(&self, residual: &DVector<f64>) -> f64 {
-        let of = |ground: &Ground| ground.evidence(residual);
-        self.0.par_iter().map(of).reduce(|| 0.0, f64::max)
+        let all = self.each(residual);
+        let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let sum: f64 = all.iter().map(|e| (e - most).exp()).sum();
+        if all.is_empty() {
+            0.0
+        } else {
+            most + (sum / all.len() as f64).ln()
+        }
+    }
+
+    /// The greatest over the ways and lengths; never below zero.
+    pub fn greatest(&self, residual: &DVector<f64>) -> f64 {
+        self.each(residual).into_iter().fold(0.0, f64::max)
+    }
+
+    fn each(&self, residual: &DVector<f64>) -> Vec<f64> {
+        self.0
+            .par_iter()
+            .flat_map_iter(|ground| ground.evidence(residual))
+            .collect()
     }
 }
 
@@ -96,28 +117,26 @@ impl Ground {
     }
 
     /// With z independent modes of variance τ², visible squares γ² and s their products with the residual, the
-    /// logarithm of the evidence is −½ Σ ln(1 + γ²τ²) − τ²s²/(1 + γ²τ²), the noise known; greatest over τ and
-    /// the lengths.
-    fn evidence(&self, residual: &DVector<f64>) -> f64 {
+    /// logarithm of the evidence is −½ Σ ln(1 + γ²τ²) − τ²s²/(1 + γ²τ²), the noise known; greatest over τ, for
+    /// each length.
+    fn evidence(&self, residual: &DVector<f64>) -> Vec<f64> {
         let products = self.seen.tr_mul(residual);
-        let mut most: f64 = 0.0;
-        for (modes, squares) in &self.lengths {
+        let of_length = |(modes, squares): &(DMatrix<f64>, DVector<f64>)| {
             let score = modes.tr_mul(&products);
-            let [mut size, last, step] = SIZES;
-            size -= squares.max().ln();
-            let last = last - squares.max().ln();
-            while size <= last {
-                let variance = size.exp();
+            let at = |size: f64| {
+                let variance = (size - squares.max().ln()).exp();
                 let of = |(square, s): (&f64, &f64)| {
                     let whole = 1.0 + square * variance;
                     variance * s * s / whole - whole.ln()
                 };
-                let sum: f64 = squares.iter().zip(score.iter()).map(of).sum();
-                most = most.max(0.5 * sum);
-                size += step;
-            }
-        }
-        most
+                0.5 * squares.iter().zip(score.iter()).map(of).sum::<f64>()
+            };
+            let [first, last, step] = SIZES;
+            let count = ((last - first) / step) as usize;
+            let sizes = (0..=count).map(|k| first + step * k as f64);
+            sizes.map(at).fold(f64::NEG_INFINITY, f64::max)
+        };
+        self.lengths.iter().map(of_length).collect()
     }
 }
 

@@ -232,8 +232,9 @@ pub(super) fn terms<M: FittedModel>(bench: &Bench<'_, M>, fitted: &Fitted) -> Ve
     let of = |(term, at, amplitudes): (Term, usize, &[f64])| {
         let (function, c) = (grammar.function(term), grammar.coordinate(term));
         let units = [model.reading_unit(), c.along.unit(model)];
-        let shape_std = covariance(shape_at, shape_at).sqrt();
+        let mut shape_std = 0.0;
         if function.is_shaped() && function != Function::Step {
+            shape_std = covariance(shape_at, shape_at).sqrt();
             shape_at += 1;
         }
         let own = DMatrix::from_fn(amplitudes.len(), amplitudes.len(), |i, j| {

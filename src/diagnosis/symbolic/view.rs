@@ -36,9 +36,9 @@ pub(super) struct Fitted {
     pub explained: f64,
 }
 
-/// The repeats that a law is chosen on, every second one, and those that it is accepted on; nothing where there
-/// are fewer than two. Neighbours are parted, so that a function of the time need not be continued far.
-pub(super) fn halves<M: FittedModel>(model: &M, law: &NoiseLaw) -> Option<[View; 2]> {
+/// Every second repeat and the others, chosen on and held out, both ways; nothing where there are fewer than two.
+/// Neighbours are parted, so that a function of the time need not be continued far.
+pub(super) fn halves<M: FittedModel>(model: &M, law: &NoiseLaw) -> Option<[[View; 2]; 2]> {
     let places = model.places();
     let repeats: BTreeSet<u32> = places.iter().map(|p| p.repeat).collect();
     if repeats.len() < 2 {
@@ -54,9 +54,10 @@ pub(super) fn halves<M: FittedModel>(model: &M, law: &NoiseLaw) -> Option<[View;
             .collect(),
         space: Space::of_traces_expecting(model, law, traces),
     };
-    let [chosen, held] = [view(&chosen), view(&held)];
+    let way = |a: &[usize], b: &[usize]| [view(a), view(b)];
+    let ways = [way(&chosen, &held), way(&held, &chosen)];
     let tells = |view: &View| view.space.degrees_of_freedom() > 0;
-    (tells(&chosen) && tells(&held)).then_some([chosen, held])
+    ways[0].iter().all(tells).then_some(ways)
 }
 
 impl View {

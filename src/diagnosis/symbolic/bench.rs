@@ -184,7 +184,8 @@ impl<'a, M: FittedModel> Bench<'a, M> {
 
     fn tried(&self, way: &Way, readings: &DVector<f64>) -> Vec<Tried> {
         let held = way.held.residual(readings);
-        let found = self.search(way).candidates(&way.chosen.residual(readings));
+        let mut found = self.search(way).candidates(&way.chosen.residual(readings));
+        found.retain(|f| self.grammar.is_possible(f));
         let predicted = |fitted: Fitted| {
             let columns = self.grammar.columns(&fitted.terms, &way.held.rows);
             let change = columns * &fitted.amplitudes;

@@ -1,15 +1,18 @@
 //! A gap as a law, or the power with which one would have been found.
 
 use errsep_models::model::FittedModel;
+use nalgebra::DVector;
 use serde::Serialize;
 
 use crate::diagnosis::catalogue::tabulated::Tabulated;
 use crate::diagnosis::detection::estimate::estimate;
+use crate::diagnosis::noise::law::NoiseLaw;
 use crate::diagnosis::noise::spikes::calmed;
 use crate::diagnosis::options::Options;
 use crate::diagnosis::symbolic::bench::{Accepted, Bench, Refusal};
 use crate::diagnosis::symbolic::injected::{Power, power};
 use crate::diagnosis::symbolic::told::{LawTerm, effect, in_one_line, terms};
+use crate::diagnosis::symbolic::view::Fitted;
 
 /// Part by which the noise must change for laws to be sought anew without the best of them.
 const ANEW: f64 = 0.02;
@@ -106,7 +109,7 @@ pub fn law<M: FittedModel>(
     let attempt = first.attempt(&readings);
     let best = match &attempt {
         Ok(accepted) => Some(accepted.fitted.clone()),
-        Err(_) => first.best(&readings),
+        Err(_) => best_in_white(model, &first.law, &readings, options),
     };
     let Some(best) = best else {
         return Ok(none(
@@ -134,6 +137,19 @@ pub fn law<M: FittedModel>(
     })
 }
 
+/// The best law as it would be in white noise: what jumps or swings between traces passes for noise that
+/// shifts them, and hides itself, until it is taken out once.
+fn best_in_white<M: FittedModel>(
+    model: &M,
+    law: &NoiseLaw,
+    readings: &DVector<f64>,
+    options: &Options,
+) -> Option<Fitted> {
+    let sigma = law.components().white.sqrt();
+    let white = NoiseLaw::white(sigma, law.freedom, law.source);
+    Bench::new(model, white, options)?.best(readings)
+}
+
 fn tried<M: FittedModel>(bench: &Bench<'_, M>) -> [usize; 2] {
     let forms = bench.forms();
     [forms, forms * (forms + 1) / 2]
@@ -141,7 +157,7 @@ fn tried<M: FittedModel>(bench: &Bench<'_, M>) -> [usize; 2] {
 
 fn none<M: FittedModel>(
     bench: &Bench<'_, M>,
-    readings: &nalgebra::DVector<f64>,
+    readings: &DVector<f64>,
     why: Refusal,
     (options, injections): (&Options, usize),
 ) -> LawFound {

@@ -6,6 +6,10 @@ use nalgebra::{DMatrix, DVector};
 use crate::diagnosis::catalogue::curve::Along;
 use crate::diagnosis::symbolic::function::{Coordinate, Function};
 use crate::diagnosis::symbolic::pattern::{Pattern, block_of};
+use crate::diagnosis::symbolic::view::Fitted;
+
+/// *Limit.* Part of the readings' range that a law along the reading may change them by.
+const OFF: f64 = 0.3;
 
 /// A function of a coordinate.
 #[derive(Clone, Copy)]
@@ -93,6 +97,29 @@ impl Grammar {
             sum(&|t| t.pattern),
             sum(&|t| t.kind),
         ]
+    }
+
+    /// Whether no term along the reading changes it by more than a sensor may be off: beyond that it would be a
+    /// function of what it changes itself.
+    pub fn is_possible(&self, law: &Fitted) -> bool {
+        let mut at = 0;
+        law.terms.iter().all(|term| {
+            let (function, c) = (self.function(*term), self.coordinate(*term));
+            let own = &law.amplitudes.as_slice()[at..at + function.order()];
+            at += function.order();
+            if c.along != Along::Reading || function == Function::One {
+                return true;
+            }
+            let change = |u: &f64| -> f64 {
+                let values = function.at(c, term.shape, *u);
+                own.iter().zip(values).map(|(a, v)| a * v).sum()
+            };
+            let changes = c.values.iter().map(change);
+            let (low, high) = changes.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+                (l.min(v), h.max(v))
+            });
+            high - low <= OFF * c.range()
+        })
     }
 
     /// The change of some readings by each amplitude, readings × amplitudes.

@@ -105,7 +105,7 @@ const REVERSAL: [Listed; 17] = [
     ),
     (
         &[("step", "time")],
-        |a, p| one(a, 1) * from(a.t, 0.2 + 0.6 * p[0]),
+        |a, p| one(a, 1) * from(a.t, 0.1 + 0.3 * p[0]),
         None,
     ),
     (&[("power 2", "time")], |a, _| a.t * a.t, None),
@@ -123,7 +123,7 @@ const REVERSAL: [Listed; 17] = [
     ),
     (
         &[("constant", ""), ("step", "time")],
-        |a, p| 0.5 * a.d + one(a, 2) * from(a.t, 0.25 + 0.5 * p[0]),
+        |a, p| 0.5 * a.d + one(a, 2) * from(a.t, 0.6 + 0.3 * p[0]),
         None,
     ),
 ];

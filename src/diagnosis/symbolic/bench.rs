@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::detection::null::{BATCH, Tail};
-use crate::diagnosis::levels::{ADEQUATE, CONFIRMED, LAW_LEFT, LAW_ODDS, NO_WORSE};
+use crate::diagnosis::levels::{ADEQUATE, CONFIRMED, LAW_LEFT, LAW_ODDS};
 use crate::diagnosis::noise::law::{NoiseLaw, draw_scatter};
 use crate::diagnosis::noise::spikes::Spikes;
 use crate::diagnosis::options::Options;
@@ -231,7 +231,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         };
         let mut equal: Vec<&Tried> = tried
             .iter()
-            .filter(|t| std::ptr::eq(*t, best) || worse(t) <= NO_WORSE)
+            .filter(|t| std::ptr::eq(*t, best) || worse(t) <= CONFIRMED)
             .collect();
         equal.sort_by_key(|t| self.grammar.complexity(&t.fitted.terms));
         let freedom = way.held.space.degrees_of_freedom() as f64;

@@ -99,6 +99,18 @@ impl Grammar {
         ]
     }
 
+    /// Whether two terms may stand together: two steps or bends of one coordinate and pattern are a bump.
+    pub fn may_join(&self, a: Term, b: Term) -> bool {
+        let broken = |t: Term| {
+            matches!(
+                self.function(t),
+                Function::Step | Function::Absolute(_) | Function::Corner
+            )
+        };
+        let same = self.kinds[a.kind].coordinate == self.kinds[b.kind].coordinate;
+        !(broken(a) && broken(b) && same && a.pattern == b.pattern)
+    }
+
     /// Whether no term along the reading changes it by more than a sensor may be off: beyond that it would be a
     /// function of what it changes itself.
     pub fn is_possible(&self, law: &Fitted) -> bool {

@@ -80,9 +80,13 @@ fn drawn<M: FittedModel>(
 ) -> Option<DVector<f64>> {
     let count = if random.random::<bool>() { 1 } else { 2 };
     let mut change = DVector::zeros(bench.model.places().len());
+    let mut terms: Vec<Term> = Vec::new();
     for _ in 0..count {
         let size = PART.powf(random.random::<f64>());
-        let (column, seen) = (0..TRIES).find_map(|_| term(bench, random))?;
+        let joins = |t: Term| terms.iter().all(|known| bench.grammar.may_join(*known, t));
+        let one = |_| term(bench, random).filter(|found| joins(found.0));
+        let (own, column, seen) = (0..TRIES).find_map(one)?;
+        terms.push(own);
         change += column * (size / seen);
     }
     let seen = bench.whole.residual(&change).norm();
@@ -93,7 +97,7 @@ fn drawn<M: FittedModel>(
 fn term<M: FittedModel>(
     bench: &Bench<'_, M>,
     random: &mut ChaCha8Rng,
-) -> Option<(DVector<f64>, f64)> {
+) -> Option<(Term, DVector<f64>, f64)> {
     let grammar = &bench.grammar;
     let kind = random.random_range(0..grammar.kinds.len());
     let patterns = bench.patterns_of(kind);
@@ -122,5 +126,5 @@ fn term<M: FittedModel>(
     bench.whole.seen(grammar, &[term])?;
     let column = bench.change(&[term], &DVector::from_vec(amplitudes));
     let seen = bench.whole.residual(&column).norm();
-    (seen > 0.0).then_some((column, seen))
+    (seen > 0.0).then_some((term, column, seen))
 }

@@ -85,7 +85,10 @@ impl Search<'_> {
             return Vec::new();
         };
         let (products, others) = self.beside(&left, &basis);
-        different(self.lens.forms_by_surprise(&products, 0, &others), count)
+        let mut spots = self.lens.forms_by_surprise(&products, 0, &others);
+        let joins = |s: &Spot| terms.iter().all(|t| self.grammar.may_join(*t, s.term));
+        spots.retain(joins);
+        different(spots, count)
     }
 
     /// Laws that explain nearly as much as the best, refined, each form once.

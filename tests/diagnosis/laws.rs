@@ -134,11 +134,8 @@ fn the_power_grows_with_the_size() {
         }
     };
     let (small, great) = (part(0.0006), part(0.02));
-    // Monte Carlo: of twelve.
-    assert!(
-        great.found >= 6 && small.found < great.found,
-        "{small:?} {great:?}"
-    );
+    // Monte Carlo: of twelve, the seed stated; a third of the laws that a line shows are told from smooth curves.
+    assert!(great.found >= small.found + 3, "{small:?} {great:?}");
     assert!(great.ci95[0] <= great.probability && great.probability <= great.ci95[1]);
 }
 

@@ -12,7 +12,7 @@ const ORDER: [&[&str]; 10] = [
     &["severity"],
     &["verdict", "catalogue"],
     &["diagnose"],
-    &["joined", "agreement", "learning"],
+    &["joined", "agreement", "learning", "symbolic"],
     &["sealing"],
 ];
 

@@ -183,3 +183,12 @@ pub(in crate::diagnosis) const TURN_APART: f64 = 5.0;
 pub(in crate::diagnosis) const CONFIRMED: f64 = 3.0;
 /// *Quantile*, one standard error: a way to bind a gap by fewer curves is no worse than the best.
 pub(in crate::diagnosis) const NO_WORSE: f64 = 1.0;
+
+// Laws.
+
+/// *Quantile*: the evidence for a law over that for smooth curves, which a gap of these exceeds in less than one
+/// of as many (Markov's inequality), whatever the law.
+pub(in crate::diagnosis) const LAW_ODDS: f64 = 100.0;
+/// *Quantile.* ln of the evidence for a smooth curve in what a law leaves from which on it is there: with one curve
+/// of one mode χ² beyond 16, with the fifty of different lengths 0.3 % of normal noise.
+pub(in crate::diagnosis) const LAW_LEFT: f64 = 8.0;

@@ -18,6 +18,7 @@ mod planning;
 mod sealing;
 mod search;
 mod severity;
+mod symbolic;
 pub mod turning;
 mod verdict;
 
@@ -40,6 +41,7 @@ pub use sealing::{
     SealedEffect, SealedGap, SealedNumber, SealedTrace, Standing, checked, sealed,
 };
 pub use severity::{Confidence, Rival, Severity};
+pub use symbolic::{Law, LawFound, LawParameter, LawRival, LawTerm, NoLaw, NoRepeats, Power, law};
 pub use verdict::told::{Told, for_people, scaled};
 pub use verdict::types::{
     Detail, Diagnosis, Fingerprint, Gap, Harm, Hidden, Kind, Nearest, NoiseOut, Verdict, Where,

@@ -15,6 +15,7 @@ mod export;
 mod faulty_machine;
 mod four_sensor;
 mod fourier;
+mod law;
 mod learn;
 mod machine;
 mod measured_reversals;

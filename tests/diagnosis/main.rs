@@ -6,6 +6,7 @@ mod command;
 mod designs;
 mod effect_signatures;
 mod invariance;
+mod laws;
 mod models;
 mod noise;
 #[path = "../other_models/mod.rs"]

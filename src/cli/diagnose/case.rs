@@ -6,6 +6,7 @@ use errsep_models::model::{Effect, FittedModel, Place};
 
 use serde_json::{Value, json};
 
+use super::law::{Sought, sought};
 use super::learnt::{all_tested, learnt, tested_in_words};
 use super::sealed::Seal;
 use super::{Args, page, within_reach_of, words};
@@ -50,6 +51,9 @@ impl<M: FittedModel> Case<M> {
         let place = args.learn.as_deref();
         let file = place.map(|p| OutFile::reserve(p).map(|file| (p, file)));
         let file = file.transpose()?;
+        let law_place = args.law.as_ref().and_then(|p| p.as_deref());
+        let law_file = law_place.map(|p| OutFile::reserve(p).map(|file| (p, file)));
+        let law_file = law_file.transpose()?;
         let seal = Seal::begun(args, plan)?;
         let catalogue = catalogue(args, &self.model)?;
         let known: Vec<String> = catalogue.iter().map(|e| e.name().to_owned()).collect();
@@ -70,6 +74,11 @@ impl<M: FittedModel> Case<M> {
         let own = self::catalogue(args, &self.model)?;
         let learnt = file.map(|file| learnt(&self.model, args, file, &diagnosis, &options));
         let learnt = learnt.transpose()?;
+        let law = args
+            .law
+            .as_ref()
+            .map(|_| sought(&self.model, args, law_file, &diagnosis, &options));
+        let law = law.transpose()?;
         let sealed = seal.map(|seal| seal.written(&self.model, args, &diagnosis, &options));
         let sealed = sealed.transpose()?;
         let trials = args.prove.map(|count| {
@@ -93,8 +102,15 @@ impl<M: FittedModel> Case<M> {
             &own_effects(args, &self.model)?,
             &options,
         );
-        let said = [("learnt", learnt), ("sealed", sealed)];
-        self.delivered(args, diagnosis, trials.as_ref(), said, tests)
+        let is_missing = law.as_ref().is_some_and(|l: &Sought| l.is_missing);
+        let law = law.map(|l| l.said);
+        let said = [("learnt", learnt), ("law", law), ("sealed", sealed)];
+        let mut answer = self.delivered(args, diagnosis, trials.as_ref(), said, tests)?;
+        if is_missing {
+            // The file that was asked for is not there.
+            answer.status = Status::NotSolved;
+        }
+        Ok(answer)
     }
 
     fn delivered(
@@ -102,7 +118,7 @@ impl<M: FittedModel> Case<M> {
         args: &Args,
         mut diagnosis: Diagnosis,
         trials: Option<&Trials>,
-        said: [(&str, Option<Said>); 2],
+        said: [(&str, Option<Said>); 3],
         (tests, remarks): (Vec<Tested>, Vec<String>),
     ) -> Result<Answer, Message> {
         diagnosis.notes.extend(self.notes);
@@ -166,7 +182,7 @@ fn tell_learnt(
     (text, json, notes): (&mut String, &mut Value, &mut Vec<String>),
     unit: &str,
     tests: &[Tested],
-    said: [(&str, Option<Said>); 2],
+    said: [(&str, Option<Said>); 3],
 ) {
     for test in tests {
         let said = tested_in_words(test, unit);

@@ -141,6 +141,7 @@ impl Given<'_> {
             with: given.with.to_vec(),
             effects: None,
             learn: None,
+            law: None,
             seal: None,
             next: None,
             check: None,

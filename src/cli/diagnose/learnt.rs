@@ -31,7 +31,7 @@ pub(super) fn learnt<M: FittedModel>(
     diagnosis: &Diagnosis,
     options: &Options,
 ) -> Result<(String, Value), Message> {
-    only_unknown(args, diagnosis)?;
+    only_unknown(args, diagnosis, "--learn")?;
     let name = named(place, model)?;
     let bar = progress("learning", None);
     let found = learn(model, options);
@@ -61,7 +61,12 @@ pub(super) fn learnt<M: FittedModel>(
     Ok((text, json))
 }
 
-fn only_unknown(args: &Args, diagnosis: &Diagnosis) -> Result<(), Message> {
+/// Refuses what is only for a gap that no effect explains.
+pub(super) fn only_unknown(
+    args: &Args,
+    diagnosis: &Diagnosis,
+    option: &str,
+) -> Result<(), Message> {
     let refused = |what: String, remedy: String| {
         Err(Message::not_determined(what)
             .in_file(&args.data)
@@ -70,8 +75,11 @@ fn only_unknown(args: &Args, diagnosis: &Diagnosis) -> Result<(), Message> {
     match diagnosis.verdict.kind {
         Kind::Unknown => Ok(()),
         Kind::None => refused(
-            "there is no gap to learn: nothing stands out of the noise".to_owned(),
-            "leave --learn out; more repeats show smaller gaps".to_owned(),
+            match option {
+                "--learn" => "there is no gap to learn: nothing stands out of the noise".to_owned(),
+                _ => "there is no gap to find a law in: nothing stands out of the noise".to_owned(),
+            },
+            format!("leave {option} out; more repeats show smaller gaps"),
         ),
         Kind::Effect => {
             let names = diagnosis.verdict.effects.join(" and ");
@@ -83,18 +91,27 @@ fn only_unknown(args: &Args, diagnosis: &Diagnosis) -> Result<(), Message> {
                 .map(|effect| format!("--without {effect}"))
                 .collect();
             refused(
-                format!("{names} explains the gap, so there is nothing to learn"),
-                format!(
-                    "leave --learn out, or learn it nevertheless with {}",
-                    without.join(" ")
-                ),
+                match option {
+                    "--learn" => format!("{names} explains the gap, so there is nothing to learn"),
+                    _ => format!("{names} explains the gap, so no law is sought in it"),
+                },
+                match option {
+                    "--learn" => format!(
+                        "leave --learn out, or learn it nevertheless with {}",
+                        without.join(" ")
+                    ),
+                    _ => format!(
+                        "leave {option} out, or seek one nevertheless with {}",
+                        without.join(" ")
+                    ),
+                },
             )
         }
     }
 }
 
 /// The effect's name: that of its file.
-fn named<M: FittedModel>(place: &Path, model: &M) -> Result<String, Message> {
+pub(super) fn named<M: FittedModel>(place: &Path, model: &M) -> Result<String, Message> {
     let stem = place.file_stem().map(|stem| stem.to_string_lossy());
     let name = stem.unwrap_or_default().trim().to_owned();
     let known = model.effects();
@@ -108,7 +125,11 @@ fn named<M: FittedModel>(place: &Path, model: &M) -> Result<String, Message> {
     .remedy("give the file another name, such as coolant.toml"))
 }
 
-fn seen<M: FittedModel>(model: &M, data: &Path) -> Result<Seen, Message> {
+/// Where an effect was seen.
+///
+/// # Errors
+/// The file changed while it was read.
+pub(super) fn seen<M: FittedModel>(model: &M, data: &Path) -> Result<Seen, Message> {
     let Read256::Digest(sha256) = digest_of(data) else {
         return Err(Message::bad_input("the file changed while it was read")
             .in_file(data)

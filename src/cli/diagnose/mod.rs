@@ -10,6 +10,7 @@ mod circle;
 mod four_sensor;
 mod fourier;
 pub(in crate::cli) mod joined;
+mod law;
 mod learnt;
 mod machine;
 pub(super) mod page;
@@ -48,12 +49,18 @@ A file for --effects has one table an effect:
 
     [[effect]]
     name = \"warm-up\"
-    formula = \"1 - exp(-time / 600)\"   # of x, time, direction, repeat, channel
+    formula = \"1 - exp(-time / 600)\"   # of x, time, direction, repeat, channel, reading
 
 What no effect explains is learnt from one campaign and tested on another:
 
     errsep diagnose monday.csv --learn coolant.toml
     errsep diagnose friday.csv --effects coolant.toml
+
+A gap that follows a law (powers, exponentials, cosines, steps of position, time or reading) is
+told as a formula, or that there is none:
+
+    errsep diagnose monday.csv --law
+    errsep diagnose monday.csv --law coolant.toml   # written for --effects
 
 What a further measurement will show is written down before it is made, and scored afterwards:
 
@@ -91,6 +98,9 @@ pub struct Args {
     /// Where no effect explains the gap, write what is left as an effect of its own, for --effects.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "with")]
     learn: Option<PathBuf>,
+    /// Where no effect explains the gap, seek a law in it: a formula, written to FILE where one is named.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "with")]
+    law: Option<Option<PathBuf>>,
     /// Write what a further measurement is expected to show, before it is made, for `errsep check`.
     #[arg(long, value_name = "FILE.toml", requires = "next", conflicts_with_all = ["with", "columns"])]
     seal: Option<PathBuf>,
@@ -163,7 +173,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             "give the number of rivals of a family, such as --severity {RIVALS}, at most {MOST_RIVALS}; 0 draws none"
         )));
     }
-    if args.learn.is_some() || args.effects.is_some() || args.seal.is_some() {
+    if args.learn.is_some() || args.law.is_some() || args.effects.is_some() || args.seal.is_some() {
         // A learnt effect names the readings that it was learnt from by their digest.
         want_digests();
     }

@@ -5,6 +5,8 @@
 
 use serde::Deserialize;
 
+use crate::diagnosis::catalogue::curve::Along;
+
 /// What a formula may ask of a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circumstances {
@@ -18,9 +20,11 @@ pub struct Circumstances {
     pub repeat: f64,
     /// Number of the channel, from one, in the order of the report.
     pub channel: f64,
+    /// The reading as the model has it, without its own noise.
+    pub reading: f64,
 }
 
-/// A formula in x, time, direction, repeat and channel.
+/// A formula in x, time, direction, repeat, channel and reading.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(try_from = "String")]
 pub struct Formula {
@@ -48,6 +52,7 @@ enum Variable {
     Direction,
     Repeat,
     Channel,
+    Reading,
 }
 
 /// A function of one or two numbers.
@@ -58,12 +63,13 @@ enum Function {
 }
 
 /// Names of variables, for messages.
-const VARIABLES: [(&str, Variable); 5] = [
+const VARIABLES: [(&str, Variable); 6] = [
     ("x", Variable::X),
     ("time", Variable::Time),
     ("direction", Variable::Direction),
     ("repeat", Variable::Repeat),
     ("channel", Variable::Channel),
+    ("reading", Variable::Reading),
 ];
 
 /// Names of functions.
@@ -100,6 +106,21 @@ impl Formula {
     pub fn at(&self, reading: &Circumstances) -> f64 {
         self.root.value(reading)
     }
+
+    /// As it was written.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The first of position, time and reading that it names.
+    pub fn along(&self) -> Option<Along> {
+        self.root.along()
+    }
+
+    /// Whether it asks for the reading.
+    pub fn has_reading(&self) -> bool {
+        self.root.has(Variable::Reading)
+    }
 }
 
 impl Node {
@@ -111,10 +132,29 @@ impl Node {
             Self::Variable(Variable::Direction) => reading.direction,
             Self::Variable(Variable::Repeat) => reading.repeat,
             Self::Variable(Variable::Channel) => reading.channel,
+            Self::Variable(Variable::Reading) => reading.reading,
             Self::Call(Function::One(function), inner) => function(inner[0].value(reading)),
             Self::Call(Function::Two(function), inner) => {
                 function(inner[0].value(reading), inner[1].value(reading))
             }
+        }
+    }
+
+    fn has(&self, variable: Variable) -> bool {
+        match self {
+            Self::Number(_) => false,
+            Self::Variable(own) => *own == variable,
+            Self::Call(_, inner) => inner.iter().any(|n| n.has(variable)),
+        }
+    }
+
+    fn along(&self) -> Option<Along> {
+        match self {
+            Self::Variable(Variable::X) => Some(Along::Position),
+            Self::Variable(Variable::Time) => Some(Along::Time),
+            Self::Variable(Variable::Reading) => Some(Along::Reading),
+            Self::Number(_) | Self::Variable(_) => None,
+            Self::Call(_, inner) => inner.iter().find_map(Self::along),
         }
     }
 
@@ -330,6 +370,7 @@ mod tests {
         direction: -1.0,
         repeat: 2.0,
         channel: 4.0,
+        reading: 0.5,
     };
 
     fn value(text: &str) -> f64 {
@@ -350,6 +391,7 @@ mod tests {
             2.0
         );
         assert_eq!(value("cos(0 * pi)"), 1.0);
+        assert_eq!(value("reading^2"), 0.25);
     }
 
     #[test]

@@ -63,6 +63,15 @@ pub struct Seen {
     pub date: String,
 }
 
+/// A reading as the model has it, where it is asked for.
+fn reading_at(readings: &Option<Vec<f64>>, k: usize) -> f64 {
+    readings
+        .as_ref()
+        .and_then(|r| r.get(k))
+        .copied()
+        .unwrap_or(0.0)
+}
+
 /// The effects of a file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -71,13 +80,14 @@ pub struct TabulatedEffects {
     pub effect: Vec<Spanned<Tabulated>>,
 }
 
-fn circumstances(place: &Place) -> Circumstances {
+fn circumstances(place: &Place, reading: f64) -> Circumstances {
     Circumstances {
         x: place.x,
         time: place.time,
         direction: place.direction,
         repeat: f64::from(place.repeat),
         channel: place.channel as f64 + 1.0,
+        reading,
     }
 }
 
@@ -97,12 +107,20 @@ impl Tabulated {
         let weights = self.weights(&channels);
         let of = |(place, change): (&Place, f64)| self.weight(&weights, place) * change;
         if self.curve.is_empty() {
-            let pairs = model.places().iter().map(|place| (place, self.at(place)));
+            let readings = self.readings(model);
+            let places = model.places().iter().enumerate();
+            let pairs = places.map(|(k, place)| (place, self.at(place, reading_at(&readings, k))));
             return pairs.map(of).collect();
         }
         let pairs = model.places().iter().zip(self.on_curves(model));
         let at = |(place, on): (_, On<'_>)| of((place, on.map_or(0.0, |(c, value)| c.at(value))));
         pairs.map(at).collect()
+    }
+
+    /// Every reading as the model has it, where its formula asks for them.
+    fn readings<M: FittedModel>(&self, model: &M) -> Option<Vec<f64>> {
+        let asks = self.formula.as_ref().is_some_and(Formula::has_reading);
+        asks.then(|| Along::Reading.values(model))
     }
 
     /// The curve of each reading, and where on it the reading is.
@@ -133,8 +151,11 @@ impl Tabulated {
             .get(both[usize::from(Way::of(place) == Way::Backward)]?)
     }
 
-    /// Part of the readings at which its curves were not seen.
+    /// Part of the readings at which its curves were not seen; of a formula none is told.
     pub fn outside<M: FittedModel>(&self, model: &M) -> f64 {
+        if self.curve.is_empty() {
+            return 0.0;
+        }
         let all = self.on_curves(model);
         let unseen = all
             .iter()
@@ -142,9 +163,9 @@ impl Tabulated {
         unseen.count() as f64 / all.len().max(1) as f64
     }
 
-    fn at(&self, place: &Place) -> f64 {
+    fn at(&self, place: &Place, reading: f64) -> f64 {
         if let Some(formula) = &self.formula {
-            return formula.at(&circumstances(place));
+            return formula.at(&circumstances(place, reading));
         }
         let x = place.x;
         let right = self.signature.partition_point(|p| p[0] < x);
@@ -189,7 +210,13 @@ impl Tabulated {
         if let Some(what) = self.fault_of_form(&channels) {
             return Some(what);
         }
-        let undefined = |f: &Formula| places.iter().find(|p| !f.at(&circumstances(p)).is_finite());
+        let readings = self.readings(model);
+        let value =
+            |f: &Formula, k: usize| f.at(&circumstances(&places[k], reading_at(&readings, k)));
+        let undefined = |f: &Formula| {
+            let mut all = (0..places.len()).filter(|k| !value(f, *k).is_finite());
+            all.next().map(|k| &places[k])
+        };
         if let Some(place) = self.formula.as_ref().and_then(undefined) {
             return Some(format!(
                 "the formula of `{}` gives no finite number at position {}, time {}",

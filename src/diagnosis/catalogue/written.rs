@@ -1,4 +1,4 @@
-//! A learnt effect as the file that `--effects` reads.
+//! An effect of curves or of a formula as the file that `--effects` reads.
 
 use std::fmt::Write;
 
@@ -10,17 +10,33 @@ use crate::diagnosis::catalogue::tabulated::{Seen, Tabulated};
 /// Digits of a change, of a place and of an open change: the band is known to no more.
 const DIGITS: [usize; 3] = [6, 10, 3];
 
-/// The text of a file with one effect of curves. `heading`: lines for people, without their `#`.
+/// The text of a file with one effect of curves or of a formula. `heading`: lines for people, without their `#`.
 pub fn written<M: FittedModel>(effect: &Tabulated, model: &M, heading: &[String]) -> String {
     let mut text: String = heading.iter().map(|line| format!("# {line}\n")).collect();
+    let _ = write!(text, "\n[[effect]]\nname = {}\n", quoted(&effect.name));
     let along = effect.along.unwrap_or(Along::Position);
-    let _ = write!(
-        text,
-        "\n[[effect]]\nname = {}\nalong = {}   # {}\n",
-        quoted(&effect.name),
-        quoted(along.name()),
-        along.unit(model)
-    );
+    if let Some(formula) = &effect.formula {
+        let _ = writeln!(
+            text,
+            "formula = {}   # {}",
+            quoted(formula.text()),
+            model.reading_unit()
+        );
+    } else {
+        let _ = writeln!(
+            text,
+            "along = {}   # {}",
+            quoted(along.name()),
+            along.unit(model)
+        );
+    }
+    if !effect.channels.is_empty() {
+        let weights = effect.channels.iter();
+        let weights: Vec<String> = weights
+            .map(|(name, w)| format!("{} = {w:?}", quoted(name)))
+            .collect();
+        let _ = writeln!(text, "channels = {{ {} }}", weights.join(", "));
+    }
     if let Some(seen) = &effect.seen {
         text += &seen_in(seen);
     }

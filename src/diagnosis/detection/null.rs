@@ -38,14 +38,14 @@ pub struct NullLaw {
 
 /// A sorted sample with an exponential tail fitted to its upper tenth.
 #[derive(Debug, Clone)]
-struct Tail {
+pub(in crate::diagnosis) struct Tail {
     sorted: Vec<f64>,
     from: f64,
     scale: f64,
 }
 
 impl Tail {
-    fn new(mut sample: Vec<f64>) -> Self {
+    pub fn new(mut sample: Vec<f64>) -> Self {
         sample.sort_by(f64::total_cmp);
         let start = sample.len() * 9 / 10;
         let from = sample.get(start).copied().unwrap_or(0.0);
@@ -58,7 +58,8 @@ impl Tail {
         }
     }
 
-    fn beyond(&self, value: f64) -> f64 {
+    /// Probability of a value as great.
+    pub fn beyond(&self, value: f64) -> f64 {
         // A family that showed nothing in any draw was not there to be judged.
         if self.from <= 0.0 {
             return 1.0;

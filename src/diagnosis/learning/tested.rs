@@ -8,6 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 
 use crate::diagnosis::attribution::shrink::{GapMeter, HeldOut, Size, shrink};
+use crate::diagnosis::catalogue::curve::{Along, Curve};
 use crate::diagnosis::catalogue::tabulated::{Seen, Tabulated};
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::space::Space;
@@ -18,6 +19,8 @@ use crate::diagnosis::options::Options;
 const DRAWS: usize = 1000;
 /// Cosines of a drawn curve.
 const COSINES: usize = 24;
+/// Points of a drawn curve in the place of a formula.
+const POINTS: usize = 97;
 /// Drawn curves that are projected at once.
 const BATCH: usize = 100;
 
@@ -119,6 +122,7 @@ fn by_chance<M: FittedModel>(
 ) -> Vec<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x6368_616e_6365);
     let mut explained = Vec::with_capacity(DRAWS);
+    let effect = &curved(model, effect);
     while explained.len() < DRAWS {
         let columns: Vec<DVector<f64>> = (0..BATCH)
             .map(|_| {
@@ -141,6 +145,35 @@ fn by_chance<M: FittedModel>(
         }));
     }
     explained
+}
+
+/// What is drawn in place of an effect: its curves, or of a formula one curve over what it is a function of.
+fn curved<M: FittedModel>(model: &M, effect: &Tabulated) -> Tabulated {
+    let Some(formula) = &effect.formula else {
+        return effect.clone();
+    };
+    let along = formula.along().unwrap_or(Along::Position);
+    let values = along.values(model);
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let at = |k: usize| {
+        [
+            low + (high - low) * k as f64 / (POINTS - 1) as f64,
+            0.0,
+            0.0,
+        ]
+    };
+    Tabulated {
+        formula: None,
+        along: Some(along),
+        curve: vec![Curve {
+            channel: None,
+            direction: None,
+            points: (0..POINTS).map(at).collect(),
+            open: Vec::new(),
+        }],
+        ..effect.clone()
+    }
 }
 
 /// The same effect with other curves.

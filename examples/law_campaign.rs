@@ -1,0 +1,564 @@
+//! Laws put into simulated campaigns and sought again: `cargo run --release --example law_campaign -- CASES SEED
+//! [laws|nulls|smooth]`. Twenty laws by formulas of this file, which shares no code with the grammar, with parameters
+//! of chance are laid over readings of a reversal, a calibration line and a circle, the whole catalogue withheld. Told
+//! is how often the law is found exactly: the same class of expression, and a visible change equal to 1 % of its root
+//! mean square; and how often a law is told where there is none: in the noise, in Gaussian processes, in bumps.
+
+#[path = "../tests/other_models/mod.rs"]
+mod other_models;
+#[path = "../tests/scene/mod.rs"]
+mod scene;
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use errsep::diagnosis::{Kind, Law, LawFound, Options, diagnose_with, law};
+use errsep_models::calibration_line::CalibrationLine;
+use errsep_models::circle::CirclePoints;
+use errsep_models::model::{Effect, FittedModel, Place, Shape};
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
+use nalgebra::DVector;
+use other_models::{calibration_line_made, circle_made};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use statrs::distribution::{Beta, ContinuousCDF};
+
+/// Length of what is seen of a law, in units of the noise of one reading: exact to 1 % is only possible far above it.
+const SEEN: [f64; 2] = [250.0, 1000.0];
+/// The same of gaps that are no law.
+const SEEN_SMOOTH: [f64; 2] = [30.0, 1000.0];
+
+/// What a law may ask of a reading: position and time over their ranges (0 to 1), the reading over half its range
+/// about zero, the direction, the channel.
+struct At {
+    x: f64,
+    t: f64,
+    r: f64,
+    d: f64,
+    c: usize,
+}
+
+/// Classes and coordinates of the terms that are right, the law with four parameters of chance in 0 to 1, and the
+/// parameter by which its uncertainty is judged: its name in the answer and the truth over the coordinate's range.
+type Listed = (
+    &'static [(&'static str, &'static str)],
+    fn(&At, &[f64; 4]) -> f64,
+    Option<(&'static str, fn(&[f64; 4]) -> f64)>,
+);
+
+fn one(a: &At, channel: usize) -> f64 {
+    f64::from(u8::from(a.c == channel))
+}
+
+fn from(value: f64, place: f64) -> f64 {
+    f64::from(u8::from(value >= place))
+}
+
+const REVERSAL: [Listed; 17] = [
+    (
+        &[("power 2", "position")],
+        |a, _| one(a, 0) * a.x * a.x,
+        None,
+    ),
+    (
+        &[("power 3", "position")],
+        |a, _| one(a, 3) * (a.x - 0.5).powi(3),
+        None,
+    ),
+    (
+        &[("absolute value", "position")],
+        |a, p| one(a, 1) * (a.x - 0.25 - 0.5 * p[0]).abs(),
+        Some(("origin", |p| 0.25 + 0.5 * p[0])),
+    ),
+    (
+        &[("step", "position")],
+        |a, p| one(a, 2) * from(a.x, 0.2 + 0.6 * p[0]),
+        None,
+    ),
+    (
+        &[("cosine", "position")],
+        |a, p| one(a, 0) * (TAU * a.x * (1.5 + 8.0 * p[0]) + TAU * p[1]).cos(),
+        Some(("period", |p| 1.0 / (1.5 + 8.0 * p[0]))),
+    ),
+    (&[("power 2", "position")], |a, _| a.d * a.x * a.x, None),
+    (
+        &[("cosine", "position")],
+        |a, p| a.d * one(a, 1) * (TAU * a.x * (2.0 + 18.0 * p[0]) + TAU * p[1]).cos(),
+        Some(("period", |p| 1.0 / (2.0 + 18.0 * p[0]))),
+    ),
+    (
+        &[("saturating exponential", "time")],
+        |a, p| 1.0 - (-a.t / (0.1 + 0.5 * p[0])).exp(),
+        Some(("constant", |p| 0.1 + 0.5 * p[0])),
+    ),
+    (
+        &[("growing exponential", "time")],
+        |a, p| one(a, 0) * ((a.t / (0.2 + 0.3 * p[0])).exp() - 1.0),
+        Some(("constant", |p| 0.2 + 0.3 * p[0])),
+    ),
+    (
+        &[("cosine", "time")],
+        |a, p| (TAU * a.t * (1.2 + 4.0 * p[0]) + TAU * p[1]).cos(),
+        Some(("period", |p| 1.0 / (1.2 + 4.0 * p[0]))),
+    ),
+    (
+        &[("step", "time")],
+        |a, p| one(a, 1) * from(a.t, 0.1 + 0.3 * p[0]),
+        None,
+    ),
+    (&[("power 2", "time")], |a, _| a.t * a.t, None),
+    (
+        &[("power 2", "reading")],
+        |a, _| one(a, 0) * a.r * a.r,
+        None,
+    ),
+    (&[("power 3", "reading")], |a, _| a.r.powi(3), None),
+    (&[("absolute value", "reading")], |a, _| a.r.abs(), None),
+    (
+        &[("cosine", "time"), ("power 2", "position")],
+        |a, p| 4.0 * one(a, 0) * a.x * a.x + (TAU * a.t * (1.2 + 3.0 * p[0]) + TAU * p[1]).cos(),
+        Some(("period", |p| 1.0 / (1.2 + 3.0 * p[0]))),
+    ),
+    (
+        &[("constant", ""), ("step", "time")],
+        |a, p| 0.5 * a.d + one(a, 2) * from(a.t, 0.6 + 0.3 * p[0]),
+        None,
+    ),
+];
+
+const LINE: [Listed; 2] = [
+    (
+        &[("cosine", "position")],
+        |a, p| (TAU * a.x * (1.3 + 5.0 * p[0]) + TAU * p[1]).cos(),
+        Some(("period", |p| 1.0 / (1.3 + 5.0 * p[0]))),
+    ),
+    (
+        &[("growing exponential", "position")],
+        |a, p| (a.x / (0.2 + 0.1 * p[0])).exp() - 1.0,
+        Some(("constant", |p| 0.2 + 0.1 * p[0])),
+    ),
+];
+
+const CIRCLE: [Listed; 1] = [(
+    &[("step", "time")],
+    |a, p| from(a.t, 0.2 + 0.6 * p[0]),
+    None,
+)];
+
+/// The circumstances of all readings. A reading is the mean of those that differ by nothing but noise.
+fn circumstances<M: FittedModel>(model: &M) -> Vec<At> {
+    let places = model.places();
+    let mut sums: BTreeMap<(usize, usize), (f64, f64)> = BTreeMap::new();
+    for (place, value) in places.iter().zip(model.observed()) {
+        let sum = sums.entry((place.cell, place.channel)).or_default();
+        *sum = (sum.0 + value, sum.1 + 1.0);
+    }
+    let reading = |p: &Place| {
+        let (sum, count) = sums[&(p.cell, p.channel)];
+        sum / count
+    };
+    let range = |value: &dyn Fn(&Place) -> f64| {
+        let low = places.iter().map(value).fold(f64::INFINITY, f64::min);
+        (
+            low,
+            places.iter().map(value).fold(f64::NEG_INFINITY, f64::max),
+        )
+    };
+    let part = |(low, high): (f64, f64), value: f64| (value - low) / (high - low).max(1e-300);
+    let (x, t, r) = (range(&|p| p.x), range(&|p| p.time), range(&reading));
+    let reach = r.0.abs().max(r.1.abs());
+    let at = |p: &Place| At {
+        x: part(x, p.x),
+        t: part(t, p.time),
+        r: reading(p) / reach,
+        d: p.direction,
+        c: p.channel,
+    };
+    places.iter().map(at).collect()
+}
+
+/// What the model leaves of changes of its readings: an orthonormal basis of what it absorbs, column by column.
+struct Absorbed(Vec<DVector<f64>>);
+
+impl Absorbed {
+    fn of<M: FittedModel>(model: &M) -> Self {
+        let freedom = model.freedom();
+        let mut columns: Vec<DVector<f64>> = freedom
+            .columns
+            .column_iter()
+            .map(|c| c.clone_owned())
+            .collect();
+        if let Some(profiles) = &freedom.profiles {
+            let length = model.traces()[0].len();
+            for function in 0..profiles.patterns.ncols() {
+                let withheld = profiles.withheld.iter().find(|w| w.0 == function);
+                for i in 0..length {
+                    let mut profile = DVector::zeros(length);
+                    profile[i] = 1.0;
+                    if let Some((_, normal)) = withheld {
+                        profile -= normal * (normal[i] / normal.norm_squared());
+                    }
+                    let mut column = DVector::zeros(model.places().len());
+                    for (t, trace) in model.traces().iter().enumerate() {
+                        let own = &profile * profiles.patterns[(t, function)];
+                        column.rows_mut(trace.start, length).copy_from(&own);
+                    }
+                    columns.push(column);
+                }
+            }
+        }
+        let mut kept = Self(Vec::new());
+        for column in columns {
+            let left = kept.left(&kept.left(&column));
+            if left.norm() > 1e-7 * column.norm() {
+                kept.0.push(left.normalize());
+            }
+        }
+        kept
+    }
+
+    fn left(&self, change: &DVector<f64>) -> DVector<f64> {
+        let mut left = change.clone();
+        for basis in &self.0 {
+            left.axpy(-basis.dot(&left), basis, 1.0);
+        }
+        left
+    }
+}
+
+fn drawn_size(bounds: [f64; 2], random: &mut ChaCha8Rng) -> f64 {
+    bounds[0] * (bounds[1] / bounds[0]).powf(random.random::<f64>())
+}
+
+/// A change of a visible length in units of the noise.
+fn scaled(change: &DVector<f64>, absorbed: &Absorbed, noise: f64, seen: f64) -> DVector<f64> {
+    change * (seen * noise / absorbed.left(change).norm())
+}
+
+fn options() -> Options {
+    Options {
+        draws: 200,
+        ..Options::default()
+    }
+}
+
+/// What the search comes to on readings whose verdict without a catalogue is `unknown`.
+enum Outcome {
+    NotUnknown,
+    NoLaw(String),
+    Told(Box<Law>),
+}
+
+fn sought<M: FittedModel>(model: &M, forced: bool) -> Outcome {
+    let options = options();
+    if !forced && diagnose_with(model, Vec::new(), &options).verdict.kind != Kind::Unknown {
+        return Outcome::NotUnknown;
+    }
+    match law(model, &options, 0) {
+        Ok(LawFound::Law(law)) => Outcome::Told(law),
+        Ok(LawFound::None(none)) => Outcome::NoLaw(format!("{} ({:?})", none.why, none.nearest)),
+        Err(_) => Outcome::NotUnknown,
+    }
+}
+
+#[derive(Default, Clone, Copy)]
+struct Count {
+    cases: usize,
+    unknown: usize,
+    told: usize,
+    class: usize,
+    exact: usize,
+    sizes: usize,
+    inside: usize,
+}
+
+fn case<M: FittedModel>(base: &M, noise: f64, listed: &Listed, seed: u64) -> Count {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let parameters = [0; 4].map(|_| random.random::<f64>());
+    let places = circumstances(base);
+    let raw = DVector::from_iterator(
+        places.len(),
+        places.iter().map(|a| (listed.1)(a, &parameters)),
+    );
+    let absorbed = Absorbed::of(base);
+    let change = scaled(&raw, &absorbed, noise, drawn_size(SEEN, &mut random));
+    let mut count = Count {
+        cases: 1,
+        ..Count::default()
+    };
+    let verbose = std::env::var_os("ERRSEP_CASES").is_some();
+    match sought(&base.refit(base.observed() + &change), false) {
+        Outcome::NotUnknown => {
+            if verbose {
+                println!("{seed} {:?}: no gap", listed.0);
+            }
+        }
+        Outcome::NoLaw(why) => {
+            count.unknown = 1;
+            if verbose {
+                println!("{seed} {:?}: {why}", listed.0);
+            }
+        }
+        Outcome::Told(law) => {
+            (count.unknown, count.told) = (1, 1);
+            let own = law.effect.columns(base, &Shape::only())[0].dense(places.len());
+            let off = absorbed.left(&(own - &change)).norm() / absorbed.left(&change).norm();
+            let mut classes: Vec<(&str, &str)> = law
+                .terms
+                .iter()
+                .map(|t| (t.function.as_str(), t.along.unwrap_or("")))
+                .collect();
+            classes.sort_unstable();
+            count.class = usize::from(classes == listed.0);
+            count.exact = usize::from(classes == listed.0 && off <= 0.01);
+            if let Some((name, truth)) = listed.2.filter(|_| count.class == 1) {
+                let along = law
+                    .terms
+                    .iter()
+                    .find(|t| t.parameters.iter().any(|p| p.name == name));
+                let found = along.and_then(|t| t.parameters.iter().find(|p| p.name == name));
+                let of_time = along.is_some_and(|t| t.along == Some("time"));
+                let value = |p: &Place| if of_time { p.time } else { p.x };
+                let low = base
+                    .places()
+                    .iter()
+                    .map(value)
+                    .fold(f64::INFINITY, f64::min);
+                let high = base
+                    .places()
+                    .iter()
+                    .map(value)
+                    .fold(f64::NEG_INFINITY, f64::max);
+                let from = if name == "origin" { low } else { 0.0 };
+                if let Some(found) = found {
+                    let off = found.value - from - truth(&parameters) * (high - low);
+                    count.sizes = 1;
+                    count.inside = usize::from(off.abs() <= 1.96 * found.std);
+                }
+            }
+            if verbose {
+                let text = law.effect.formula.as_ref().map_or("", |f| f.text());
+                println!(
+                    "{seed} {:?}: {text} {:?}, off {off:.4}, odds {:.1e}",
+                    listed.0, law.effect.channels, law.odds
+                );
+            }
+        }
+    }
+    count
+}
+
+/// Two-sided 95 % limits of a part (Clopper and Pearson).
+fn limits(count: usize, of: usize) -> String {
+    let (a, n) = (count as f64, of as f64);
+    let at = |a: f64, b: f64, p: f64| Beta::new(a, b).unwrap().inverse_cdf(p);
+    let low = if count == 0 {
+        0.0
+    } else {
+        at(a, n - a + 1.0, 0.025)
+    };
+    let high = if count == of {
+        1.0
+    } else {
+        at(a + 1.0, n - a, 0.975)
+    };
+    format!(
+        "{count} of {of} ({:.1} to {:.1} %)",
+        100.0 * low,
+        100.0 * high
+    )
+}
+
+fn table<M: FittedModel>(
+    name: &str,
+    listed: &[Listed],
+    (cases, first): (u64, u64),
+    noise: f64,
+    make: &(dyn Fn(u64) -> M + Sync),
+) -> Count {
+    let mut whole = Count::default();
+    for (k, law) in listed.iter().enumerate() {
+        let all: Vec<Count> = (0..cases)
+            .into_par_iter()
+            .map(|case| {
+                let seed = first * 100_000 + k as u64 * 1000 + case;
+                self::case(&make(seed), noise, law, seed)
+            })
+            .collect();
+        let sum = all.iter().fold(Count::default(), |a, b| Count {
+            cases: a.cases + b.cases,
+            unknown: a.unknown + b.unknown,
+            told: a.told + b.told,
+            class: a.class + b.class,
+            exact: a.exact + b.exact,
+            sizes: a.sizes + b.sizes,
+            inside: a.inside + b.inside,
+        });
+        let terms: Vec<String> = law
+            .0
+            .iter()
+            .map(|(f, along)| format!("{f} {along}"))
+            .collect();
+        println!(
+            "| {name} | {} | {} | {} | {} | {} | {} |",
+            terms.join(" + "),
+            sum.cases,
+            sum.unknown,
+            sum.told,
+            sum.class,
+            sum.exact
+        );
+        whole.cases += sum.cases;
+        whole.unknown += sum.unknown;
+        whole.told += sum.told;
+        whole.class += sum.class;
+        whole.exact += sum.exact;
+        whole.sizes += sum.sizes;
+        whole.inside += sum.inside;
+    }
+    whole
+}
+
+/// A gap that is no law of the grammar: a Gaussian process or a bump along one coordinate, each channel with a weight
+/// of chance or all alike.
+fn no_law<M: FittedModel>(model: &M, random: &mut ChaCha8Rng) -> DVector<f64> {
+    let places = circumstances(model);
+    let along = random.random_range(0..3);
+    let bump = random.random::<f64>() < 0.25;
+    let alike = random.random::<bool>();
+    let channels = places.iter().map(|a| a.c).max().unwrap_or(0) + 1;
+    let normal = |random: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(random) };
+    let weights: Vec<f64> = (0..channels)
+        .map(|_| if alike { 1.0 } else { normal(random) })
+        .collect();
+    let length = 0.04 * (1.0f64 / 0.04).powf(random.random::<f64>());
+    let centre = random.random::<f64>();
+    let waves: Vec<(f64, f64)> = (0..32)
+        .map(|_| (normal(random) / length, TAU * random.random::<f64>()))
+        .collect();
+    DVector::from_iterator(
+        places.len(),
+        places.iter().map(|a| {
+            let u = [a.x, a.t, 0.5 * (1.0 + a.r)][along];
+            let value: f64 = if bump {
+                (-((u - centre) / (0.3 * length)).powi(2)).exp()
+            } else {
+                waves.iter().map(|(w, phase)| (w * u + phase).cos()).sum()
+            };
+            value * weights[a.c]
+        }),
+    )
+}
+
+/// How many gaps that are no law are told as one.
+fn false_laws<M: FittedModel>(
+    name: &str,
+    (cases, first): (u64, u64),
+    noise: f64,
+    make: &(dyn Fn(u64) -> M + Sync),
+    smooth: bool,
+) {
+    let one = |case: u64| {
+        let seed = first * 100_000 + 50_000 + case;
+        let base = make(seed);
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        if !smooth {
+            return sought(&base, true);
+        }
+        let absorbed = Absorbed::of(&base);
+        let raw = no_law(&base, &mut random);
+        let change = scaled(&raw, &absorbed, noise, drawn_size(SEEN_SMOOTH, &mut random));
+        sought(&base.refit(base.observed() + change), false)
+    };
+    let all: Vec<Outcome> = (0..cases).into_par_iter().map(one).collect();
+    let told = all.iter().filter(|o| matches!(o, Outcome::Told(_))).count();
+    let asked = all
+        .iter()
+        .filter(|o| !matches!(o, Outcome::NotUnknown))
+        .count();
+    if std::env::var_os("ERRSEP_CASES").is_some() {
+        for outcome in &all {
+            match outcome {
+                Outcome::Told(law) => println!(
+                    "false: {:?} {:.1e} {:?}",
+                    law.effect.formula, law.odds, law.rms
+                ),
+                Outcome::NoLaw(why) => println!("{why}"),
+                Outcome::NotUnknown => {}
+            }
+        }
+    }
+    println!(
+        "{name}: {cases} campaigns, {asked} asked, false laws {}",
+        limits(told, cases as usize)
+    );
+}
+
+fn reversal(seed: u64) -> Linearised {
+    let observations = scene::scene(seed, 20e-6).measured(seed);
+    Linearised::new(&observations, Assumptions::default()).unwrap()
+}
+
+fn line(seed: u64) -> CalibrationLine {
+    calibration_line_made(&[], seed, 1.0)
+}
+
+fn circle(seed: u64) -> CirclePoints {
+    circle_made(&[], seed, 1.0)
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let number = |k: usize, usual: u64| {
+        arguments
+            .get(k)
+            .and_then(|a| a.parse().ok())
+            .unwrap_or(usual)
+    };
+    let size = (number(0, 5), number(1, 1));
+    let what = arguments.get(2).map(String::as_str);
+    let wanted = |name: &str| what.is_none_or(|w| w == name);
+    println!("{} cases, seed {}", size.0, size.1);
+    // Standard deviation of one reading as the makers have it.
+    let noise = [0.05, 1e-3, 1.0];
+    if wanted("laws") {
+        println!("| model | law | cases | `unknown` | told | right class | exact |");
+        println!("|---|---|---|---|---|---|---|");
+        let counts = [
+            table("reversal", &REVERSAL, size, noise[0], &reversal),
+            table("calibration line", &LINE, size, noise[1], &line),
+            table("circle", &CIRCLE, size, noise[2], &circle),
+        ];
+        let sum = |of: fn(&Count) -> usize| counts.iter().map(of).sum::<usize>();
+        println!(
+            "\nexact {}, of those told {}",
+            limits(sum(|c| c.exact), sum(|c| c.cases)),
+            limits(sum(|c| c.exact), sum(|c| c.told))
+        );
+        println!(
+            "periods, constants and origins within 1.96 standard uncertainties: {}",
+            limits(sum(|c| c.inside), sum(|c| c.sizes))
+        );
+    }
+    for (smooth, name) in [(false, "nulls"), (true, "smooth")] {
+        if wanted(name) {
+            false_laws(
+                &format!("{name}, reversal"),
+                size,
+                noise[0],
+                &reversal,
+                smooth,
+            );
+            false_laws(
+                &format!("{name}, calibration line"),
+                size,
+                noise[1],
+                &line,
+                smooth,
+            );
+            false_laws(&format!("{name}, circle"), size, noise[2], &circle, smooth);
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! The grammar: functions of coordinates times patterns over channels and directions, one term or two.
+
+use errsep_models::model::FittedModel;
+use nalgebra::{DMatrix, DVector};
+
+use crate::diagnosis::catalogue::curve::Along;
+use crate::diagnosis::symbolic::function::{Coordinate, Function};
+use crate::diagnosis::symbolic::pattern::{Pattern, block_of};
+use crate::diagnosis::symbolic::view::Fitted;
+
+/// *Limit.* Part of the readings' range that a law along the reading may change them by.
+const OFF: f64 = 0.3;
+
+/// A function of a coordinate.
+#[derive(Clone, Copy)]
+pub(super) struct Kind {
+    pub function: Function,
+    pub coordinate: usize,
+}
+
+/// One term of a law, without its amplitudes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Term {
+    pub kind: usize,
+    pub pattern: usize,
+    pub shape: f64,
+}
+
+impl Term {
+    /// Function and pattern, whatever the shape.
+    pub fn form(self) -> (usize, usize) {
+        (self.kind, self.pattern)
+    }
+}
+
+/// All that may be a term for the readings of a model.
+pub(super) struct Grammar {
+    pub coordinates: Vec<Coordinate>,
+    /// The simplest first.
+    pub kinds: Vec<Kind>,
+    pub patterns: Vec<Pattern>,
+    /// Channel and direction of every reading.
+    pub blocks: Vec<usize>,
+}
+
+impl Grammar {
+    /// Nothing where no coordinate has enough values.
+    pub fn new<M: FittedModel>(model: &M) -> Option<Self> {
+        let along = [Along::Position, Along::Time, Along::Reading];
+        let coordinates: Vec<Coordinate> = along
+            .into_iter()
+            .filter_map(|a| Coordinate::new(model, a))
+            .collect();
+        if coordinates.is_empty() {
+            return None;
+        }
+        let mut kinds = vec![Kind {
+            function: Function::One,
+            coordinate: 0,
+        }];
+        for (coordinate, c) in coordinates.iter().enumerate() {
+            let of = |function| Kind {
+                function,
+                coordinate,
+            };
+            kinds.extend(Function::all(c).into_iter().map(of));
+        }
+        kinds.sort_by_key(|k| k.function.parameters());
+        Some(Self {
+            coordinates,
+            kinds,
+            patterns: Pattern::all(model),
+            blocks: model.places().iter().map(block_of).collect(),
+        })
+    }
+
+    pub fn function(&self, term: Term) -> Function {
+        self.kinds[term.kind].function
+    }
+
+    pub fn coordinate(&self, term: Term) -> &Coordinate {
+        &self.coordinates[self.kinds[term.kind].coordinate]
+    }
+
+    /// Number of amplitudes.
+    pub fn order(&self, terms: &[Term]) -> usize {
+        terms.iter().map(|t| self.function(*t).order()).sum()
+    }
+
+    /// Parameters, shapes, terms, and the place in the grammar: what is less is simpler.
+    pub fn complexity(&self, terms: &[Term]) -> [usize; 5] {
+        let sum = |value: &dyn Fn(Term) -> usize| terms.iter().map(|t| value(*t)).sum();
+        [
+            sum(&|t| self.function(t).parameters()),
+            sum(&|t| usize::from(self.function(t).is_shaped())),
+            terms.len(),
+            sum(&|t| t.pattern),
+            sum(&|t| t.kind),
+        ]
+    }
+
+    /// Whether two terms may stand together: two steps or bends of one coordinate and pattern are a bump.
+    pub fn may_join(&self, a: Term, b: Term) -> bool {
+        let broken = |t: Term| {
+            matches!(
+                self.function(t),
+                Function::Step | Function::Absolute(_) | Function::Corner
+            )
+        };
+        let same = self.kinds[a.kind].coordinate == self.kinds[b.kind].coordinate;
+        !(broken(a) && broken(b) && same && a.pattern == b.pattern)
+    }
+
+    /// Whether no term along the reading changes it by more than a sensor may be off: beyond that it would be a
+    /// function of what it changes itself.
+    pub fn is_possible(&self, law: &Fitted) -> bool {
+        let mut at = 0;
+        law.terms.iter().all(|term| {
+            let (function, c) = (self.function(*term), self.coordinate(*term));
+            let own = &law.amplitudes.as_slice()[at..at + function.order()];
+            at += function.order();
+            if c.along != Along::Reading || function == Function::One {
+                return true;
+            }
+            let change = |u: &f64| -> f64 {
+                let values = function.at(c, term.shape, *u);
+                own.iter().zip(values).map(|(a, v)| a * v).sum()
+            };
+            let changes = c.values.iter().map(change);
+            let (low, high) = changes.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+                (l.min(v), h.max(v))
+            });
+            high - low <= OFF * c.range()
+        })
+    }
+
+    /// The change of some readings by each amplitude, readings × amplitudes.
+    pub fn columns(&self, terms: &[Term], rows: &[usize]) -> DMatrix<f64> {
+        let mut columns = DMatrix::zeros(rows.len(), self.order(terms));
+        let mut at = 0;
+        for term in terms {
+            let (function, c) = (self.function(*term), self.coordinate(*term));
+            let pattern = &self.patterns[term.pattern];
+            for (k, row) in rows.iter().enumerate() {
+                let weight = pattern.weight(self.blocks[*row]);
+                if weight != 0.0 {
+                    let values = function.at(c, term.shape, c.values[*row]);
+                    for (j, value) in values.iter().take(function.order()).enumerate() {
+                        columns[(k, at + j)] = weight * value;
+                    }
+                }
+            }
+            at += function.order();
+        }
+        columns
+    }
+
+    /// The change of some readings by each shape but a step's, readings × shapes.
+    pub fn slopes(
+        &self,
+        terms: &[Term],
+        amplitudes: &DVector<f64>,
+        rows: &[usize],
+    ) -> DMatrix<f64> {
+        let mut slopes = Vec::new();
+        let mut at = 0;
+        for term in terms {
+            let (function, c) = (self.function(*term), self.coordinate(*term));
+            let pattern = &self.patterns[term.pattern];
+            let own = &amplitudes.as_slice()[at..at + function.order()];
+            if function.is_shaped() && function != Function::Step {
+                let of = |row: &usize| {
+                    let slope = function.slope(c, term.shape, c.values[*row]);
+                    let sum: f64 = own.iter().zip(slope).map(|(a, s)| a * s).sum();
+                    pattern.weight(self.blocks[*row]) * sum
+                };
+                slopes.push(DVector::from_iterator(rows.len(), rows.iter().map(of)));
+            }
+            at += function.order();
+        }
+        if slopes.is_empty() {
+            DMatrix::zeros(rows.len(), 0)
+        } else {
+            DMatrix::from_columns(&slopes)
+        }
+    }
+}

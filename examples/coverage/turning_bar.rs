@@ -57,7 +57,7 @@ pub fn rows(seeds: u64) -> Vec<Row> {
 fn of(
     name: &str,
     unsteady: bool,
-    one: impl Fn(u64) -> Option<Found> + Sync,
+    one: impl Fn(u64) -> Option<Found> + Sync + Send,
     seeds: u64,
 ) -> Vec<Row> {
     let found: Vec<Found> = (0..seeds).into_par_iter().filter_map(one).collect();

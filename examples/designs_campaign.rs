@@ -7,10 +7,15 @@
 //! signatures), of such a size that it leaves 0.7 to 3 times the noise of a reading unabsorbed (machines are
 //! drawn until one can have it so large); the library diagnoses the readings; the truth is opened and counted. Readings without any effect are diagnosed at
 //! false-alarm probabilities of 1 % and 5 %. Case k of an effect has the seed `1000 * N + k`.
+//!
+//! Of the cases that are not right alone the certificate says whether they could be: *separable* are those
+//! whose effect, at the size put in, is 4.65 standard deviations (twice the 99 % quantile) or more from the
+//! effect most like it.
 
 use std::time::{Duration, Instant};
 
-use errsep::diagnosis::{Diagnosis, Kind, Options, diagnose};
+use errsep::diagnosis::{Diagnosis, Kind, NoiseLaw, NoiseSource, Options, certificate, diagnose};
+use errsep_models::model::FittedModel;
 use errsep_models::reversal::designs::simulate::{
     DesignEffect, DesignEffectKind, DesignPlan, frame, simulate,
 };
@@ -49,6 +54,9 @@ const SHOWN: [&str; 14] = [
 /// Sizes in units of the noise.
 const SIZES: (f64, f64) = (0.7, 3.0);
 
+/// Standard deviations between two effects from which on they count as told apart.
+const APART: f64 = 4.65;
+
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let option = |name: &str| -> Option<&String> {
@@ -69,7 +77,7 @@ fn main() {
     let mut counts = vec![Counts::default(); names.len()];
     let mut done = 0;
     while done < cases && Instant::now() < until {
-        let found: Vec<Option<Said>> = names
+        let found: Vec<Option<Case>> = names
             .par_iter()
             .map(|name| one(name, seed + done))
             .collect();
@@ -82,8 +90,10 @@ fn main() {
         "Seeds {seed} to {}, {done} cases an effect.\n",
         seed + done.max(1) - 1
     );
-    println!("| effect | cases | right, alone | right, in a group | wrong | unknown | none |");
-    println!("|---|---|---|---|---|---|---|");
+    println!(
+        "| effect | cases | right, alone | right, in a group | wrong | unknown | none | right, of the separable |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
     let mut all = Counts::default();
     for (name, count) in names.iter().zip(&counts) {
         println!("| `{name}` {}", count.row());
@@ -116,13 +126,25 @@ enum Said {
 #[derive(Debug, Clone, Copy, Default)]
 struct Counts {
     of: [usize; 5],
+    /// Not right alone, and not separable.
+    alike: usize,
     not_made: usize,
 }
 
+/// One case: what was said, and whether the effect could be told from all others.
+#[derive(Debug, Clone, Copy)]
+struct Case {
+    said: Said,
+    separable: bool,
+}
+
 impl Counts {
-    fn add(&mut self, said: Option<Said>) {
-        match said {
-            Some(said) => self.of[said as usize] += 1,
+    fn add(&mut self, case: Option<Case>) {
+        match case {
+            Some(case) => {
+                self.of[case.said as usize] += 1;
+                self.alike += usize::from(!case.separable);
+            }
             None => self.not_made += 1,
         }
     }
@@ -132,6 +154,7 @@ impl Counts {
             *a += b;
         }
         self.not_made += other.not_made;
+        self.alike += other.alike;
         self
     }
 
@@ -142,7 +165,12 @@ impl Counts {
             0 => String::new(),
             n => format!(" ({n} not made)"),
         };
-        format!("| {cases}{without} | {} |", shares.join(" | "))
+        let separable = share(self.of[Said::Right as usize], cases - self.alike);
+        format!(
+            "| {cases}{without} | {} | {separable} of {} |",
+            shares.join(" | "),
+            cases - self.alike
+        )
     }
 }
 
@@ -194,15 +222,43 @@ fn bare(random: &mut ChaCha8Rng, seed: u64) -> Option<DesignPlan> {
 const ATTEMPTS: u64 = 40;
 
 /// One case of an effect; `None` where no machine that is drawn can have it so large.
-fn one(name: &str, seed: u64) -> Option<Said> {
+fn one(name: &str, seed: u64) -> Option<Case> {
     let made = |attempt: u64| made(name, seed + 1_000_000 * attempt);
-    let plan = (0..ATTEMPTS).find_map(made)?;
+    let (plan, visible) = (0..ATTEMPTS).find_map(made)?;
     let (readings, _) = simulate(&plan).ok()?;
-    Some(judged(name, &diagnosed(&readings, 0.01, seed)?))
+    let said = judged(name, &diagnosed(&readings, 0.01, seed)?);
+    let separable =
+        said == Said::Right || apart(name, &plan, visible).is_some_and(|sd| sd >= APART);
+    if said != Said::Right {
+        eprintln!(
+            "{name} seed {seed}: {said:?}, {:?} standard deviations apart",
+            apart(name, &plan, visible)
+        );
+    }
+    Some(Case { said, separable })
 }
 
-/// A machine with the effect at a size that can be seen.
-fn made(name: &str, seed: u64) -> Option<DesignPlan> {
+/// Standard deviations between an effect of which `visible` µm shows and the one most like it; `None` where
+/// the certificate tells it from that one at no plausible size.
+fn apart(name: &str, plan: &DesignPlan, visible: f64) -> Option<f64> {
+    let undisturbed = DesignPlan {
+        effects: Vec::new(),
+        ..plan.clone()
+    };
+    let model = model(&simulate(&undisturbed).ok()?.0)?;
+    let law = NoiseLaw::white(NOISE_UM, f64::INFINITY, NoiseSource::Stated);
+    let options = Options {
+        draws: 200,
+        ..Options::default()
+    };
+    let rows = certificate(&model, &model.effects(), &law, &options);
+    let row = rows.into_iter().find(|row| row.effect == name)?;
+    // The certificate's visible root mean square belongs to the smallest size seen.
+    Some(APART * visible / (row.visible_rms? * row.identifiable? / row.detectable?))
+}
+
+/// A machine with the effect at a size that can be seen, and how much of it shows, µm.
+fn made(name: &str, seed: u64) -> Option<(DesignPlan, f64)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut plan = bare(&mut random, seed)?;
     if name == "thickness-shift" {
@@ -214,7 +270,7 @@ fn made(name: &str, seed: u64) -> Option<DesignPlan> {
     let target = NOISE_UM * (SIZES.0 + (SIZES.1 - SIZES.0) * random.random::<f64>());
     plan.effects = vec![sized(name, &mut plan, target, &mut random)?];
     plan.noise_um = NOISE_UM;
-    Some(plan)
+    Some((plan, target))
 }
 
 /// The effect at a size that leaves so much, µm root mean square, that the model does not absorb. Beside

@@ -5,7 +5,10 @@ use errsep::diagnosis::Kind;
 use errsep::diagnosis::turning::{UNSTEADY_TURN, weigh};
 use errsep_models::noise::Law;
 use errsep_models::reversal::turning_bar::simulate::{TurningPlan, simulate};
-use errsep_models::reversal::turning_bar::{Plan, Run, Setting, Survey, analyse};
+use errsep_models::reversal::turning_bar::{Plan, Run, Setting, Survey, TurningReading, analyse};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::tally::{Row, Tally};
@@ -38,17 +41,29 @@ const CASES: [(&str, f64, f64, f64); 4] = [
 
 /// The table.
 pub fn rows(seeds: u64) -> Vec<Row> {
-    CASES.iter().flat_map(|case| of(case, seeds)).collect()
+    let own = CASES.iter().flat_map(|(name, share, length, stray)| {
+        let one = |seed| one(seed, *share, *length, *stray);
+        of(name, *stray > 0.0, one, seeds)
+    });
+    let other = of(
+        "another maker: loaded drive, uneven feed, steps of 0.02 um, noise correlated over 4 readings",
+        true,
+        |seed| judged(another(seed)),
+        seeds,
+    );
+    own.chain(other).collect()
 }
 
-fn of((name, share, length, stray): &(&str, f64, f64, f64), seeds: u64) -> Vec<Row> {
-    let found: Vec<Found> = (0..seeds)
-        .into_par_iter()
-        .filter_map(|seed| one(seed, *share, *length, *stray))
-        .collect();
+fn of(
+    name: &str,
+    unsteady: bool,
+    one: impl Fn(u64) -> Option<Found> + Sync + Send,
+    seeds: u64,
+) -> Vec<Row> {
+    let found: Vec<Found> = (0..seeds).into_par_iter().filter_map(one).collect();
     let names = ["alpha_h + cone", "eccentricity", "inclination"];
     let row = |quantity: &str, tally: Tally| Row {
-        case: (*name).to_owned(),
+        case: name.to_owned(),
         quantity: quantity.to_owned(),
         seeds: found.len() as u64,
         tally,
@@ -70,7 +85,7 @@ fn of((name, share, length, stray): &(&str, f64, f64, f64), seeds: u64) -> Vec<R
             named.add_wide(f.unsteady[k]);
         }
         let percent = 100.0 * level;
-        rows.push(match *stray > 0.0 {
+        rows.push(match unsteady {
             true => row(&format!("named `{UNSTEADY_TURN}` at {percent} %"), named),
             false => row(&format!("no alarm at {percent} %"), quiet),
         });
@@ -102,6 +117,103 @@ fn one(seed: u64, share: f64, readings: f64, stray: f64) -> Option<Found> {
         ..TurningPlan::default()
     };
     let (all, _) = simulate(&made);
+    judged(Made {
+        readings: all,
+        slope: made.slope_rad,
+        eccentricity: made.eccentricity_um,
+        inclination: made.gamma_rad[0].hypot(made.gamma_rad[1]),
+    })
+}
+
+/// A run with what is true of it: α + τ (rad), |e| at mid travel (µm), |γ| (rad).
+struct Made {
+    readings: Vec<TurningReading>,
+    slope: f64,
+    eccentricity: f64,
+    inclination: f64,
+}
+
+/// A run by other physics than the simulator's. The spindle follows a drive that is loaded anew every few
+/// turns, with a time constant; the feed is uneven; the bar is a line in space that is turned about the axis
+/// of the spindle; the form is bumps and a bow; the indicator shows steps; its noise is a running mean over
+/// four readings beside a white part, neither of which the laws of the fit have.
+fn another(seed: u64) -> Made {
+    let mut random = ChaCha8Rng::seed_from_u64(0x5eed_0000 + seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let (n, step) = (1440, 1.0 / 3.0);
+    let (mut theta, mut turning, mut wanted, mut x) = (6.0 * normal(), 0.314, 0.314, 0.0);
+    let (slope, eccentricity) = (4e-5 * normal(), 9.0 + normal().abs() * 4.0);
+    let (inclination, twist) = (7e-5, 3.0 * normal());
+    let bumps: Vec<[f64; 3]> = (0..7)
+        .map(|k| {
+            [
+                normal(),
+                36.0 * (f64::from(k) + 0.5 * normal()),
+                14.0 + 3.0 * normal().abs(),
+            ]
+        })
+        .collect();
+    let white: Vec<f64> = (0..n + 3).map(|_| normal()).collect();
+    let apart: Vec<f64> = (0..n).map(|_| normal()).collect();
+    let loads: Vec<f64> = (0..n / 150 + 1).map(|_| normal()).collect();
+    let mut places = Vec::with_capacity(n);
+    for i in 0..n {
+        places.push((step * i as f64, x, theta));
+        if i % 150 == 0 {
+            wanted = 0.314 * (1.0 + 0.01 * loads[i / 150]);
+        }
+        turning += (wanted - turning) * step / 9.0;
+        theta += turning * step;
+        x += 0.17 * (1.0 + 0.1 * (i as f64 / 70.0).sin());
+    }
+    let half = 0.5 * x;
+    let bump = |x: f64| -> f64 {
+        let bow = 3.0 * ((x - half) / half).powi(2);
+        bow + bumps
+            .iter()
+            .map(|[h, c, w]| h * (-0.5 * ((x - c) / w).powi(2)).exp())
+            .sum::<f64>()
+    };
+    let form: Vec<f64> = places.iter().map(|p| bump(p.1)).collect();
+    // The line of the form over the readings belongs to the slope.
+    let mean = |values: &dyn Fn(usize) -> f64| (0..n).map(values).sum::<f64>() / n as f64;
+    let (mx, mf) = (mean(&|i| places[i].1), mean(&|i| form[i]));
+    let line =
+        mean(&|i| (places[i].1 - mx) * (form[i] - mf)) / mean(&|i| (places[i].1 - mx).powi(2));
+    let middle = f64::midpoint(places[0].1, places[n - 1].1);
+    let readings = (0..n)
+        .map(|i| {
+            let (time, x, theta) = places[i];
+            // Two points of the axis, turned about that of the spindle.
+            let along = [eccentricity, 0.0];
+            let tilt = [
+                1e3 * inclination * twist.cos(),
+                1e3 * inclination * twist.sin(),
+            ];
+            let own = [0, 1].map(|k| along[k] + tilt[k] * (x - middle));
+            let turned = own[0] * theta.cos() - own[1] * theta.sin();
+            let section = 0.25 * (2.0 * theta + 1.0).cos();
+            let noise = 0.05 * white[i..i + 4].iter().sum::<f64>() / 4.0 + 0.02 * apart[i];
+            let value = turned + section + form[i] + 1e3 * slope * x + noise;
+            TurningReading {
+                time: Some(time),
+                x,
+                value: (value / 0.02).round() * 0.02,
+                spindle: None,
+            }
+        })
+        .collect();
+    Made {
+        readings,
+        slope: slope + 1e-3 * line,
+        eccentricity,
+        inclination,
+    }
+}
+
+/// What is found in a run.
+fn judged(made: Made) -> Option<Found> {
+    let all = &made.readings;
     let plan = Plan {
         setting: Setting {
             harmonics: vec![2],
@@ -110,7 +222,7 @@ fn one(seed: u64, share: f64, readings: f64, stray: f64) -> Option<Found> {
         form_cells: None,
         turn_cells: None,
     };
-    let run = Run::new(&all).ok()?;
+    let run = Run::new(all).ok()?;
     let survey = Survey::new(&run, 0.0, plan.setting.handed, None).ok()?;
     let mut analysis = analyse(&run, &survey, &plan).ok()?;
     analysis.hold_out(&run, &survey);
@@ -118,11 +230,7 @@ fn one(seed: u64, share: f64, readings: f64, stray: f64) -> Option<Found> {
     let chosen = told[0].chosen(&analysis);
     let spread = chosen.spread(&analysis);
     let bar = chosen.fit.bar(&spread)?;
-    let truth = [
-        made.slope_rad,
-        made.eccentricity_um,
-        made.gamma_rad[0].hypot(made.gamma_rad[1]),
-    ];
+    let truth = [made.slope, made.eccentricity, made.inclination];
     let values = [
         chosen.fit.slope(&spread),
         bar.eccentricity_um,

@@ -423,7 +423,7 @@ fn an_effect_joins_the_fit_of_a_design_and_leaves_its_readings() {
 #[test]
 fn what_a_design_cannot_have_is_told() {
     let folder = simulated(EIGHT, &[]);
-    let fitted = "[artefact]\nthickness = 40.0\nfit_thickness = true\n";
+    let fitted = "[artefact]\nthickness = 1.0\nfit_thickness = true\n";
     std::fs::write(folder.path().join("fitted.toml"), fitted).unwrap();
     std::fs::write(
         folder.path().join("single.csv"),
@@ -435,8 +435,8 @@ fn what_a_design_cannot_have_is_told() {
     let cases: [(&[&str], i32, &str); 5] = [
         (
             &["reversal", data, "--setup", "fitted.toml"],
-            2,
-            "fit_thickness is for the channels",
+            1,
+            "would give the thickness only to ±",
         ),
         (
             &["reversal", data, "--simultaneous", "--with=taper"],

@@ -7,6 +7,7 @@ mod columns;
 #[path = "../command/mod.rs"]
 mod command;
 mod designs;
+mod designs_beside_the_crest;
 mod designs_noise_and_tables;
 mod diagnose;
 mod export;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use errsep_models::model::{FittedModel, Place};
 use errsep_models::reversal::Direction;
-use errsep_models::reversal::designs::DesignFit;
+use errsep_models::reversal::designs::{self, DesignFit};
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised, NotDiagnosable};
 use errsep_models::reversal::effects::joins_the_fit;
 use serde_json::Value;
@@ -15,6 +15,7 @@ use super::case::Case;
 use super::joined::{Given, followed_by};
 use super::within_reach_of;
 use crate::cli::Answer;
+use crate::cli::reversal::{design_options as options, no_crest};
 use crate::io::Message;
 use crate::io::reversal::{DesignData, Readings, ReversalSetup, read_any};
 use crate::report::number;
@@ -28,7 +29,10 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         setup.columns = args.columns.map();
     }
     let data = match read_any(&args.data, &setup)? {
-        Readings::Four(data) => data,
+        Readings::Four(data) => {
+            no_crest(&setup, args.setup.as_deref())?;
+            data
+        }
         Readings::Other(data) => return of_design(args, &setup, &data),
     };
     if !args.with.is_empty() {
@@ -70,7 +74,7 @@ fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<An
             design.indicators().len(),
             design.positions().len()
         ),
-        notes: notes(&model),
+        notes: with_crest(setup, notes(&model)),
         model,
         along: ALONG,
         inputs: Vec::new(),
@@ -136,7 +140,28 @@ pub fn design_model(
     data: &DesignData,
     fit: Option<&DesignFit>,
 ) -> Result<Linearised, NotDiagnosable> {
-    Linearised::of_design(&data.observations, setup.zero, fit, assumptions(setup))
+    if setup.crest.is_none() {
+        return Linearised::of_design(&data.observations, setup.zero, fit, assumptions(setup));
+    }
+    let own;
+    let fit = match fit {
+        Some(fit) => fit,
+        None => {
+            let failed = |why: String| NotDiagnosable::NoFit(why);
+            let options = options(setup, data).map_err(|why| failed(why.to_string()))?;
+            own = designs::fit(&data.observations, &options)
+                .map_err(|why| failed(why.to_string()))?;
+            &own
+        }
+    };
+    // What the set-up states of the crest is taken out of the readings; a fit that has the term would carry
+    // them back to where it was.
+    let mut observations = data.observations.clone();
+    for reading in &mut observations.readings {
+        let lost = fit.lost(reading.channel, reading.x);
+        reading.value += lost.map_err(|why| NotDiagnosable::NoFit(why.to_string()))?;
+    }
+    Linearised::of_design(&observations, setup.zero, None, assumptions(setup))
 }
 
 /// A design's answer with the fit that effects have joined behind it, and what they change in each
@@ -277,6 +302,14 @@ pub fn notes(model: &Linearised) -> Vec<String> {
             "{} readings are at positions that not every trace has, and were not used.",
             model.left_out
         ));
+    }
+    notes
+}
+
+/// The notes, and that a stated crest is taken out.
+pub fn with_crest(setup: &ReversalSetup, mut notes: Vec<String>) -> Vec<String> {
+    if setup.crest.is_some() {
+        notes.push("What the styluses lose beside the crest is taken out of the readings as the set-up states it; off-crest is what may be left of that.".to_owned());
     }
     notes
 }

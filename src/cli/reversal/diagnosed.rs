@@ -48,7 +48,9 @@ impl Diagnosed {
     ) -> Result<Self, Message> {
         let model = reversal::design_model(setup, data, Some(fit))
             .map_err(|why| reversal::refusal(&why).in_file(file))?;
-        Self::made(file, model, seed)
+        let mut made = Self::made(file, model, seed)?;
+        made.diagnosis.notes = reversal::with_crest(setup, made.diagnosis.notes);
+        Ok(made)
     }
 
     fn made(file: &Path, model: Linearised, seed: u64) -> Result<Self, Message> {

@@ -13,7 +13,7 @@ mod staged;
 mod tables;
 mod text;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
@@ -25,6 +25,7 @@ use serde_json::Value;
 use super::{Answer, ColumnArgs, CommonArgs};
 use crate::io::reversal::{Readings, ReversalData, ReversalSetup, read_any};
 use crate::io::{Message, OutFile, Status};
+pub use designs::options as design_options;
 use diagnosed::Diagnosed;
 use outcome::Outcome;
 
@@ -110,7 +111,10 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         .transpose()?;
     let progress = super::progress("reading", None);
     let data = match read_any(&args.data, &setup)? {
-        Readings::Four(data) => data,
+        Readings::Four(data) => {
+            no_crest(&setup, args.setup.as_deref())?;
+            data
+        }
         Readings::Other(data) => {
             let answer = designs::answer(args, &setup, &data, corrected);
             progress.finish_and_clear();
@@ -158,6 +162,24 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     match diagnosed {
         Some(diagnosed) => diagnosed.beside(answer, common),
         None => Ok(answer),
+    }
+}
+
+/// What a stylus beside the crest loses hangs on slopes across its line.
+///
+/// # Errors
+/// A set-up that states it of the four channels.
+pub fn no_crest(setup: &ReversalSetup, file: Option<&Path>) -> Result<(), Message> {
+    match (&setup.crest, file) {
+        (Some(_), Some(file)) => Err(Message::bad_input(
+            "off_crest is for indicators in two planes: 1A, 1B, 2A, 2B do not see how slide and bar run \
+             across their line, on which the loss beside the crest hangs",
+        )
+        .in_file(file)
+        .remedy(
+            "leave tip_radius and off_crest out, or read top and bottom too and name the channels by their angles",
+        )),
+        _ => Ok(()),
     }
 }
 

@@ -14,6 +14,7 @@ use super::reversal::Args;
 use super::sizes;
 use crate::cli::Answer;
 use crate::io::message::nearest;
+use crate::io::reversal::StylusBeside;
 use crate::io::{CsvTable, Message};
 
 /// Microradians in a radian, as the options are given.
@@ -64,6 +65,7 @@ pub(super) fn run(args: &Args, text: &str) -> Result<Answer, Message> {
                 .remedy("give e_1, e_2 and the oval part in um, such as 5,-3,0"));
         }
     };
+    let beside = beside(args, &design)?;
     let plan = DesignPlan {
         slopes_rad: [
             args.alpha,
@@ -77,6 +79,7 @@ pub(super) fn run(args: &Args, text: &str) -> Result<Answer, Message> {
         .map(|urad| urad * URAD),
         kept_um: kept,
         thickness_mm: args.thickness,
+        crest: beside.as_ref().map(|crest| crest.of(&design)).transpose()?,
         length_mm: args.length,
         positions: args.positions,
         repeats: args.repeats,
@@ -141,6 +144,11 @@ pub(super) fn run(args: &Args, text: &str) -> Result<Answer, Message> {
         "tilts": tilts,
         "eccentricity": kept.map(|[e_1, e_2, o]| json!({"e_1": e_1, "e_2": e_2, "o": o, "unit": "um"})),
         "thickness": {"value": args.thickness, "unit": "mm"},
+        "off_crest": plan.crest.as_ref().map(|crest| json!({
+            "tip_radius": crest.tip_mm,
+            "by_channel": crest.offset_mm,
+            "unit": "mm",
+        })),
         "noise": {"std": args.noise[0], "unit": "um"},
         "effects": effects.iter().map(|(name, effect)| json!({
             "effect": name,
@@ -153,10 +161,37 @@ pub(super) fn run(args: &Args, text: &str) -> Result<Answer, Message> {
     let mut answer = super::answer("reversal", table, known, args.common.seed)?;
     let zero = if kept.is_some() { "kept" } else { "reset" };
     answer.setup = Some(format!(
-        "[artefact]\nthickness = {:?}      # mm\n\n[indicator]\nzero = \"{zero}\"\n",
-        args.thickness
+        "[artefact]\nthickness = {:?}      # mm\n\n[indicator]\nzero = \"{zero}\"\n{}",
+        args.thickness,
+        beside.map_or_else(String::new, |crest| crest.as_toml())
     ));
     Ok(answer)
+}
+
+/// How the bar stands beside the styluses, where that is asked for.
+fn beside(args: &Args, design: &Design) -> Result<Option<StylusBeside>, Message> {
+    let Some(tip_radius) = args.tip_radius else {
+        return Ok(None);
+    };
+    let indicators = design.indicators();
+    let off_crest = match &args.off_crest[..] {
+        [one] => vec![(None, *one)],
+        each if each.len() == indicators.len() => {
+            let angles = indicators.iter().map(|a| Some(*a));
+            angles.zip(each.iter().copied()).collect()
+        }
+        each => {
+            let (given, wanted) = (each.len(), indicators.len());
+            let what = format!("--off-crest has {given} figures for {wanted} indicators");
+            return Err(Message::bad_input(what).remedy(
+                "give one figure for all, or one for each indicator in the order of their angles",
+            ));
+        }
+    };
+    Ok(Some(StylusBeside {
+        tip_radius,
+        off_crest,
+    }))
 }
 
 /// The effects that are asked for, each with what is drawn for it.

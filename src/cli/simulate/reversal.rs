@@ -150,6 +150,19 @@ pub struct Args {
         requires = "design"
     )]
     pub(super) kept: Vec<f64>,
+    /// A round bar of the diameter --thickness under styluses of that radius, mm, that stand beside its crest.
+    #[arg(long, value_name = "MM", requires = "design", requires = "off_crest")]
+    pub(super) tip_radius: Option<f64>,
+    /// How far the bar stands beside the stylus at the middle of the travel, mm, positive towards growing
+    /// angles of the indicator: one figure, or one for each indicator in the order of their angles.
+    #[arg(
+        long,
+        value_name = "MM,...",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        requires = "tip_radius"
+    )]
+    pub(super) off_crest: Vec<f64>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
 }

@@ -9,6 +9,7 @@ use errsep_models::reversal::staged::Interpolation;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::crest::{self, Offsets, StylusBeside};
 use super::data::ROLES;
 use crate::io::{ColumnMap, Message, SetupFile};
 
@@ -33,6 +34,8 @@ pub struct ReversalSetup {
     pub channels: Vec<DesignChannel>,
     /// What becomes of the indicators' zeros between the traces.
     pub zero: Zero,
+    /// Styluses beside the crest of a bar.
+    pub crest: Option<StylusBeside>,
 }
 
 #[derive(Deserialize, Default)]
@@ -57,6 +60,8 @@ struct Artefact {
 struct Indicator {
     noise: Option<Spanned<f64>>,
     zero: Zeros,
+    tip_radius: Option<Spanned<f64>>,
+    off_crest: Option<Spanned<Offsets>>,
 }
 
 /// The angles of a channel, degrees.
@@ -135,6 +140,12 @@ impl ReversalSetup {
         }
         Ok(Self {
             channels,
+            crest: crest::read(
+                &setup,
+                file.indicator.tip_radius.as_ref(),
+                file.indicator.off_crest.as_ref(),
+                file.artefact.thickness.as_ref().map(|d| *d.as_ref()),
+            )?,
             zero: match file.indicator.zero {
                 Zeros::Reset => Zero::Reset,
                 Zeros::Kept => Zero::Kept,
@@ -179,6 +190,9 @@ impl ReversalSetup {
         );
         if let Some(n) = self.knots {
             text += &format!("knots = {n}\n");
+        }
+        if let Some(crest) = &self.crest {
+            text = text.replacen("\n[model]", &format!("{}\n[model]", crest.as_toml()), 1);
         }
         if self.zero == Zero::Kept {
             text = text.replacen("[indicator]\n", "[indicator]\nzero = \"kept\"\n", 1);

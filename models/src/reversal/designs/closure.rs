@@ -92,7 +92,7 @@ fn profile(
             .map(|place| place[0])
             .collect()
     } else {
-        let breaks = problem.bases[0].breaks();
+        let breaks = problem.splines.finest();
         breaks[..breaks.len() - 1].to_vec()
     };
     let (mut x, mut profile, mut variance) = (Vec::new(), Vec::new(), 0.0);

@@ -56,6 +56,14 @@ pub enum DesignFitError {
         /// How many these readings carry.
         most: usize,
     },
+    /// Slopes and forms so small that a thickness does not show.
+    #[error(
+        "these readings would give the thickness only to ± {std_mm:.3} mm: the slopes of channels and forms are too small for it to show"
+    )]
+    ThicknessNotDetermined {
+        /// Its standard uncertainty if it were fitted, mm.
+        std_mm: f64,
+    },
     /// Too few positions for the shortest spline.
     #[error("no channel has more than {positions} different positions; 4 are needed")]
     TooFewPositions {

@@ -1,11 +1,12 @@
 //! Where each unknown of a design stands in the fit.
 //!
-//! Band: the coefficients of the fitted forms, interleaved by knot; the first and the last of each form
-//! are zero, which takes every straight line out of the splines. Border: slopes, slopes common to a
-//! position of the spindle (held at zero: closures), constants, and the line that is subtracted from
-//! each form.
+//! Band: the coefficients of the fitted forms in the order of the middles of their basis functions, so that
+//! forms of different knots lie side by side; the first and the last of each form are zero, which takes every
+//! straight line out of the splines. Border: slopes, slopes common to a position of the spindle (held at
+//! zero: closures), constants, the line that is subtracted from each form, and the thickness where it is
+//! asked for.
 
-use super::channel::{Design, angle_name, is_same};
+use super::channel::{Design, DesignChannel, angle_name, direction, is_same};
 use super::determined::{Determined, SLIDE};
 
 /// A form that is fitted.
@@ -17,13 +18,38 @@ pub enum FormOf {
     Side(usize),
 }
 
+/// A form of the slide as a channel sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlideSeen {
+    /// Its place among the forms.
+    pub form: usize,
+    /// Its part along the indicator, n(φ).
+    pub along: f64,
+    /// Its part across, t(φ), where the crest of the bar is a term of the fit; otherwise 0.
+    pub across: f64,
+}
+
+/// What moves the artefact across the line of an indicator, of the fitted unknowns: t(φ) and t(ψ) with
+/// t(a) = (−sin a, cos a).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Across {
+    /// Shares of the slopes.
+    pub slopes: Vec<f64>,
+    /// Shares of the slopes of the artefact alone, which turns with the spindle.
+    pub artefact: Vec<f64>,
+    /// Shares of the constants: of the eccentricity.
+    pub constants: Vec<f64>,
+}
+
 /// The unknowns of a fit.
 #[derive(Debug, Clone)]
 pub struct Layout {
     /// Forms, those of the slide first.
     pub forms: Vec<FormOf>,
-    /// By channel: the forms of the slide that it sees, and their factors.
-    pub slides: Vec<Vec<(usize, f64)>>,
+    /// By channel: the forms of the slide that it sees.
+    pub slides: Vec<Vec<SlideSeen>>,
+    /// By channel, where the crest of the bar is a term of the fit: what moves the artefact across.
+    pub across: Vec<Across>,
     /// By channel: the form of its side.
     pub side: Vec<usize>,
     /// By channel: what its slope is of the slopes, then of the closures.
@@ -36,13 +62,26 @@ pub struct Layout {
     pub slope_count: usize,
     /// How many closures are held at zero after them.
     pub closure_count: usize,
-    /// Coefficients of a form, the two fixed ones included.
-    pub coefficients: usize,
+    /// Whether the thickness is unknown.
+    pub thickness: bool,
+    /// By form: the band unknown of each coefficient; none for the first and the last.
+    places: Vec<Vec<Option<usize>>>,
+    /// By band unknown: the form and its coefficient.
+    members: Vec<(usize, usize)>,
+}
+
+/// What a fit has beside slopes, constants and forms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Beside {
+    /// The crest of a bar as a term.
+    pub crest: bool,
+    /// The thickness as an unknown.
+    pub thickness: bool,
 }
 
 impl Layout {
-    /// The unknowns of a design.
-    pub fn new(design: &Design, determined: &Determined, coefficients: usize) -> Self {
+    /// The unknowns of a design, without knots yet.
+    pub fn new(design: &Design, determined: &Determined, beside: Beside) -> Self {
         let channels = design.channels().len();
         let pivots = |a: &super::Analysis| -> Vec<Vec<f64>> {
             let row = |c: usize| a.pivots().iter().map(|j| a.matrix()[(c, *j)]).collect();
@@ -59,9 +98,18 @@ impl Layout {
         let slides = (0..channels)
             .map(|c| {
                 let factors = fitted.iter().enumerate();
+                let [cos, sin] = direction(design.channels()[c].indicator);
                 factors
-                    .map(|(place, (_, j))| (place, forms.matrix()[(c, *j)]))
-                    .filter(|(_, factor)| *factor != 0.0)
+                    .map(|(form, (axis, j))| SlideSeen {
+                        form,
+                        along: forms.matrix()[(c, *j)],
+                        across: if beside.crest {
+                            [-sin, cos][*axis]
+                        } else {
+                            0.0
+                        },
+                    })
+                    .filter(|seen| seen.along != 0.0 || seen.across != 0.0)
                     .collect()
             })
             .collect();
@@ -90,34 +138,60 @@ impl Layout {
             names,
             slope_count: determined.slopes.rank(),
             closure_count: closures.len(),
-            coefficients,
+            across: match beside.crest {
+                true => across(design, determined),
+                false => Vec::new(),
+            },
+            thickness: beside.thickness,
+            places: Vec::new(),
+            members: Vec::new(),
         }
     }
 
-    /// The same with another number of coefficients a form.
+    /// The same with forms on these break points, mm, one list a form.
     #[must_use]
-    pub fn with_coefficients(&self, coefficients: usize) -> Self {
+    pub fn on(&self, breaks: &[Vec<f64>]) -> Self {
+        // The function of coefficient k has its middle at break k − 1.
+        let mut members: Vec<(usize, usize)> = breaks
+            .iter()
+            .enumerate()
+            .flat_map(|(form, own)| (1..=own.len()).map(move |k| (form, k)))
+            .collect();
+        members.sort_by(|(f, k), (g, l)| {
+            let middles = breaks[*f][k - 1].total_cmp(&breaks[*g][l - 1]);
+            middles.then(f.cmp(g))
+        });
+        let mut places: Vec<Vec<Option<usize>>> =
+            breaks.iter().map(|own| vec![None; own.len() + 2]).collect();
+        for (j, (form, k)) in members.iter().enumerate() {
+            places[*form][*k] = Some(j);
+        }
         Self {
-            coefficients,
+            places,
+            members,
             ..self.clone()
         }
     }
 
     /// Number of unknowns in the band.
     pub fn band_count(&self) -> usize {
-        self.coefficients.saturating_sub(2) * self.forms.len()
+        self.members.len()
     }
 
     /// The band unknown of a coefficient of a form; `None` for the first and last, which are zero.
     pub fn coefficient(&self, form: usize, index: usize) -> Option<usize> {
-        (index > 0 && index + 1 < self.coefficients).then(|| (index - 1) * self.forms.len() + form)
+        self.places[form][index]
+    }
+
+    /// The form and the coefficient of a band unknown.
+    pub fn member(&self, index: usize) -> (usize, usize) {
+        self.members[index]
     }
 
     /// The coefficients of a form, out of the band.
     pub fn coefficients_of(&self, form: usize, band: &[f64]) -> Vec<f64> {
-        (0..self.coefficients)
-            .map(|k| self.coefficient(form, k).map_or(0.0, |j| band[j]))
-            .collect()
+        let own = self.places[form].iter();
+        own.map(|place| place.map_or(0.0, |j| band[j])).collect()
     }
 
     /// The border unknown of the first constant.
@@ -136,9 +210,14 @@ impl Layout {
         [at, at + 1]
     }
 
+    /// The border unknown of the thickness.
+    pub fn thickness_index(&self) -> Option<usize> {
+        self.thickness.then(|| self.line(self.forms.len())[0])
+    }
+
     /// Number of unknowns in the border.
     pub fn border_count(&self) -> usize {
-        self.line(self.forms.len())[0]
+        self.line(self.forms.len())[0] + usize::from(self.thickness)
     }
 
     /// The border unknowns of the closures.
@@ -148,7 +227,7 @@ impl Layout {
 
     /// Number of unknowns that the fit chooses: the lines are tied to the band, closures are held.
     pub fn free_count(&self) -> usize {
-        self.band_count() + self.slope_count + self.constant_count()
+        self.band_count() + self.slope_count + self.constant_count() + usize::from(self.thickness)
     }
 
     /// The slope of a channel, rad.
@@ -177,6 +256,38 @@ impl Layout {
             FormOf::Side(side) => super::determined::side_name(design.sides()[side]),
         }
     }
+}
+
+/// What moves the artefact across the line of each indicator.
+fn across(design: &Design, determined: &Determined) -> Vec<Across> {
+    let names = |a: &super::Analysis| -> Vec<String> {
+        let own = a.pivots().iter();
+        own.map(|j| a.unknowns()[*j].clone()).collect()
+    };
+    let (slopes, constants) = (names(&determined.slopes), names(&determined.constants));
+    let one = |channel: &DesignChannel| {
+        let t = |angle: f64| {
+            let [cos, sin] = direction(angle);
+            [-sin, cos]
+        };
+        let (of_slide, of_artefact) = (t(channel.indicator), t(channel.side()));
+        let turns = |name: &str| match name {
+            "gamma_1" | "e_1" => of_artefact[0],
+            "gamma_2" | "e_2" => of_artefact[1],
+            _ => 0.0,
+        };
+        let moves = |name: &str| match name {
+            "alpha_h" => of_slide[0],
+            "alpha_v" => of_slide[1],
+            other => turns(other),
+        };
+        Across {
+            slopes: slopes.iter().map(|n| moves(n)).collect(),
+            artefact: slopes.iter().map(|n| turns(n)).collect(),
+            constants: constants.iter().map(|n| turns(n)).collect(),
+        }
+    };
+    design.channels().iter().map(one).collect()
 }
 
 /// A slope common to the channels of a position of the spindle against that of all others: by name and

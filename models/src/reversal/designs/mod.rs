@@ -18,12 +18,18 @@ mod determined;
 mod disturbance;
 mod error;
 mod fit;
+mod found;
+mod ground;
+mod knots;
 mod layout;
+mod options;
 mod problem;
 mod readings;
+mod rig;
 pub mod simulate;
 mod solution;
 pub mod staged;
+mod wave_form;
 mod words;
 
 pub use analysis::Analysis;
@@ -37,6 +43,8 @@ pub use determined::{
 pub use error::DesignFitError;
 #[doc(hidden)]
 pub use fit::central_differences;
-pub use fit::{DesignOptions, fit};
+pub use fit::fit;
+pub use found::{ChannelResiduals, DesignConvergence, Found, FoundForm};
+pub use options::{Crest, DesignOptions};
 pub use readings::{DesignObservations, DesignReading};
-pub use solution::{ChannelResiduals, DesignConvergence, DesignFit, Found, FoundForm};
+pub use solution::DesignFit;

@@ -1,7 +1,6 @@
 //! The solution of a design and what can be asked of it.
 
 use errsep_solvers::linear::bordered::BorderedCovariance;
-use errsep_solvers::outcome::{Ending, Iteration};
 use errsep_solvers::problem::NoValue;
 use errsep_solvers::structured::Parameters;
 
@@ -9,10 +8,12 @@ use super::analysis::Analysis;
 use super::channel::Design;
 use super::closure::{self, DesignClosure, PositionSlope};
 use super::determined::{Determined, SLOPES};
+use super::found::{ChannelResiduals, DesignConvergence, Found, FoundForm};
 use super::layout::{FormOf, Layout};
-use super::problem::DesignProblem;
+use super::problem::crest::Beside;
+use super::problem::{Body, DesignProblem, Splines};
 use super::readings::{DesignObservations, Trace};
-use crate::basis::bspline::{Cubic, CubicBSpline, horner};
+use crate::basis::bspline::{Cubic, horner};
 use crate::reversal::channel_noise::along::Gathered;
 use crate::reversal::channel_noise::scatter::Scatter;
 use crate::reversal::channel_noise::settle::Settled;
@@ -26,59 +27,6 @@ use crate::reversal::simultaneous::{Agreement, Axis, NoiseOrigin};
 use crate::reversal::staged::Value;
 use crate::units::{UM_PER_MM, mm_from_um};
 
-/// A fitted slope or constant: an unknown by itself, or with others that the design does not tell from
-/// it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Found {
-    /// Its name, such as `alpha_h` or `alpha_h + cone`.
-    pub name: String,
-    /// Whether it is an unknown by itself.
-    pub alone: bool,
-    /// rad for slopes, µm for constants.
-    pub value: Value,
-    /// Degrees of freedom of its standard uncertainty; infinite where the noise is declared.
-    pub degrees_of_freedom: f64,
-}
-
-/// A fitted form, or forms that the design does not tell apart.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FoundForm {
-    /// Its name, such as `M_h`, `S_90` or `M_h + S_0`.
-    pub name: String,
-    /// The side of the artefact, degrees, where it is that of a side by itself.
-    pub side: Option<f64>,
-    /// Whether it is a form by itself.
-    pub alone: bool,
-    /// Values, µm, without straight-line part over the measured positions.
-    pub values: Vec<f64>,
-    /// Standard uncertainties, µm.
-    pub std: Vec<f64>,
-    /// Degrees of freedom of these: the fewest of any point.
-    pub degrees_of_freedom: f64,
-}
-
-/// Residuals and noise of one channel.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ChannelResiduals {
-    /// Number of readings.
-    pub readings: usize,
-    /// Root mean square, µm.
-    pub rms: f64,
-    /// Standard deviation of one reading, µm, without what the model misses.
-    pub sigma: f64,
-}
-
-/// How the fit went.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DesignConvergence {
-    /// How it ended.
-    pub ending: Ending,
-    /// One record a pass over all readings.
-    pub history: Vec<Iteration>,
-    /// Time of the whole fit.
-    pub seconds: f64,
-}
-
 /// The simultaneous solution of a design.
 #[derive(Debug, Clone)]
 pub struct DesignFit {
@@ -87,12 +35,16 @@ pub struct DesignFit {
     /// What they determine.
     pub determined: Determined,
     layout: Layout,
-    bases: Vec<CubicBSpline>,
+    splines: Splines,
     cubics: Vec<Vec<Cubic>>,
     axis: Axis,
     parameters: Parameters,
     covariance: BorderedCovariance,
-    /// Half the thickness of the artefact, mm.
+    /// The artefact; half its thickness as it was given.
+    body: Body,
+    /// How the bar stands beside the stylus of each channel, where that is a term.
+    beside: Vec<Beside>,
+    /// Half the thickness of the artefact as it is known or found, mm.
     half_mm: f64,
     scatter: Scatter,
     /// 1/σ by channel, 1/µm.
@@ -130,6 +82,8 @@ pub(super) struct Reached<'a> {
     /// Standard deviation of a reading of each channel in the weights, µm.
     pub sigmas: Vec<f64>,
     pub knots: FittedKnots,
+    /// How the bar stands beside the stylus of each channel, where that is a term.
+    pub beside: Vec<Beside>,
 }
 
 impl DesignFit {
@@ -168,12 +122,14 @@ impl DesignFit {
             design,
             determined,
             layout: problem.layout.clone(),
-            bases: problem.bases.clone(),
+            splines: problem.splines.clone(),
             cubics: problem.cubics(&result.parameters),
             axis: problem.axis,
             parameters: result.parameters.clone(),
             covariance: reached.covariance,
-            half_mm: problem.half_mm,
+            body: problem.body.clone(),
+            beside: reached.beside,
+            half_mm: problem.half_mm(&result.parameters),
             scatter: told.scatter,
             weights: problem.weights.clone(),
             cost: result.cost,
@@ -209,9 +165,9 @@ impl DesignFit {
         let problem = DesignProblem::new(
             &own,
             self.layout.clone(),
-            self.bases.clone(),
+            self.splines.clone(),
             self.axis,
-            self.half_mm,
+            self.body.clone(),
             self.weights.clone(),
         );
         let prepared = problem.at(&self.parameters)?;
@@ -321,7 +277,7 @@ impl DesignFit {
         let border = &self.parameters.border;
         let attitude = Attitude::new(self.layout.slope(channel, border), self.half_mm)?;
         let touched = |u: f64| {
-            let basis = &self.bases[side];
+            let basis = &self.splines.bases[side];
             let k = basis.cell_of(u);
             let (left, width) = basis.cell(k);
             let [a, b, c, d] = self.cubics[side][k];
@@ -331,16 +287,50 @@ impl DesignFit {
             (mm_from_um(height), mm_from_um(slope))
         };
         let u = attitude.contact(x, touched)?;
-        let slide: f64 = self.layout.slides[channel]
-            .iter()
-            .map(|(form, factor)| factor * self.form_value(*form, x))
+        let slides = self.layout.slides[channel].iter();
+        let slide: f64 = slides
+            .map(|seen| seen.along * self.form_value(seen.form, x))
             .sum();
         let seen = UM_PER_MM * attitude.reading_mm(u, touched(u).0);
-        Ok(seen + slide + self.layout.constant(channel, border))
+        let lost = self.lost(channel, x)?;
+        Ok(seen + slide + self.layout.constant(channel, border) - lost)
+    }
+
+    /// What a channel loses at a slide position (mm) because its stylus stands beside the crest, µm; zero
+    /// where that is no term.
+    ///
+    /// # Errors
+    /// [`NoValue`] where the stylus stands beside the bar.
+    pub fn lost(&self, channel: usize, x: f64) -> Result<f64, NoValue> {
+        let Some(beside) = self.beside.get(channel) else {
+            return Ok(0.0);
+        };
+        let slides = self.layout.slides[channel].iter();
+        let wander = slides.map(|seen| seen.across * self.form_value(seen.form, x));
+        Ok(beside.loss(x, wander.sum())?.um)
+    }
+
+    /// The thickness where it is fitted, mm, with its degrees of freedom.
+    pub fn thickness(&self) -> Option<Found> {
+        let (value, degrees_of_freedom) = self.border_value(self.layout.thickness_index()?);
+        Some(Found {
+            name: "thickness".to_owned(),
+            alone: true,
+            value,
+            degrees_of_freedom,
+        })
+    }
+
+    /// The cells of each form, by its name.
+    pub fn cells(&self) -> Vec<(String, usize)> {
+        let forms = self.splines.breaks.iter().enumerate();
+        forms
+            .map(|(form, breaks)| (self.layout.form_name(form, &self.design), breaks.len() - 1))
+            .collect()
     }
 
     fn form_value(&self, form: usize, at: f64) -> f64 {
-        let basis = &self.bases[form];
+        let basis = &self.splines.bases[form];
         let k = basis.cell_of(at);
         let (left, width) = basis.cell(k);
         horner(&self.cubics[form][k], (at - left) / width)
@@ -349,7 +339,7 @@ impl DesignFit {
     /// Standard uncertainty of a form at a position, µm, and its degrees of freedom. What the model misses
     /// may lie in the form itself, finer than the knots.
     fn form_std(&self, form: usize, at: f64) -> (f64, f64) {
-        let (first, functions) = self.bases[form].values(at);
+        let (first, functions) = self.splines.bases[form].values(at);
         let band: Vec<(usize, f64)> = functions
             .into_iter()
             .enumerate()

@@ -20,6 +20,9 @@ const SPEED_RANGE: f64 = 0.1;
 /// A wave stands out where it exceeds so many standard deviations of what noise alone would show.
 const STANDS_OUT: f64 = 4.0;
 
+/// Below this share of the largest reading a wave is rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// The once-per-turn wave of one turn: reading = c cos ψ_b + d sin ψ_b, z = c + i d.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TurnWave {
@@ -95,7 +98,8 @@ impl Survey {
         let steady = steady(&waves, &frame, if recorded { 0.0 } else { turns });
         let coherent = steady.bar[0].hypot(steady.bar[1]).hypot(steady.bar[2]);
         let noise = STANDS_OUT * sigma * (2.0 / run.len() as f64).sqrt();
-        if !(coherent > noise) {
+        let largest = run.value.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        if !(coherent > noise.max(ROUNDING * largest)) {
             return Err(TurningError::NoWave);
         }
         let bar = straight(&waves, &frame);

@@ -91,6 +91,7 @@ fn four_channels_are_the_four_channel_fit() {
                 thickness_mm: 42.0,
                 noise,
                 knots,
+                alike: true,
                 ..DesignOptions::default()
             },
         )

@@ -1,5 +1,8 @@
 //! The reversal in any number of positions and planes.
 
+mod crest;
 mod effects;
 mod fit;
+mod knots;
 mod table;
+mod thickness;

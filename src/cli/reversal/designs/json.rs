@@ -68,6 +68,10 @@ pub fn json(o: &Outcome) -> Result<Value, Message> {
         "design": design,
         "tilts": tilts,
         "eccentricity": eccentricity,
+        "thickness": match fit.thickness() {
+            Some(found) => quantity(&found, "mm")?,
+            None => Value::Null,
+        },
         "tilt_combinations": tilt_combinations,
         "form_combinations": form_combinations,
         "forms": forms(o),
@@ -100,6 +104,7 @@ pub fn json(o: &Outcome) -> Result<Value, Message> {
             "disagree": fit.agreement.disagree,
             "missed": {"value": fit.agreement.missed, "unit": "um"},
         },
+        "knots": fit.cells().into_iter().map(|(form, cells)| (form, json!(cells))).collect::<Map<_, _>>(),
         "convergence": {
             "converged": true,
             "reason": fit.convergence.ending.to_string(),

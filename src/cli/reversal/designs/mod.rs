@@ -1,14 +1,15 @@
 //! Designs other than the four channels: `errsep.reversal/2`.
 
 mod json;
+mod notes;
 mod page;
 mod text;
 
 use errsep_models::reversal::Direction;
 use errsep_models::reversal::designs::{
-    DesignFit, DesignFitError, DesignOptions, Determined, FoundForm, angle_name, fit,
+    DesignFit, DesignFitError, DesignOptions, Determined, FoundForm, fit,
 };
-use errsep_models::reversal::simultaneous::{KnotVerdict, Knots, Noise, NoiseOrigin};
+use errsep_models::reversal::simultaneous::{Knots, Noise};
 use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
 
 use super::Args;
@@ -21,13 +22,9 @@ use crate::cli::diagnose::reversal::design_with;
 use crate::cli::quantity::COVERAGE;
 use crate::io::reversal::{DesignData, ReversalSetup, corrected_design};
 use crate::io::{CsvTable, Message, OutFile, Status};
-use crate::report::number;
 
 /// More positions than this of a form are not seen apart.
 const MOST_POSITIONS: usize = 1001;
-
-/// Squares beyond their mean by so many standard deviations are told.
-const CLEAR: f64 = 4.0;
 
 /// A solved design with all that its answer tells.
 struct Outcome<'a> {
@@ -48,25 +45,16 @@ pub fn answer(
     data: &DesignData,
     corrected: Option<OutFile>,
 ) -> Result<Answer, Message> {
-    if setup.fit_thickness {
-        return Err(
-            Message::bad_input("fit_thickness is for the channels 1A, 1B, 2A, 2B alone")
-                .in_file(&args.data)
-                .remedy("leave it out, or give those four channels without other angles"),
-        );
-    }
-    let options = DesignOptions {
-        zero: setup.zero,
-        thickness_mm: setup.thickness.unwrap_or(0.0),
-        noise: setup.noise.map_or(Noise::Estimated, Noise::Declared),
-        knots: setup.knots.map_or(Knots::Chosen, Knots::Cells),
-        ..DesignOptions::default()
-    };
+    let mut options = options(setup, data).map_err(|why| match &args.setup {
+        Some(file) => why.in_file(file),
+        None => why.in_file(&args.data),
+    })?;
+    options.fit_thickness = setup.fit_thickness && setup.thickness.is_some();
     let fit = fit(&data.observations, &options).map_err(|why| refusal(&why, args, data))?;
     let x = positions(data);
     let outcome = Outcome {
         forms: fit.forms(&x),
-        warnings: warnings(&fit, data),
+        warnings: notes::warnings(&fit, data, setup, &options),
         x,
         fit,
         data,
@@ -102,6 +90,25 @@ pub fn answer(
         write_corrected(args, setup, data, changes.as_deref(), file)?;
     }
     Ok(answer)
+}
+
+/// How a set-up has its design fitted, a thickness taken as known.
+///
+/// # Errors
+/// Styluses of indicators that are not there.
+pub fn options(setup: &ReversalSetup, data: &DesignData) -> Result<DesignOptions, Message> {
+    let design = &data.observations.design;
+    Ok(DesignOptions {
+        zero: setup.zero,
+        thickness_mm: setup.thickness.unwrap_or(0.0),
+        crest: match &setup.crest {
+            Some(crest) => Some(crest.of(design)?),
+            None => None,
+        },
+        noise: setup.noise.map_or(Noise::Estimated, Noise::Declared),
+        knots: setup.knots.map_or(Knots::Chosen, Knots::Cells),
+        ..DesignOptions::default()
+    })
 }
 
 /// Writes the readings less what the effects change in them.
@@ -219,6 +226,10 @@ fn refusal(why: &DesignFitError, args: &Args, data: &DesignData) -> Message {
             "read every channel at four or more different positions x",
         ),
         DesignFitError::TooSteep { .. } => (Message::bad_input(why.to_string()), OTHER_UNITS),
+        DesignFitError::ThicknessNotDetermined { .. } => (
+            Message::not_determined(why.to_string()),
+            "measure the thickness and leave fit_thickness out of the set-up",
+        ),
         DesignFitError::TooFewReadings { .. } | DesignFitError::TooManyKnots { .. } => (
             Message::not_determined(why.to_string()),
             "take more readings, or give fewer [model] knots, or leave them out: they are chosen from the data",
@@ -277,88 +288,6 @@ fn degrees(freedom: f64) -> DegreesOfFreedom {
 /// The least of some degrees of freedom.
 fn fewest(all: impl Iterator<Item = f64>) -> DegreesOfFreedom {
     degrees(all.fold(f64::INFINITY, f64::min))
-}
-
-fn warnings(fit: &DesignFit, data: &DesignData) -> Vec<String> {
-    let mut warnings = Vec::new();
-    if !data.not_read.is_empty() {
-        let names = data.not_read.join(", ");
-        warnings.push(format!("channels of the set-up without a reading: {names}"));
-    }
-    let design = &fit.design;
-    let once: Vec<String> = (0..design.sides().len())
-        .filter_map(|side| {
-            let mut seen = (0..design.channels().len()).filter(|c| design.side_of(*c) == side);
-            let (first, second) = (seen.next()?, seen.next());
-            let name = &design.channels()[first].name;
-            let angle = angle_name(design.sides()[side]);
-            second.is_none().then(|| format!("{angle}° (by {name})"))
-        })
-        .collect();
-    if !once.is_empty() {
-        warnings.push(format!(
-            "sides seen once only: {}; nothing checks their forms, and a wrong angle would show just so: \
-             check the angles of these channels",
-            once.join(", ")
-        ));
-    }
-    for (channel, own) in design.channels().iter().zip(&fit.by_channel) {
-        let stands = |value: Option<f64>| {
-            let readings = data.observations.readings.iter();
-            let at = design.channels().iter().position(|c| c == channel);
-            readings
-                .filter(|r| Some(r.channel) == at)
-                .all(|r| Some(r.value) == value)
-        };
-        let first = data
-            .observations
-            .readings
-            .iter()
-            .find(|r| design.channels()[r.channel] == *channel);
-        if own.readings > 1 && stands(first.map(|r| r.value)) {
-            warnings.push(format!(
-                "all readings of {} are equal: an indicator that does not move tells nothing; check it",
-                channel.name
-            ));
-        }
-    }
-    if fit.agreement.disagree == Some(true) && fit.agreement.missed > 0.0 {
-        warnings.push(noise::disagreement(fit.agreement.missed));
-    }
-    let exceeds = |squares: f64, freedom: f64| squares > freedom + CLEAR * (2.0 * freedom).sqrt();
-    for closure in &fit.closures {
-        let count = closure.profile.len() as f64;
-        if closure.expected_rms > 0.0
-            && exceeds(count * (closure.rms / closure.expected_rms).powi(2), count)
-        {
-            warnings.push(format!(
-                "{} does not close: {} µm, noise alone would give {}",
-                closure.name,
-                number::plain(closure.rms, 3),
-                number::plain(closure.expected_rms, 3)
-            ));
-        }
-    }
-    for slope in &fit.position_slopes {
-        if slope.value.value.abs() > CLEAR * slope.value.std {
-            warnings.push(format!(
-                "{} is no zero: something changed between the positions of the spindle",
-                slope.name
-            ));
-        }
-    }
-    if fit.knots.verdict == KnotVerdict::TooFew {
-        let counted = match fit.noise_origin {
-            NoiseOrigin::Repeats(_) => "; the uncertainties follow the law of the repeats",
-            _ if fit.agreement.disagree == Some(true) => "",
-            _ => "; the uncertainties are too small then",
-        };
-        warnings.push(format!(
-            "neighbouring residuals go together: the noise is correlated, or the forms have finer detail \
-             than the knots follow{counted}"
-        ));
-    }
-    warnings
 }
 
 fn tables(o: &Outcome) -> Vec<CsvTable> {

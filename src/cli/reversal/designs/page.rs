@@ -242,9 +242,9 @@ fn fit(o: &Outcome) -> Section {
         });
     Section::new("How the solution was reached")
         .paragraph(format!(
-            "{}. {} cells a form; {} degrees of freedom.",
+            "{}. {}; {} degrees of freedom.",
             fit.convergence.ending,
-            fit.knots.breaks.len() - 1,
+            super::text::cells(fit),
             fit.degrees_of_freedom
         ))
         .key_figures([

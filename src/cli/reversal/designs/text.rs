@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use errsep_models::reversal::designs::{Found, angle_name};
+use errsep_models::reversal::designs::{DesignFit, Found, angle_name};
 use errsep_models::reversal::staged::Value;
 
 use super::Outcome;
@@ -178,14 +178,29 @@ fn write_all(t: &mut String, file: &Path, o: &Outcome, coverage: &str) -> std::f
     }
     writeln!(
         t,
-        "\nMethod: simultaneous; {} ({} cells a form)",
+        "\nMethod: simultaneous; {} ({})",
         fit.convergence.ending,
-        fit.knots.breaks.len() - 1
+        cells(fit)
     )?;
     for warning in &o.warnings {
         writeln!(t, "Note: {warning}.")?;
     }
     Ok(())
+}
+
+/// The cells of the forms in words.
+pub fn cells(fit: &DesignFit) -> String {
+    let cells = fit.cells();
+    match cells.first() {
+        Some((_, first)) if cells.iter().all(|c| c.1 == *first) => format!("{first} cells a form"),
+        _ => {
+            let own: Vec<String> = cells
+                .iter()
+                .map(|(name, k)| format!("{name} {k}"))
+                .collect();
+            format!("cells of the forms: {}", own.join(", "))
+        }
+    }
 }
 
 fn write_slope(t: &mut String, slope: &Found, factor: f64) -> std::fmt::Result {

@@ -2,18 +2,24 @@
 //! its indicator, over splines.
 //!
 //! A channel's tilt is the sum of the slopes that it sees; its probe rides on the side it sees as in
-//! [`forward`](crate::reversal::forward), and the slide brings M_h cos φ + M_v sin φ. A task is one cell
-//! and one channel, as in the four-channel fit.
+//! [`forward`](crate::reversal::forward), and the slide brings M_h cos φ + M_v sin φ. Where the crest of a
+//! bar is a term, the reading loses what a stylus beside it loses ([`crest`]). A task is one slab, a cell of
+//! the finest form, and one channel; its readings run through the cells of all forms that the channel sees.
 
+mod columns;
+pub(super) mod crest;
+mod jacobian;
 mod rows;
 mod tasks;
 
 use errsep_solvers::linear::banded::Tall;
-use errsep_solvers::linear::bordered::{Constraints, Share};
+use errsep_solvers::linear::bordered::Constraints;
 use errsep_solvers::problem::NoValue;
-use errsep_solvers::structured::{Parameters, StructuredProblem};
+use errsep_solvers::structured::Parameters;
 use nalgebra::{DMatrix, DVector};
 
+use self::columns::Batch;
+use self::crest::{Beside, CrestTerm};
 use super::layout::{FormOf, Layout};
 use super::readings::Trace;
 use crate::basis::bspline::{Cubic, CubicBSpline};
@@ -21,27 +27,59 @@ use crate::reversal::cells::Union;
 use crate::reversal::forward::Attitude;
 use crate::reversal::simultaneous::Axis;
 use crate::reversal::simultaneous::gauge::line_of_spline;
-use crate::reversal::simultaneous::rows::{CellForm, Points, Run};
 use crate::reversal::simultaneous::starts::starts;
 
-/// Traces, unknowns and bases.
+/// The splines of the forms.
+#[derive(Debug, Clone)]
+pub struct Splines {
+    /// By form: break points on the slide's axis, mm.
+    pub breaks: Vec<Vec<f64>>,
+    /// By form: the basis, a side's on the artefact's own axis.
+    pub bases: Vec<CubicBSpline>,
+}
+
+impl Splines {
+    /// The breaks of the form with most cells.
+    pub fn finest(&self) -> &[f64] {
+        let longest = self.breaks.iter().max_by_key(|b| b.len());
+        longest.map_or(&[], |b| &b[..])
+    }
+}
+
+/// What is known of the artefact.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// Half the thickness, mm; where the thickness is unknown, half its first guess.
+    pub half_mm: f64,
+    /// The crest, where it is a term.
+    pub crest: Option<CrestTerm>,
+}
+
+/// Traces, unknowns and splines.
 #[derive(Debug, Clone)]
 pub struct DesignProblem<'a> {
     pub(super) traces: &'a [Trace],
     pub(super) layout: Layout,
-    /// By form, all of the same number of cells; those of the slide are one.
-    pub(super) bases: Vec<CubicBSpline>,
+    pub(super) splines: Splines,
     pub(super) axis: Axis,
-    /// Half the thickness of the artefact, mm.
-    pub(super) half_mm: f64,
+    pub(super) body: Body,
     /// 1/σ of a reading of each channel, 1/µm.
     pub(super) weights: Vec<f64>,
     /// The coefficients of ξ in each basis.
     xi: Vec<Vec<f64>>,
     constraints: Constraints,
     held: Vec<bool>,
-    /// By channel the first reading at or beyond each break of the slide's forms.
-    slide_starts: Vec<Vec<usize>>,
+    /// By form of the slide and channel the first reading at or beyond each break.
+    slide_starts: Vec<Vec<Vec<usize>>>,
+    /// By channel the first reading of each slab.
+    slabs: Vec<Vec<usize>>,
+}
+
+/// The cells of a run: of the side and of the forms of the slide that the channel sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Cells {
+    side: usize,
+    slides: [usize; 2],
 }
 
 impl<'a> DesignProblem<'a> {
@@ -49,47 +87,60 @@ impl<'a> DesignProblem<'a> {
     pub(super) fn new(
         traces: &'a [Trace],
         layout: Layout,
-        bases: Vec<CubicBSpline>,
+        splines: Splines,
         axis: Axis,
-        half_mm: f64,
+        body: Body,
         weights: Vec<f64>,
     ) -> Self {
-        let xi = bases
+        let xi = splines
+            .bases
             .iter()
             .map(|basis| basis.line(axis.xi(0.0), 1.0 / axis.scale))
             .collect();
-        let slide_starts = match layout.forms.first() {
-            Some(FormOf::Slide(_)) => {
-                let breaks = bases[0].breaks();
-                traces.iter().map(|t| starts(&t.x, breaks)).collect()
-            }
-            _ => Vec::new(),
-        };
+        let cut = |breaks: &[f64]| traces.iter().map(|t| starts(&t.x, breaks)).collect();
+        let slides = layout.forms.iter().zip(&splines.breaks);
+        let slide_starts = slides
+            .filter(|(form, _)| matches!(form, FormOf::Slide(_)))
+            .map(|(_, breaks)| cut(breaks))
+            .collect();
         let closures = layout.closures();
         Self {
-            constraints: gauge(&layout, &bases, traces, axis),
+            constraints: gauge(&layout, &splines.bases, traces, axis),
             held: (0..layout.border_count())
                 .map(|j| closures.contains(&j))
                 .collect(),
+            slabs: cut(splines.finest()),
+            slide_starts,
             traces,
             layout,
-            bases,
+            splines,
             axis,
-            half_mm,
+            body,
             weights,
             xi,
-            slide_starts,
         }
     }
 
-    /// Number of cells of every form.
-    pub(super) fn cell_count(&self) -> usize {
-        self.bases.first().map_or(0, CubicBSpline::cell_count)
+    /// Holds a border unknown at its value, or lets it go.
+    pub(super) fn hold(&mut self, index: usize, held: bool) {
+        self.held[index] = held;
+    }
+
+    /// Number of slabs.
+    fn slab_count(&self) -> usize {
+        self.splines.finest().len().saturating_sub(1)
+    }
+
+    /// Half the thickness at a point, mm.
+    pub(super) fn half_mm(&self, at: &Parameters) -> f64 {
+        let fitted = self.layout.thickness_index();
+        fitted.map_or(self.body.half_mm, |j| 0.5 * at.border[j])
     }
 
     /// The forms, less their lines, as polynomials of their cells, µm.
     pub(super) fn cubics(&self, at: &Parameters) -> Vec<Vec<Cubic>> {
-        self.bases
+        self.splines
+            .bases
             .iter()
             .enumerate()
             .map(|(form, basis)| {
@@ -108,184 +159,46 @@ impl<'a> DesignProblem<'a> {
             .collect()
     }
 
-    /// Goes through the runs of a task: readings from..to, cell of the side, cell of the slide.
+    /// The first readings of the cells that a channel sees: of its side, then of the slide's forms.
+    fn cuts<'s>(
+        &'s self,
+        prepared: &'s Prepared,
+        channel: usize,
+    ) -> impl Iterator<Item = &'s [usize]> {
+        let slides = self.layout.slides[channel].iter();
+        std::iter::once(&prepared.side_starts[channel][..])
+            .chain(slides.map(move |seen| &self.slide_starts[seen.form][channel][..]))
+    }
+
+    /// The cells in which a reading lies, and one past the last reading that shares them.
+    fn cells_at(&self, prepared: &Prepared, channel: usize, reading: usize) -> (Cells, usize) {
+        let mut cells = [0; 3];
+        let mut end = self.traces[channel].len();
+        for (cell, starts) in cells.iter_mut().zip(self.cuts(prepared, channel)) {
+            let after = starts.partition_point(|first| *first <= reading);
+            *cell = after.saturating_sub(1).min(starts.len() - 2);
+            end = end.min(starts[*cell + 1]);
+        }
+        let [side, slides @ ..] = cells;
+        (Cells { side, slides }, end)
+    }
+
+    /// Goes through the runs of a task: readings from..to, and their cells.
     fn runs(
         &self,
         prepared: &Prepared,
         channel: usize,
-        cell: usize,
-        mut run: impl FnMut(usize, usize, usize, usize) -> Result<(), NoValue>,
+        slab: usize,
+        mut run: impl FnMut(usize, usize, Cells) -> Result<(), NoValue>,
     ) -> Result<(), NoValue> {
-        let side = &prepared.side_starts[channel];
-        // A channel that sees no form of the slide has the side's cells alone.
-        let slide = match self.layout.slides[channel].is_empty() {
-            true => side,
-            false => &self.slide_starts[channel],
-        };
-        let cells = self.cell_count();
-        // A reading belongs to the lower of its two cells: to cell k from the later start on.
-        let start = side[cell].max(slide[cell]);
-        let end = side[cell + 1].max(slide[cell + 1]);
-        let (mut at_side, mut at_slide) = (cell, cell);
-        let mut from = start;
+        let (mut from, end) = (self.slabs[channel][slab], self.slabs[channel][slab + 1]);
         while from < end {
-            while at_side + 1 < cells && side[at_side + 1] <= from {
-                at_side += 1;
-            }
-            while at_slide + 1 < cells && slide[at_slide + 1] <= from {
-                at_slide += 1;
-            }
-            let to = end.min(side[at_side + 1]).min(slide[at_slide + 1]);
-            run(from, to, at_side, at_slide)?;
+            let (cells, to) = self.cells_at(prepared, channel, from);
+            let to = to.min(end);
+            run(from, to, cells)?;
             from = to;
         }
         Ok(())
-    }
-
-    /// What the readings of a channel share in two cells. Forms of the slide that are seen together act
-    /// as one, their sum.
-    fn run<'b>(
-        &'b self,
-        prepared: &Prepared,
-        channel: usize,
-        side: usize,
-        slide: usize,
-    ) -> Run<'b> {
-        let cell = |form: usize, k: usize, cubic: Cubic| {
-            let (left, width) = self.bases[form].cell(k);
-            CellForm {
-                left,
-                width,
-                form: cubic,
-                basis: self.bases[form].polynomials(k),
-            }
-        };
-        let own = self.layout.side[channel];
-        let slide = match self.layout.slides[channel][..] {
-            [] => None,
-            [(form, factor)] => Some((cell(form, slide, prepared.cubics[form][slide]), factor)),
-            ref seen => {
-                let mut sum = [0.0; 4];
-                for (form, factor) in seen {
-                    for (total, c) in sum.iter_mut().zip(prepared.cubics[*form][slide]) {
-                        *total += factor * c;
-                    }
-                }
-                Some((cell(seen[0].0, slide, sum), 1.0))
-            }
-        };
-        Run {
-            attitude: prepared.attitudes[channel],
-            side: cell(own, side, prepared.cubics[own][side]),
-            slide,
-            offset: prepared.constants[channel],
-            weight: self.weights[channel],
-            thickness: false,
-        }
-    }
-
-    /// Fills the columns of a run: where two forms of the slide are seen, each function of their basis
-    /// stands twice.
-    fn fill(
-        &self,
-        channel: usize,
-        points: &Points,
-        run: &Run,
-        x: &[f64],
-        scratch: &mut Tall,
-        out: &mut Tall,
-    ) {
-        let slides = &self.layout.slides[channel];
-        if slides.len() < 2 {
-            points.fill(run, x, None, out);
-            return;
-        }
-        scratch.reset(x.len(), run.columns());
-        points.fill(run, x, None, scratch);
-        let stride = slides.len() + 1;
-        for k in 0..4 {
-            for (s, (_, factor)) in slides.iter().enumerate() {
-                let from = scratch.column(2 * k);
-                for (o, v) in out.column_mut(stride * k + s).iter_mut().zip(from) {
-                    *o = factor * v;
-                }
-            }
-            out.column_mut(stride * k + stride - 1)
-                .copy_from_slice(scratch.column(2 * k + 1));
-        }
-        for (j, from) in (8..scratch.columns()).enumerate() {
-            out.column_mut(4 * stride + j)
-                .copy_from_slice(scratch.column(from));
-        }
-    }
-
-    /// Local columns of a channel's runs, the residual included.
-    fn columns(&self, channel: usize) -> usize {
-        match self.layout.slides[channel].len() {
-            0 => 7,
-            n => 4 * (n + 1) + 2,
-        }
-    }
-
-    /// The band unknowns of the local columns: by coefficient, the slide's before the artefact's.
-    fn band_columns(&self, channel: usize, side: usize, slide: usize) -> Vec<Option<usize>> {
-        let slides = &self.layout.slides[channel];
-        let mut band = Vec::with_capacity(12);
-        for k in 0..4 {
-            for (form, _) in slides {
-                band.push(self.layout.coefficient(*form, slide + k));
-            }
-            band.push(self.layout.coefficient(self.layout.side[channel], side + k));
-        }
-        band
-    }
-
-    /// What the local columns are to the border. A constant and ξ are combinations of the functions of
-    /// a cell: constants and lines have no column of their own beside a form of the slide.
-    fn shares(&self, channel: usize, side: usize, slide: usize) -> Vec<Share> {
-        let layout = &self.layout;
-        let slides = &layout.slides[channel];
-        let stride = slides.len() + 1;
-        let mut shares = Vec::with_capacity(48);
-        let mut push = |column: usize, unknown: usize, weight: f64| {
-            if weight != 0.0 {
-                shares.push(Share {
-                    column: column as u32,
-                    unknown: unknown as u32,
-                    weight,
-                });
-            }
-        };
-        for k in 0..4 {
-            for (s, (form, _)) in slides.iter().enumerate() {
-                let [height, slope] = layout.line(*form);
-                push(stride * k + s, height, -1.0);
-                push(stride * k + s, slope, -self.xi[*form][slide + k]);
-            }
-            let own = layout.side[channel];
-            let [height, slope] = layout.line(own);
-            push(stride * k + stride - 1, height, -1.0);
-            push(stride * k + stride - 1, slope, -self.xi[own][side + k]);
-        }
-        let tilt = 4 * stride;
-        for (j, share) in layout.slopes[channel].iter().enumerate() {
-            push(tilt, j, *share);
-        }
-        // The largest factor of a slide's form makes the constant with least rounding.
-        let largest =
-            (0..slides.len()).max_by(|a, b| slides[*a].1.abs().total_cmp(&slides[*b].1.abs()));
-        for (j, share) in layout.constants[channel].iter().enumerate() {
-            let unknown = layout.constants_from() + j;
-            match largest {
-                Some(s) => {
-                    for k in 0..4 {
-                        push(stride * k + s, unknown, share / slides[s].1);
-                    }
-                }
-                None => push(tilt + 1, unknown, *share),
-            }
-        }
-        shares
     }
 
     /// Reading less model, µm, of every reading: by channel, in the order of its trace.
@@ -293,21 +206,23 @@ impl<'a> DesignProblem<'a> {
     /// # Errors
     /// [`NoValue`] where the model is not defined.
     pub(super) fn residuals(&self, at: &Parameters) -> Result<Vec<Vec<f64>>, NoValue> {
-        let prepared = self.prepare(at)?;
-        let mut points = Box::<Points>::default();
+        let prepared = self.prepared(at)?;
+        let mut batch = Batch::default();
         (0..self.traces.len())
             .map(|c| {
                 let unit = -1.0 / self.weights[c];
                 let trace = &self.traces[c];
                 let mut residuals = Vec::with_capacity(trace.len());
-                for cell in 0..self.cell_count() {
-                    self.runs(&prepared, c, cell, |from, to, side, slide| {
-                        let run = self.run(&prepared, c, side, slide);
+                for slab in 0..self.slab_count() {
+                    self.runs(&prepared, c, slab, |from, to, cells| {
+                        let run = self.run(&prepared, c, cells);
                         for first in (from..to).step_by(Tall::CAPACITY) {
                             let last = to.min(first + Tall::CAPACITY);
-                            let (x, value) = (&trace.x[first..last], &trace.value[first..last]);
-                            points.locate(&run, x, value)?;
-                            residuals.extend(points.residual[..x.len()].iter().map(|r| unit * r));
+                            let x = &trace.x[first..last];
+                            let value = &trace.value[first..last];
+                            self.locate(&prepared, (c, cells), &run, (x, value), &mut batch)?;
+                            let own = &batch.points.residual[..x.len()];
+                            residuals.extend(own.iter().map(|r| unit * r));
                         }
                         Ok(())
                     })?;
@@ -316,55 +231,33 @@ impl<'a> DesignProblem<'a> {
             })
             .collect()
     }
-}
 
-impl DesignProblem<'_> {
-    /// Derivatives of the weighted residuals by every unknown, band first: one row a reading, channel by
-    /// channel.
-    ///
-    /// # Errors
-    /// [`NoValue`] where the model is not defined.
-    pub(super) fn jacobian(&self, at: &Parameters) -> Result<DMatrix<f64>, NoValue> {
-        let prepared = self.prepare(at)?;
-        let rows = self.traces.iter().map(Trace::len).sum();
-        let n = self.layout.band_count();
-        let mut jacobian = DMatrix::zeros(rows, n + self.layout.border_count());
-        let mut points = Box::<Points>::default();
-        let (mut scratch, mut batch) = (Tall::new(10), Tall::new(16));
-        let mut above = 0;
+    /// The state in which derivatives at a point are taken; the width of the band is not known yet.
+    fn prepared(&self, at: &Parameters) -> Result<Prepared, NoValue> {
+        let cubics = self.cubics(at);
+        let half_mm = self.half_mm(at);
+        let mut attitudes = Vec::with_capacity(self.traces.len());
+        let mut side_starts = Vec::with_capacity(self.traces.len());
         for (c, trace) in self.traces.iter().enumerate() {
-            for cell in 0..self.cell_count() {
-                self.runs(&prepared, c, cell, |from, to, side, slide| {
-                    let run = self.run(&prepared, c, side, slide);
-                    let (band, shares) = (
-                        self.band_columns(c, side, slide),
-                        self.shares(c, side, slide),
-                    );
-                    for first in (from..to).step_by(Tall::CAPACITY) {
-                        let last = to.min(first + Tall::CAPACITY);
-                        let x = &trace.x[first..last];
-                        points.locate(&run, x, &trace.value[first..last])?;
-                        batch.reset(last - first, self.columns(c));
-                        self.fill(c, &points, &run, x, &mut scratch, &mut batch);
-                        for row in 0..last - first {
-                            let mut out = jacobian.row_mut(above + first + row);
-                            for (l, j) in band.iter().enumerate() {
-                                if let Some(j) = j {
-                                    out[*j] += batch.column(l)[row];
-                                }
-                            }
-                            for share in &shares {
-                                let local = batch.column(share.column as usize)[row];
-                                out[n + share.unknown as usize] += share.weight * local;
-                            }
-                        }
-                    }
-                    Ok(())
-                })?;
-            }
-            above += trace.len();
+            let attitude = Attitude::new(self.layout.slope(c, &at.border), half_mm)?;
+            side_starts.push(self.side_starts(&attitude, &cubics, c, &trace.x)?);
+            attitudes.push(attitude);
         }
-        Ok(jacobian)
+        Ok(Prepared {
+            cubics,
+            attitudes,
+            constants: (0..self.traces.len())
+                .map(|c| self.layout.constant(c, &at.border))
+                .collect(),
+            side_starts,
+            beside: match &self.body.crest {
+                None => Vec::new(),
+                Some(crest) => (0..self.traces.len())
+                    .map(|c| crest.beside(&self.layout, c, half_mm, &at.border))
+                    .collect::<Result<_, NoValue>>()?,
+            },
+            width: 0,
+        })
     }
 }
 
@@ -401,5 +294,14 @@ pub struct Prepared {
     constants: Vec<f64>,
     /// First reading whose probe point is at or beyond each break of the side's form.
     side_starts: Vec<Vec<usize>>,
+    /// By channel, where the crest is a term: how the artefact stands beside the stylus.
+    beside: Vec<Beside>,
     width: usize,
+}
+
+impl Prepared {
+    /// By channel, where the crest is a term: how the bar stands beside the stylus.
+    pub(super) fn beside(self) -> Vec<Beside> {
+        self.beside
+    }
 }

@@ -3,14 +3,15 @@
 use errsep_solvers::linear::banded::Tall;
 use errsep_solvers::options::Options as Minimisation;
 use errsep_solvers::problem::NoValue;
-use errsep_solvers::structured::{Parameters, StructuredFit, StructuredProblem, fit_structured};
+use errsep_solvers::structured::{Parameters, StructuredFit, fit_structured};
 
+use super::columns::Batch;
 use super::{DesignProblem, Prepared};
 use crate::reversal::channel_noise::Weighed;
 use crate::reversal::channel_noise::along::Derivatives;
 use crate::reversal::designs::error::DesignFitError;
 use crate::reversal::designs::readings::Trace;
-use crate::reversal::simultaneous::rows::{Points, Run};
+use crate::reversal::simultaneous::rows::Run;
 
 impl DesignProblem<'_> {
     /// The derivatives of what one reading of a channel, by its place in the trace, would be; nothing is
@@ -24,34 +25,24 @@ impl DesignProblem<'_> {
         channel: usize,
         row: usize,
     ) -> Result<Derivatives, NoValue> {
-        let last = self.cell_count() - 1;
-        let cell = |starts: &[usize]| {
-            let before = starts.partition_point(|first| *first <= row);
-            before.saturating_sub(1).min(last)
-        };
-        let side = cell(&prepared.side_starts[channel]);
-        let slide = match self.layout.slides[channel].is_empty() {
-            true => side,
-            false => cell(&self.slide_starts[channel]),
-        };
+        let (cells, _) = self.cells_at(prepared, channel, row);
         let run = Run {
             weight: 1.0,
-            ..self.run(prepared, channel, side, slide)
+            ..self.run(prepared, channel, cells)
         };
         let trace = &self.traces[channel];
         let (x, value) = (&trace.x[row..=row], &trace.value[row..=row]);
-        let mut points = Box::<Points>::default();
-        points.locate(&run, x, value)?;
-        let (mut scratch, mut one) = (Tall::new(10), Tall::new(16));
+        let (mut batch, mut one) = (Batch::default(), Tall::new(16));
+        self.locate(prepared, (channel, cells), &run, (x, value), &mut batch)?;
         one.reset(1, self.columns(channel));
-        self.fill(channel, &points, &run, x, &mut scratch, &mut one);
-        let unknowns = self.band_columns(channel, side, slide).into_iter();
+        self.fill(prepared, channel, (&run, cells), x, &mut batch, &mut one);
+        let unknowns = self.band_columns(channel, cells).into_iter();
         let band = unknowns
             .enumerate()
             .filter_map(|(column, unknown)| Some((unknown?, one.column(column)[0])))
             .collect();
         let mut border = vec![0.0; self.layout.border_count()];
-        for share in self.shares(channel, side, slide) {
+        for share in self.shares(channel, cells) {
             border[share.unknown as usize] += share.weight * one.column(share.column as usize)[0];
         }
         Ok((band, border))
@@ -62,7 +53,7 @@ impl DesignProblem<'_> {
     /// # Errors
     /// [`NoValue`] where the model is not defined.
     pub(in crate::reversal::designs) fn at(&self, point: &Parameters) -> Result<Prepared, NoValue> {
-        self.prepare(point)
+        self.prepared(point)
     }
 }
 

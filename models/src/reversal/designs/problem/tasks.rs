@@ -1,14 +1,14 @@
-//! The rows of a design, task by task: one cell and one channel.
+//! The rows of a design, task by task: one slab and one channel.
 
 use errsep_solvers::linear::banded::Tall;
 use errsep_solvers::linear::bordered::Constraints;
 use errsep_solvers::problem::NoValue;
 use errsep_solvers::structured::{Parameters, Sink, StructuredProblem};
 
+use super::columns::Batch;
 use super::{DesignProblem, Prepared};
-use crate::basis::bspline::horner;
+use crate::basis::bspline::{Cubic, horner};
 use crate::reversal::forward::{Attitude, no_contact};
-use crate::reversal::simultaneous::rows::Points;
 use crate::reversal::simultaneous::starts::starts;
 use crate::units::mm_from_um;
 
@@ -36,51 +36,8 @@ impl StructuredProblem for DesignProblem<'_> {
     }
 
     fn prepare(&self, at: &Parameters) -> Result<Prepared, NoValue> {
-        let cubics = self.cubics(at);
-        let mut attitudes = Vec::with_capacity(self.traces.len());
-        let mut side_starts = Vec::with_capacity(self.traces.len());
-        for (c, trace) in self.traces.iter().enumerate() {
-            let attitude = Attitude::new(self.layout.slope(c, &at.border), self.half_mm)?;
-            let form = self.layout.side[c];
-            // Breaks of the side's form, seen on the slide.
-            let breaks: Vec<f64> = self.bases[form]
-                .breaks()
-                .iter()
-                .enumerate()
-                .map(|(k, u)| {
-                    let height = match cubics[form].get(k) {
-                        Some(cubic) => cubic[0],
-                        None => cubics[form].last().map_or(0.0, |cubic| horner(cubic, 1.0)),
-                    };
-                    attitude.slide_position(*u, mm_from_um(height))
-                })
-                .collect();
-            if let Some(pair) = breaks.windows(2).find(|pair| !(pair[0] < pair[1])) {
-                return Err(no_contact(pair[0]));
-            }
-            attitudes.push(attitude);
-            side_starts.push(starts(&trace.x, &breaks));
-        }
-        let mut prepared = Prepared {
-            cubics,
-            attitudes,
-            constants: (0..self.traces.len())
-                .map(|c| self.layout.constant(c, &at.border))
-                .collect(),
-            side_starts,
-            width: 0,
-        };
-        let mut apart = 0;
-        for channel in 0..self.traces.len() {
-            for cell in 0..self.cell_count() {
-                self.runs(&prepared, channel, cell, |_, _, side, slide| {
-                    apart = apart.max(side.abs_diff(slide));
-                    Ok(())
-                })?;
-            }
-        }
-        let forms = self.layout.forms.len();
-        prepared.width = (forms * (4 + apart)).min(self.layout.band_count());
+        let mut prepared = self.prepared(at)?;
+        prepared.width = self.width(&prepared)?;
         Ok(prepared)
     }
 
@@ -89,42 +46,91 @@ impl StructuredProblem for DesignProblem<'_> {
     }
 
     fn task_count(&self, _: &Prepared) -> usize {
-        self.cell_count() * self.traces.len()
+        self.slab_count() * self.traces.len()
     }
 
     fn task(&self, prepared: &Prepared, index: usize, sink: &mut Sink) -> Result<(), NoValue> {
-        let (cell, c) = (index / self.traces.len(), index % self.traces.len());
+        let (slab, c) = (index / self.traces.len(), index % self.traces.len());
         let trace = &self.traces[c];
-        let mut points = Points::default();
-        let mut scratch = Tall::new(10);
-        self.runs(prepared, c, cell, |from, to, side, slide| {
-            let run = self.run(prepared, c, side, slide);
+        let mut batch = Batch::default();
+        self.runs(prepared, c, slab, |from, to, cells| {
+            let run = self.run(prepared, c, cells);
             sink.open(self.columns(c));
             for first in (from..to).step_by(Tall::CAPACITY) {
                 let last = to.min(first + Tall::CAPACITY);
-                let x = &trace.x[first..last];
-                points.locate(&run, x, &trace.value[first..last])?;
-                self.fill(c, &points, &run, x, &mut scratch, sink.batch(last - first));
+                let (x, value) = (&trace.x[first..last], &trace.value[first..last]);
+                self.locate(prepared, (c, cells), &run, (x, value), &mut batch)?;
+                let out = sink.batch(last - first);
+                self.fill(prepared, c, (&run, cells), x, &mut batch, out);
                 sink.push();
             }
-            let band = self.band_columns(c, side, slide);
-            sink.close(band, self.shares(c, side, slide), c);
+            sink.close(self.band_columns(c, cells), self.shares(c, cells), c);
             Ok(())
         })
     }
 
     fn border_name(&self, index: usize) -> String {
-        self.layout
-            .names
-            .get(index)
-            .cloned()
-            .unwrap_or_else(|| "line of a form".to_owned())
+        if self.layout.thickness_index() == Some(index) {
+            return "thickness".to_owned();
+        }
+        let known = self.layout.names.get(index).cloned();
+        known.unwrap_or_else(|| "line of a form".to_owned())
     }
 
     fn band_name(&self, index: usize) -> String {
-        let forms = self.layout.forms.len();
-        let breaks = self.bases[index % forms].breaks();
-        let knot = (index / forms).min(breaks.len() - 1);
-        format!("a form near {:.4} mm", breaks[knot])
+        let (form, k) = self.layout.member(index);
+        let breaks = self.splines.bases[form].breaks();
+        format!("a form near {:.4} mm", breaks[k - 1])
+    }
+}
+
+impl DesignProblem<'_> {
+    /// The first reading at or beyond each break of the form of a channel's side, seen on the slide.
+    pub(super) fn side_starts(
+        &self,
+        attitude: &Attitude,
+        cubics: &[Vec<Cubic>],
+        channel: usize,
+        x: &[f64],
+    ) -> Result<Vec<usize>, NoValue> {
+        let form = self.layout.side[channel];
+        let own = &cubics[form];
+        let breaks: Vec<f64> = self.splines.bases[form]
+            .breaks()
+            .iter()
+            .enumerate()
+            .map(|(k, u)| {
+                let height = match own.get(k) {
+                    Some(cubic) => cubic[0],
+                    None => own.last().map_or(0.0, |cubic| horner(cubic, 1.0)),
+                };
+                attitude.slide_position(*u, mm_from_um(height))
+            })
+            .collect();
+        match breaks.windows(2).find(|pair| !(pair[0] < pair[1])) {
+            Some(pair) => Err(no_contact(pair[0])),
+            None => Ok(starts(x, &breaks)),
+        }
+    }
+
+    /// Unknowns of the band from the lowest of a group to the highest of all groups before it.
+    fn width(&self, prepared: &Prepared) -> Result<usize, NoValue> {
+        let (mut highest, mut width) = (0, 1);
+        for slab in 0..self.slab_count() {
+            for channel in 0..self.traces.len() {
+                self.runs(prepared, channel, slab, |_, _, cells| {
+                    let band = self.band_columns(channel, cells).into_iter().flatten();
+                    let own = band.fold(None, |range: Option<(usize, usize)>, j| {
+                        Some(range.map_or((j, j), |(low, high)| (low.min(j), high.max(j))))
+                    });
+                    if let Some((low, high)) = own {
+                        highest = highest.max(high);
+                        width = width.max(highest + 1 - low);
+                    }
+                    Ok(())
+                })?;
+            }
+        }
+        Ok(width)
     }
 }

@@ -1,0 +1,244 @@
+//! How many knots each form of a design has, from the data.
+//!
+//! At the slopes of the channels' lines the cost of the linear fit is that of one linear problem; the least
+//! corrected Akaike criterion of all unknowns decides
+//! ([`knots`](crate::reversal::simultaneous::knots)). First all forms go up the ladder together, then each
+//! form by itself up and down from there while that lowers the criterion, in turn until none moves.
+
+use std::collections::HashMap;
+
+use errsep_solvers::linear::bordered::Bordered;
+use errsep_solvers::structured::{StructuredProblem, evaluate};
+use nalgebra::DVector;
+
+use super::error::DesignFitError;
+use super::fit::FEWEST_FREE;
+use super::ground::Ground;
+use super::problem::DesignProblem;
+use super::readings::range;
+use super::staged;
+use crate::basis::bspline::CubicBSpline;
+use crate::reversal::simultaneous::Knots;
+use crate::reversal::simultaneous::knots::{KnotTrial, PATIENCE, POSITIONS_A_CELL, ladder, trial};
+
+/// The break points of a fit.
+#[derive(Debug, Clone)]
+pub(super) struct Chosen {
+    /// By form, mm.
+    pub breaks: Vec<Vec<f64>>,
+    /// Those that all forms together would have, mm.
+    pub common: Vec<f64>,
+    /// The ladder of all forms together, where they are chosen.
+    pub table: Vec<KnotTrial>,
+}
+
+/// Times each form is tried again.
+const ROUNDS: usize = 4;
+
+/// Rungs that a form looks beyond one that is no better.
+const BEYOND: usize = 2;
+
+/// Cells of the finest form a cell of the coarsest: a row spans three cells of each form, in which all
+/// unknowns of the finest lie side by side, and the cost grows with the square of their number.
+const FINEST: usize = 8;
+
+/// The break points that the options ask for, or that the data choose.
+///
+/// # Errors
+/// [`DesignFitError`] where the readings do not carry them.
+pub(super) fn breaks(ground: &Ground) -> Result<Chosen, DesignFitError> {
+    let alike = |breaks: Vec<f64>, table| Chosen {
+        breaks: vec![breaks.clone(); ground.layout.forms.len()],
+        common: breaks,
+        table,
+    };
+    match &ground.options.knots {
+        Knots::At(breaks) => Ok(alike(breaks.clone(), Vec::new())),
+        Knots::Cells(asked) => match ground.most_cells() {
+            most if *asked > most && most > 0 => {
+                let asked = *asked;
+                Err(DesignFitError::TooManyKnots { asked, most })
+            }
+            _ => Ok(alike(even(ground, *asked)?, Vec::new())),
+        },
+        Knots::Chosen => {
+            let mut rungs = Rungs::new(ground)?;
+            let (best, table) = rungs.together()?;
+            let common = rungs.breaks[best].clone();
+            if ground.options.alike {
+                return Ok(alike(common, table));
+            }
+            let own = rungs.by_form(best)?;
+            Ok(Chosen {
+                breaks: own.iter().map(|r| rungs.breaks[*r].clone()).collect(),
+                common,
+                table,
+            })
+        }
+    }
+}
+
+/// Breaks of so many equal cells; a cell in which the channels with a reading do not tell all forms
+/// apart is joined to the next.
+fn even(ground: &Ground, cells: usize) -> Result<Vec<f64>, DesignFitError> {
+    let traces = ground.traces;
+    let (low, high) = range(traces);
+    let even = CubicBSpline::uniform(low, high, cells.max(1))?;
+    let mut breaks = vec![low];
+    let mut seen = vec![false; traces.len()];
+    let mut at = vec![0; traces.len()];
+    let mut told: HashMap<Vec<bool>, bool> = HashMap::new();
+    for right in &even.breaks()[1..] {
+        for (c, trace) in traces.iter().enumerate() {
+            let next = at[c] + trace.x[at[c]..].partition_point(|x| x < right);
+            seen[c] |= next > at[c];
+            at[c] = next;
+        }
+        let apart = *told
+            .entry(seen.clone())
+            .or_insert_with(|| staged::tell_apart(&ground.determined.forms, &seen));
+        if apart {
+            breaks.push(*right);
+            seen.fill(false);
+        }
+    }
+    // What is left at the end belongs to the last cell.
+    if breaks.len() > 1 {
+        breaks.pop();
+    }
+    breaks.push(high);
+    Ok(breaks)
+}
+
+/// The ladder of cells.
+struct Rungs<'g, 'a> {
+    ground: &'g Ground<'a>,
+    /// Different break points, finer and finer, mm.
+    breaks: Vec<Vec<f64>>,
+    /// What was tried, by the rung of each form: the criterion, where the readings carry it.
+    tried: HashMap<Vec<usize>, Option<f64>>,
+}
+
+impl<'g, 'a> Rungs<'g, 'a> {
+    fn new(ground: &'g Ground<'a>) -> Result<Self, DesignFitError> {
+        let mut breaks: Vec<Vec<f64>> = Vec::new();
+        for cells in std::iter::once(1).chain(ladder(ground.positions() / POSITIONS_A_CELL)) {
+            let own = even(ground, cells)?;
+            if breaks.last().is_none_or(|last| last.len() != own.len()) {
+                breaks.push(own);
+            }
+        }
+        Ok(Self {
+            ground,
+            breaks,
+            tried: HashMap::new(),
+        })
+    }
+
+    /// The trial of a rung for each form; `None` where the readings do not carry it.
+    fn trial(&self, rungs: &[usize]) -> Result<Option<KnotTrial>, DesignFitError> {
+        let readings = self.ground.readings();
+        let breaks: Vec<Vec<f64>> = rungs.iter().map(|r| self.breaks[*r].clone()).collect();
+        let most = breaks.iter().map(|b| b.len() - 1).max().unwrap_or(0);
+        let (problem, start) = self.ground.problem(breaks)?;
+        let count = problem.layout.free_count();
+        if readings < count + FEWEST_FREE {
+            return Ok(None);
+        }
+        let evaluation = evaluate(&problem, &start)?;
+        let squares = squares_left(&problem, &evaluation.system);
+        Ok(squares.map(|squares| trial(most, readings, count, squares)))
+    }
+
+    /// Goes up the ladder with all forms together: the best rung, and the table.
+    fn together(&mut self) -> Result<(usize, Vec<KnotTrial>), DesignFitError> {
+        let (mut table, mut best): (Vec<KnotTrial>, usize) = (Vec::new(), 0);
+        let forms = self.ground.layout.forms.len();
+        for rung in 0..self.breaks.len() {
+            let all = vec![rung; forms];
+            let own = self.trial(&all)?;
+            self.tried.insert(all, own.map(|t| t.aicc));
+            let Some(own) = own else {
+                break;
+            };
+            table.push(own);
+            if own.aicc < table[best].aicc {
+                best = rung;
+            } else if rung >= best + PATIENCE {
+                break;
+            }
+        }
+        Ok((best, table))
+    }
+
+    fn criterion(&mut self, rungs: &[usize]) -> Result<f64, DesignFitError> {
+        let known = self.tried.get(rungs).copied();
+        let own = match known {
+            Some(own) => own,
+            None => {
+                let own = self.trial(rungs)?.map(|t| t.aicc);
+                self.tried.insert(rungs.to_vec(), own);
+                own
+            }
+        };
+        Ok(own.unwrap_or(f64::INFINITY))
+    }
+
+    /// Whether the finest of these rungs is no finer beside the coarsest than the band carries.
+    fn near(&self, rungs: &[usize]) -> bool {
+        let cells = |rung: Option<&usize>| rung.map_or(1, |r| self.breaks[*r].len() - 1);
+        cells(rungs.iter().max()) <= FINEST * cells(rungs.iter().min())
+    }
+
+    /// The rung of each form, from one that is best for all together.
+    fn by_form(&mut self, common: usize) -> Result<Vec<usize>, DesignFitError> {
+        let mut at = vec![common; self.ground.layout.forms.len()];
+        let mut best = self.criterion(&at)?;
+        for _ in 0..ROUNDS {
+            let before = at.clone();
+            for form in 0..at.len() {
+                for up in [false, true] {
+                    let (mut rung, mut since) = (at[form], 0);
+                    while since < BEYOND {
+                        let next = if up {
+                            rung.checked_add(1)
+                        } else {
+                            rung.checked_sub(1)
+                        };
+                        let Some(next) = next.filter(|n| *n < self.breaks.len()) else {
+                            break;
+                        };
+                        (rung, since) = (next, since + 1);
+                        let mut tried = at.clone();
+                        tried[form] = rung;
+                        if !self.near(&tried) {
+                            break;
+                        }
+                        let own = self.criterion(&tried)?;
+                        if own < best {
+                            (best, at, since) = (own, tried, 0);
+                        }
+                    }
+                }
+            }
+            if at == before {
+                break;
+            }
+        }
+        Ok(at)
+    }
+}
+
+/// The sum of squares that the linear fit leaves.
+fn squares_left(problem: &DesignProblem, system: &Bordered) -> Option<f64> {
+    let missing = DVector::zeros(problem.constraints().len());
+    let mut held = problem.held().to_vec();
+    // No thickness shows where the forms are still zero.
+    if let Some(index) = problem.layout.thickness_index() {
+        held[index] = true;
+    }
+    let solved = system.solve(problem.constraints(), &missing, &held).ok()?;
+    let left =
+        system.sum_of_squares() - 2.0 * system.predicted_reduction(&solved.band, &solved.border);
+    Some(left.max(system.unreachable_residual().powi(2)))
+}

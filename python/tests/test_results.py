@@ -99,6 +99,24 @@ def test_a_covariance_has_names(answers: dict[str, errsep.Result]) -> None:
     assert answers["reversal"].covariance is None
 
 
+def test_tilts_of_one_fit_are_correlated(readings: Path, setup: Path) -> None:
+    answer = errsep.reversal(readings, setup, simultaneous=True)
+    covariance = answer.covariance
+    assert covariance.names == list(answer.tilts)
+    assert covariance.unit == "rad2"
+    for name, tilt in answer.tilts.items():
+        # A root squared: epsilons.
+        assert covariance[name, name] == pytest.approx(tilt.std**2, rel=1e-12)
+    numbers = answer.to_uncertainties()
+    total = numbers["tilts.alpha"] + numbers["tilts.beta"]
+    variance = sum(covariance[a, b] for a in ("alpha", "beta") for b in ("alpha", "beta"))
+    # `uncertainties` factors the covariance by eigenvalues.
+    assert total.std_dev == pytest.approx(variance**0.5, rel=1e-9)
+    # Sizes of an effect are µm and s beside tilts in rad: no unit for all.
+    drifting = errsep.reversal(readings, setup, simultaneous=True, with_=["thermal-drift"]).covariance
+    assert drifting.unit == "" and any(name.startswith("thermal-drift.") for name in drifting.names)
+
+
 def test_what_is_not_determined_is_told(answers: dict[str, errsep.Result], readings: Path) -> None:
     assert len(answers["four_sensor"].not_determined) == 3
     assert any("positioning" in words for words in answers["step_diagonal"].not_determined)

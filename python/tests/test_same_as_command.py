@@ -14,6 +14,9 @@ import errsep
 
 NISTIR = FIXTURES / "nistir6868"
 
+_SAME = {name: name for name in ("channel", "repeat", "direction", "time", "x", "reading")}
+_WORDS = ",".join(f"{name}={name}" for name in _SAME)
+
 
 def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[str | Path]]]:
     """A call of each function and the command that is the same."""
@@ -31,6 +34,10 @@ def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[st
     planned = {"noise": 0.02, "travel": 300.0, "positions": 31, "repeats": 2}
     plan = tmp_path / "plan.toml"
     plan.write_text("\n".join(f"{key} = {value}" for key, value in planned.items()))
+    sealed, planned_next = tmp_path / "sealed.toml", tmp_path / "next.csv"
+    lines = readings.read_text().splitlines()
+    planned_next.write_text("\n".join(line.rsplit(",", 1)[0] for line in lines if line[:1] != "#") + "\n")
+    errsep.diagnose(readings, setup, severity=0, seal=sealed, next=planned_next)
     made_machine = {"stations": 5, "repeats": 3, "seed": 2}
     return {
         "reversal": (lambda: errsep.reversal(readings), ["reversal", readings]),
@@ -87,6 +94,11 @@ def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[st
             lambda: errsep.diagnose(readings, setup, without=["taper"], false_alarm=0.05),
             ["diagnose", readings, "--setup", setup, "--without", "taper", "--false-alarm", "0.05"],
         ),
+        "diagnose, columns and severity": (
+            lambda: errsep.diagnose(readings, setup, columns=_SAME, severity=0),
+            ["diagnose", readings, "--setup", setup, "--columns", _WORDS, "--severity", "0"],
+        ),
+        "check": (lambda: errsep.check(sealed, readings), ["check", sealed, readings]),
         "plan": (lambda: errsep.plan(planned), ["plan", plan]),
         "simulate": (
             lambda: errsep.simulate("reversal", alpha=-5, thickness=42, effects={"zero-jump": 0.2}, seed=7),
@@ -125,6 +137,8 @@ def calls(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         "anova",
         "straightness",
         "diagnose",
+        "diagnose, columns and severity",
+        "check",
         "plan",
         "simulate",
         "simulate machine",
@@ -144,7 +158,7 @@ def test_every_call_is_compared(calls: dict[str, Any]) -> None:
     assert list(calls) == mark.args[1]
     functions = {"_".join(words[0].split("-")) for _, words in calls.values()}
     known = {"reversal", "circle", "four_sensor", "fourier", "step_diagonal", "machine", "anova"}
-    assert functions == known | {"straightness", "diagnose", "plan", "simulate"}
+    assert functions == known | {"straightness", "diagnose", "check", "plan", "simulate"}
 
 
 def test_the_text_is_that_of_the_command(readings: Path) -> None:

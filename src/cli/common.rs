@@ -50,6 +50,12 @@ pub struct ColumnArgs {
 }
 
 impl ColumnArgs {
+    /// These names and units.
+    #[must_use]
+    pub fn of(map: ColumnMap) -> Self {
+        Self { columns: Some(map) }
+    }
+
     /// The names and units; none where the columns are named as the command has them.
     #[must_use]
     pub fn map(&self) -> ColumnMap {

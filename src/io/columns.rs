@@ -1,5 +1,6 @@
 //! Names and units of a file's columns where they are not those of the documentation.
 
+use std::fmt;
 use std::str::FromStr;
 
 use crate::io::message::{list, nearest};
@@ -69,6 +70,12 @@ impl ColumnMap {
         self.entries.iter().any(|e| e.role == role)
     }
 
+    /// The column of a role.
+    pub fn column_of(&self, role: &str) -> Option<&str> {
+        let entry = self.entries.iter().find(|e| e.role == role)?;
+        Some(&entry.column)
+    }
+
     /// Whether nothing was renamed.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
@@ -92,6 +99,20 @@ impl ColumnMap {
 
     pub(super) fn entries(&self) -> &[Entry] {
         &self.entries
+    }
+}
+
+/// As it is written.
+impl fmt::Display for ColumnMap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (k, entry) in self.entries.iter().enumerate() {
+            let comma = if k > 0 { "," } else { "" };
+            write!(f, "{comma}{}={}", entry.role, entry.column)?;
+            if let Some(unit) = entry.unit {
+                write!(f, ":{}", unit.name())?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -130,6 +151,7 @@ mod tests {
         }
         let map: ColumnMap = "x=a: b:mm, time=t:min".parse().unwrap();
         assert_eq!(map.entries()[0].column, "a: b");
+        assert_eq!(map.to_string().parse::<ColumnMap>().as_ref(), Ok(&map));
         assert!(map.only(&["x", "time"]).is_ok());
         let (what, remedy) = map.only(&["x", "times"]).unwrap_err();
         assert!(

@@ -10,6 +10,7 @@ pub mod machine;
 pub mod message;
 pub mod output;
 pub mod parts;
+pub mod plates;
 pub mod positioning;
 pub mod printable;
 pub mod provenance;

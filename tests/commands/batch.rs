@@ -145,6 +145,58 @@ fn rows_hold_what_the_commands_answer() {
 }
 
 #[test]
+fn readings_of_designs_are_campaigns_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let errsep = |words: &[&str]| {
+        let output = Command::new(cargo_bin("errsep"))
+            .current_dir(folder.path())
+            .args(words)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let design = "0/0,90/0,180/0,270/0,0/90,90/90,180/90,270/90,0/180,90/180,180/180,270/180";
+    let simulate = [
+        "simulate",
+        "reversal",
+        "--positions",
+        "41",
+        "--design",
+        design,
+    ];
+    let made = errsep(&simulate);
+    let header = made.lines().find(|line| !line.starts_with('#'));
+    assert!(
+        header.is_some_and(|h| h.contains("indicator") && h.contains("spindle")),
+        "{header:?}"
+    );
+    fs::write(folder.path().join("both-planes.csv"), made).unwrap();
+    let list = "id,command,data\nd1,reversal,both-planes.csv\n";
+    fs::write(folder.path().join("campaigns.csv"), list).unwrap();
+    errsep(&["batch", "campaigns.csv", "--out", "answers"]);
+    let row = fs::read_to_string(folder.path().join("answers/part-1-00001.ndjson")).unwrap();
+    let row: Value = serde_json::from_str(&row).unwrap();
+    assert_eq!(
+        (&row["status"], &row["result"]["schema"]),
+        (&"done".into(), &"errsep.reversal/2".into())
+    );
+    let mut own: Value = serde_json::from_str(&errsep(&[
+        "reversal",
+        "both-planes.csv",
+        "--format",
+        "json",
+    ]))
+    .unwrap();
+    own.as_object_mut().unwrap().remove("provenance");
+    own["convergence"]
+        .as_object_mut()
+        .unwrap()
+        .remove("seconds");
+    assert_eq!(row["result"], own);
+}
+
+#[test]
 fn what_is_done_is_skipped_until_something_changes() {
     let bench = Bench::new(20);
     bench.run("out", &[]);

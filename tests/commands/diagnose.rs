@@ -220,6 +220,31 @@ fn a_size_that_cannot_be_is_not_simulated() {
             "thermal-expansion=1",
             ["scale", "cannot be 1", "-0.001 to 0.001"],
         ),
+        (
+            "circle",
+            &[],
+            "squareness=1",
+            ["angle", "1 rad", "-0.01 to 0.01 rad"],
+        ),
+        (
+            "calibration-line",
+            &[],
+            "cubic=1e7",
+            ["at-full-scale", "10000000 y", "-1000000 to 1000000 y"],
+        ),
+        ("four-sensor", &[], "lag=-1", ["way", "-1 mm", "0 to 10 mm"]),
+        (
+            "fourier",
+            &[],
+            "yaw=5",
+            ["angle", "5 rad", "-0.01 to 0.01 rad"],
+        ),
+        (
+            "step-diagonal",
+            &[],
+            "angular-error=2",
+            ["at-end-of-travel", "2 rad", "-0.001 to 0.001 rad"],
+        ),
     ] {
         let arguments = [&["simulate", kind][..], more, &["--effect", effect]].concat();
         bad_input(&folder, &arguments, &told);

@@ -22,6 +22,7 @@ mod machine;
 mod measured_reversals;
 mod parts_of_nistir;
 mod plan_of_designs;
+mod plates;
 mod positioning;
 mod report;
 mod reversal;

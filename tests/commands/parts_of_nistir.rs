@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use errsep::io::machine::{read_machine, read_points};
+use errsep::io::machine::read_machine;
 use errsep::io::parts::read_parts;
 use errsep_models::machine::{Axis, part_residuals};
 use nalgebra::{DMatrix, DVector};
@@ -39,8 +39,8 @@ struct Process {
 impl Process {
     fn of(file: &str) -> Self {
         let machine = read_machine(&fixture("machine.toml"), None).unwrap();
-        let points = read_points(&fixture("holes.csv")).unwrap();
-        let readings = read_parts(&fixture(file), &Default::default(), &points).unwrap();
+        let points = fixture("holes.csv");
+        let readings = read_parts(&[fixture(file)], &Default::default(), Some(&points)).unwrap();
         let residuals = part_residuals(&machine, &readings).unwrap();
         let mut cells: BTreeMap<(&str, &str, bool), Vec<f64>> = BTreeMap::new();
         let mut places = BTreeMap::new();

@@ -131,6 +131,66 @@ fn what_is_sealed_is_scored_and_a_seal_that_was_touched_is_refused() {
 }
 
 #[test]
+fn columns_of_other_names_and_units_are_sealed_with_them() {
+    let folder = measured();
+    let sealed = |seal: &str, more: &[&str]| {
+        let [data, next, plan] = if more.is_empty() {
+            ["now.csv", "next.csv", "plan.csv"]
+        } else {
+            ["other-now.csv", "other-next.csv", "other-plan.csv"]
+        };
+        let line = [
+            "diagnose",
+            data,
+            "--severity",
+            "0",
+            "--seal",
+            seal,
+            "--next",
+            plan,
+        ];
+        let out = run(&folder, &[&line[..], more].concat());
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        let out = run(&folder, &["check", seal, next, "--format", "json"]);
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        let score: Value = serde_json::from_str(&out.stdout).unwrap();
+        score["trace"]["coverage"].as_f64().unwrap()
+    };
+    // The same readings in nm under another name, beside a column more.
+    for file in ["now.csv", "next.csv", "plan.csv"] {
+        let mut text = String::new();
+        for line in folder.read(file).lines() {
+            let line = line.replace(
+                "channel,repeat,direction,time,x",
+                "probe,repeat,direction,time,z",
+            );
+            text += &match line.rsplit_once(',') {
+                Some((rest, "reading")) => format!("{rest},signal,note\n"),
+                Some((rest, last)) if file != "plan.csv" => {
+                    format!("{rest},{},-\n", 1e3 * last.parse::<f64>().unwrap())
+                }
+                _ => format!("{line}\n"),
+            };
+        }
+        folder.write(&format!("other-{file}"), &text);
+    }
+    let columns =
+        "channel=probe,repeat=repeat,direction=direction,time=time:s,x=z:mm,reading=signal:nm";
+    let (own, renamed) = (
+        sealed("a.toml", &[]),
+        sealed("b.toml", &["--columns", columns]),
+    );
+    // Monte Carlo: bands are drawn from readings that differ in their last digit: two of 744 on an edge.
+    assert!((own - renamed).abs() <= 2.5 / 744.0, "{own} {renamed}");
+    let file = folder.read("b.toml");
+    assert!(
+        file.contains(&format!("columns = \"{columns}\"")),
+        "{}",
+        &file[..600]
+    );
+}
+
+#[test]
 fn a_plan_that_cannot_be_sealed_is_refused() {
     let folder = measured();
     let plan = folder.read("plan.csv");

@@ -53,6 +53,62 @@ fn json(folder: &Folder, more: &[&str]) -> Value {
     serde_json::from_str(&output.stdout).unwrap()
 }
 
+/// Correlations by the names of the covariance, its diagonal against the standard uncertainties.
+fn correlations(answer: &Value) -> std::collections::BTreeMap<(String, String), f64> {
+    let covariance = &answer["covariance"];
+    let names: Vec<&str> = (covariance["names"].as_array().unwrap().iter())
+        .map(|n| n.as_str().unwrap())
+        .collect();
+    let at = |i: usize, j: usize| covariance["matrix"][i][j].as_f64().unwrap();
+    for (k, name) in names.iter().enumerate() {
+        let (own, unit) = match name.split_once('.') {
+            None => (&answer["tilts"][name], &covariance["units"][k]),
+            Some((_, parameter)) => {
+                let all = answer["effects"][0]["parameters"].as_array().unwrap();
+                let own = all.iter().find(|p| p["name"] == parameter).unwrap();
+                (own, &covariance["units"][k])
+            }
+        };
+        assert_eq!(&own["unit"], unit, "{name}");
+        let std = own["std"].as_f64().unwrap();
+        // Epsilons: a square and its root.
+        assert!((at(k, k).sqrt() / std - 1.0).abs() < 1e-12, "{name}");
+    }
+    let mut all = std::collections::BTreeMap::new();
+    for i in 0..names.len() {
+        for j in 0..names.len() {
+            assert_eq!(at(i, j), at(j, i));
+            let r = at(i, j) / (at(i, i) * at(j, j)).sqrt();
+            all.insert((names[i].to_owned(), names[j].to_owned()), r);
+        }
+    }
+    all
+}
+
+#[test]
+fn the_covariance_has_the_names_and_the_uncertainties_of_the_answer() {
+    let folder = folder(&[Fault::Drift(0.9, -0.4, 600.0)]);
+    let r = |all: &std::collections::BTreeMap<(String, String), f64>, a: &str, b: &str| {
+        all[&(a.to_owned(), b.to_owned())]
+    };
+    // Four channels on one grid: the contrasts are orthogonal but for what repeats say of each channel's noise.
+    let plain = correlations(&json(&folder, &[]));
+    assert_eq!(plain.len(), 9);
+    for (a, b) in [("alpha", "beta"), ("alpha", "gamma"), ("beta", "gamma")] {
+        assert!(r(&plain, a, b).abs() < 0.2, "{a} {b} {}", r(&plain, a, b));
+    }
+    let drifting = correlations(&json(&folder, &["--with", "thermal-drift"]));
+    assert_eq!(drifting.len(), 36);
+    // The size of a drift and its time constant are told by the same readings.
+    let own = r(
+        &drifting,
+        "thermal-drift.near-drift",
+        "thermal-drift.time-constant",
+    );
+    assert!(own.abs() > 1e-3, "{own}");
+    assert!(drifting.values().all(|r| r.abs() < 1.0 + 1e-9));
+}
+
 #[test]
 fn the_answer_has_the_effect_in_every_form() {
     let folder = folder(&[Fault::Drift(0.9, -0.4, 600.0)]);

@@ -7,5 +7,6 @@ mod fitted;
 mod lack_of_fit;
 pub mod simulate;
 
+pub use effects::amplitude;
 pub use fitted::{CalibrationLine, CalibrationReading, NotALine};
 pub use lack_of_fit::{LackOfFit, lack_of_fit};

@@ -23,6 +23,7 @@ mod zone;
 pub use algebraic::{AlgebraicFit, algebraic};
 pub use batch::{FittedCircle, orthogonal_fits};
 pub use diagnosable::CirclePoints;
+pub use effects::amplitude;
 pub use nistir::{NistirEnding, NistirFit, nistir_fit};
 pub use orthogonal::{CircleFit, OrthogonalCircle, orthogonal_fit};
 pub use points::{Circle, CircleError, LARGEST, Point, SMALLEST, check_points};

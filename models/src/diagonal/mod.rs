@@ -33,6 +33,7 @@ pub use design::{Identifiability, identifiability};
 pub use determination::{Ambiguity, Determined, Remedy};
 pub use diagnosable::DiagonalRuns;
 pub use diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
+pub use effects::amplitude;
 pub use errors::ErrorTables;
 pub use estimates::{
     Assumptions, ComponentEstimate, LocationEstimate, Measured, MirrorEstimate, StepDiagonalFit,

@@ -33,6 +33,7 @@ mod zone;
 
 pub use choice::{Choice, Chosen, Penalised};
 pub use diagnosable::FourSensors;
+pub use effects::amplitude;
 pub use ends::Ends;
 pub use error::FourSensorError;
 pub use gauge::{Line, Parabola};

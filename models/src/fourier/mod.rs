@@ -27,6 +27,7 @@ mod transfer;
 
 pub use beyond::{BeyondOrders, Disagreement, TOLD_BELOW};
 pub use diagnosable::FourierScans;
+pub use effects::amplitude;
 pub use joint::{Compensation, Joint, ShiftTerm, join, step_terms};
 pub use noise::NoiseSource;
 pub use repeatability::{mean_deviation, mean_harmonic_deviation, repeatability};

@@ -41,6 +41,13 @@ impl Parameter {
     }
 }
 
+/// What the size of an effect is: the first amplitude of that of this name in a catalogue. `None` where it
+/// has none.
+pub(crate) fn amplitude<M>(catalogue: &[Box<dyn Effect<M>>], effect: &str) -> Option<Parameter> {
+    let own = catalogue.iter().find(|known| known.name() == effect)?;
+    own.amplitudes().into_iter().next()
+}
+
 /// The estimate of one parameter of an effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {

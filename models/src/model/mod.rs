@@ -15,6 +15,7 @@ use nalgebra::{DMatrix, DVector};
 /// Relative rounding of numbers that a calculation has gone through.
 pub(crate) const ROUNDING: f64 = 1e-12;
 
+pub(crate) use effect::amplitude;
 pub(crate) use effect::each;
 pub use effect::{About, Effect, Estimate, Link, Parameter, Shape};
 pub(crate) use moments::Moments;

@@ -1,5 +1,7 @@
 //! Coverage factor and expanded uncertainty (GUM chapter 6 and annex G).
 
+use std::cell::Cell;
+
 use errsep_solvers::uncertainty::student_quantile;
 use serde::{Deserialize, Serialize};
 
@@ -17,14 +19,24 @@ pub fn coverage_factor(
     if !(probability > 0.0 && probability < 1.0) {
         return Err(UncertaintyError::BadProbability { found: probability });
     }
-    // From the lower tail, which keeps its digits where the coverage is close to 1.
-    let k = -student_quantile(0.5 * (1.0 - probability), degrees_of_freedom.as_f64());
-    if k.is_nan() {
-        return Err(UncertaintyError::BadDegreesOfFreedom {
-            found: degrees_of_freedom.as_f64(),
-        });
+    let asked = (probability, degrees_of_freedom.as_f64());
+    let (last, factor) = LAST.get();
+    if last == asked {
+        return Ok(factor);
     }
+    // From the lower tail, which keeps its digits where the coverage is close to 1.
+    let k = -student_quantile(0.5 * (1.0 - probability), asked.1);
+    if k.is_nan() {
+        return Err(UncertaintyError::BadDegreesOfFreedom { found: asked.1 });
+    }
+    LAST.set((asked, k));
     Ok(k)
+}
+
+thread_local! {
+    // The quantities of an answer mostly share their degrees of freedom, and the quantile takes as long as
+    // many of them. No probability is zero.
+    static LAST: Cell<((f64, f64), f64)> = const { Cell::new(((0.0, 0.0), 0.0)) };
 }
 
 /// An expanded uncertainty `U = k u` and its interval.

@@ -15,6 +15,7 @@ from ._errsep import __version__
 from .batches import Batch, batch
 from .commands import (
     anova,
+    check,
     circle,
     diagnose,
     four_sensor,
@@ -48,6 +49,7 @@ __all__ = [
     "__version__",
     "anova",
     "batch",
+    "check",
     "circle",
     "diagnose",
     "four_sensor",

@@ -55,9 +55,8 @@ def _label(ax: Any, title: str, x: str = "x (mm)", y: str = "deviation (µm)") -
 
 def _reversal(answer: Result, ax: Any) -> None:
     table = answer.tables["profiles"]
-    for form in ("M", "S_A", "S_B"):
-        if f"{form}_um" in table:
-            _line(ax, table, f"{form}_um", f"{form}_std_um", form)
+    for form in (name.removesuffix("_std_um") for name in table if name.endswith("_std_um")):
+        _line(ax, table, f"{form}_um", f"{form}_std_um", form)
     _label(ax, "Forms of the slide and of the artefact, 95 % bands")
 
 
@@ -150,6 +149,20 @@ def _diagnose(answer: Result, ax: Any) -> None:
     _bars(ax, names, evidence, "log evidence against no effect", "Evidence of each effect alone")
 
 
+def _check(answer: Result, ax: Any) -> None:
+    numbers = [
+        (f"{effect['effect']} {number['name']}", number["z"])
+        for effect in answer["effects"]
+        for number in effect["numbers"]
+    ]
+    numbers += [(number["name"], number["z"]) for number in answer["quantities"]]
+    told = [(name, z) for name, z in numbers if z is not None]
+    names, found = [name for name, _ in told], [z for _, z in told]
+    _bars(ax, names, found, "found less sealed, standard deviations", "Against what was sealed")
+    for end in (-BAND, BAND):
+        ax.axvline(end, color="0.5", linewidth=0.8, linestyle="--")
+
+
 def _plan(answer: Result, ax: Any) -> None:
     found = [e for e in answer["effects"] if e["detectable"] is not None and e["unit"] == "um"]
     names = [effect["effect"] for effect in found]
@@ -180,6 +193,7 @@ _DRAWN: dict[str, Callable[[Result, Any], None]] = {
     "machine": _machine,
     "anova": _anova,
     "diagnose": _diagnose,
+    "check": _check,
     "plan": _plan,
     "simulate": _simulate,
 }

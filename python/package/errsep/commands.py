@@ -195,7 +195,7 @@ def machine(
     action
         ``"predict"`` (``data``: points), ``"length"`` (points, ``between``), ``"squareness"`` (points,
         ``first``, ``second``, ``along``), ``"circularity"`` (``centre``, ``radius``, ``count``,
-        ``plane``), ``"parts"`` (``data``: readings of parts; ``points``).
+        ``plane``), ``"parts"`` (``data``: readings of parts or a list of such tables; ``points``).
     components
         Readings to which the entries with a ``degree`` are fitted.
     between
@@ -208,8 +208,8 @@ def machine(
     if components is not None:
         call.option("components", call.table(components, "components"))
     call.words.append(action)
-    if data is not None:
-        call.positional(call.table(data, "readings" if action == "parts" else "points"))
+    for one in data if isinstance(data, list) else [] if data is None else [data]:
+        call.positional(call.table(one, "readings" if action == "parts" else "points"))
     if points is not None:
         call.option("points", call.table(points, "points"))
     pairs = (pair if isinstance(pair, str) else ":".join(pair) for pair in between)
@@ -265,7 +265,11 @@ def diagnose(
     columns: ColumnMap | None = None,
     without: Sequence[str] = (),
     effects: Setup | None = None,
+    learn: str | os.PathLike[str] | None = None,
+    seal: str | os.PathLike[str] | None = None,
+    next: Table | None = None,
     false_alarm: float | None = None,
+    severity: int | None = None,
     prove: int | None = None,
     seed: int | None = None,
     threads: int | None = None,
@@ -275,31 +279,62 @@ def diagnose(
     Parameters
     ----------
     data, setup
-        Those of the model's own command.
+        Those of the model's own command. Parts may come as a list of tables, a part each.
     model
         ``"reversal"``, ``"calibration-line"``, ``"circle"``, ``"four-sensor"``, ``"fourier"``,
         ``"machine"``, ``"step-diagonal"``; columns and set-up tell where it is absent.
     points
         Points of the parts, for a machine.
+    columns
+        Names and units of the columns.
     without
         Effects left out of the catalogue.
     effects
         More effects for the catalogue: a dictionary, TOML text or a path.
+    learn
+        A file into which what no effect explains is written as an effect of its own, for ``effects``.
+    seal, next
+        A file into which is written what a further measurement will show, for `check`, and that
+        measurement: its columns without the readings.
     false_alarm
         Probability of naming anything where nothing is there.
+    severity
+        Most rivals of a family that are drawn to say what else would have been given the same name.
     prove
         Number of sealed effects that are put in and diagnosed blind.
     """
     call = Call("diagnose")
     columns_of: Columns = {**_REVERSAL, **_POINTS} if model != "four-sensor" else _FOUR_SENSOR
-    call.positional(call.table(data, "data", columns_of))
+    for one in data if isinstance(data, list) else [data]:
+        call.positional(call.table(one, "data", columns_of))
     _setup(call, setup)
     call.options({"model": model, "columns": columns, "false_alarm": false_alarm, "prove": prove})
+    call.options({"severity": severity, "learn": _path(learn), "seal": _path(seal)})
+    if next is not None:
+        call.option("next", call.table(next, "plan"))
     if points is not None:
         call.option("points", call.table(points, "points"))
     call.repeated("without", without)
     if effects is not None:
         call.option("effects", call.toml(effects, "effects"))
+    call.option("seed", seed)
+    return _answer(call, threads)
+
+
+def check(
+    sealed: str | os.PathLike[str],
+    data: Table,
+    *,
+    seed: int | None = None,
+    threads: int | None = None,
+) -> Result:
+    """Does a measurement show what was sealed before it was made, by ``diagnose(…, seal=, next=)``?
+
+    A low score is an answer; a seal that was touched is an `InputError`.
+    """
+    call = Call("check")
+    call.positional(os.fspath(sealed))
+    call.positional(call.table(data, "data", {**_REVERSAL, **_POINTS}))
     call.option("seed", seed)
     return _answer(call, threads)
 

@@ -202,7 +202,9 @@ def correlated(quantities: Mapping[str, Quantity], covariance: Covariance | None
         return {}
     found = {}
     for short in covariance.names:
+        effect, _, parameter = short.partition(".")
+        full = (short, f"fit.{short}", f"tilts.{short}", f"effects.{effect}.parameters.{parameter}")
         for name, q in quantities.items():
-            if name in (short, f"fit.{short}") and q.std > 0 and math.isfinite(q.std):
+            if name in full and q.std > 0 and math.isfinite(q.std):
                 found[short] = name
     return found

@@ -88,7 +88,12 @@ class Result:
 
     @cached_property
     def covariance(self) -> Covariance | None:
-        """The covariance with its names, where the command's answer has one (a circle)."""
+        """The covariance with its names, where the command's answer has one: of a circle, of the tilts
+        and effects of a simultaneous reversal."""
+        named = self._json.get("covariance")
+        if named is not None:
+            units = set(named["units"])
+            return Covariance(named["names"], named["matrix"], f"{units.pop()}2" if len(units) == 1 else "")
         found = self._json.get("fit", {}).get("covariance")
         return None if found is None else Covariance(found["order"], found["value"], found["unit"])
 
@@ -262,8 +267,15 @@ def _name(part: Any, k: int) -> str:
     return str(k)
 
 
+def _in_words(one: Any) -> str:
+    """What a design leaves open comes with what to do about it."""
+    if isinstance(one, Mapping):
+        return ": ".join(words for words in (one["combination"], one.get("remedy")) if words)
+    return str(one)
+
+
 def _not_determined(answer: Mapping[str, Any]) -> list[str]:
-    found: list[str] = list(answer.get("not_determined") or [])
+    found: list[str] = [_in_words(one) for one in answer.get("not_determined") or []]
     found += [f"tilt {name}" for name, tilt in (answer.get("tilts") or {}).items() if tilt is None]
     forms = answer.get("forms") or {}
     found += [f"form {name}" for name, form in forms.items() if form is None and "_std" not in name]

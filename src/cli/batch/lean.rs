@@ -1,6 +1,7 @@
 //! An answer without its lists of numbers, as rows are read back: of a hundred kilobytes a few hundred
 //! bytes are left, and the rest is passed over without being made into numbers.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
@@ -45,6 +46,51 @@ impl<'de> Deserialize<'de> for Lean {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(Reading)
     }
+}
+
+/// The text of a row with only the first number of each list of numbers: what [`Lean`] makes of it is the
+/// same, and the rest need not be looked at number by number.
+pub(super) fn without_lists(text: &str) -> Cow<'_, str> {
+    let bytes = text.as_bytes();
+    let mut kept = String::new();
+    let (mut from, mut at) = (0, 0);
+    while let Some(next) = bytes[at..].iter().position(|b| matches!(b, b'[' | b'"')) {
+        at += next + 1;
+        if bytes[at - 1] == b'"' {
+            at = after_text(bytes, at);
+        } else if let Some((first, end)) = list_of_numbers(&bytes[at..]) {
+            kept += &text[from..at + first];
+            (from, at) = (at + end, at + end);
+        }
+    }
+    if from == 0 {
+        return Cow::Borrowed(text);
+    }
+    kept += &text[from..];
+    Cow::Owned(kept)
+}
+
+/// The place after the quote that ends a text.
+fn after_text(bytes: &[u8], mut at: usize) -> usize {
+    while let Some(next) = bytes[at..].iter().position(|b| matches!(b, b'"' | b'\\')) {
+        at += next + 1;
+        if bytes[at - 1] == b'"' {
+            return at;
+        }
+        at = bytes.len().min(at + 1);
+    }
+    bytes.len()
+}
+
+/// Where the first number of a list ends and where the list does, if it begins with a number and holds
+/// neither texts nor lists.
+fn list_of_numbers(after_bracket: &[u8]) -> Option<(usize, usize)> {
+    after_bracket
+        .first()
+        .filter(|b| b.is_ascii_digit() || **b == b'-')?;
+    let end = memchr::memchr3(b']', b'"', b'[', after_bracket)?;
+    let first = memchr::memchr(b',', &after_bracket[..end])?;
+    (after_bracket[end] == b']').then_some((first, end))
 }
 
 struct Reading;
@@ -105,6 +151,31 @@ impl<'de> Visitor<'de> for Reading {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn leaving_lists_out_first_changes_nothing() {
+        for (text, left) in [
+            (r#"{"x":[1.5,-2,3e-7],"y":[4]}"#, r#"{"x":[1.5],"y":[4]}"#),
+            (
+                r#"{"why":"a [1,2] \"[3,4]","n":[-1,2]}"#,
+                r#"{"why":"a [1,2] \"[3,4]","n":[-1]}"#,
+            ),
+            (
+                r#"{"a":[[1,2],[3,4]],"m":[1,"a]"]}"#,
+                r#"{"a":[[1],[3]],"m":[1,"a]"]}"#,
+            ),
+            (
+                r#"{"o":[1,{}],"e":[],"t":["x","y"]}"#,
+                r#"{"o":[1],"e":[],"t":["x","y"]}"#,
+            ),
+            ("[1,2", "[1,2"),
+            (r#""\"#, r#""\"#),
+        ] {
+            assert_eq!(without_lists(text), left, "{text}");
+            let lean = |text: &str| serde_json::from_str::<Lean>(text).ok();
+            assert_eq!(lean(&without_lists(text)), lean(text), "{text}");
+        }
+    }
 
     #[test]
     fn lists_of_numbers_and_objects_are_passed_over() {

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::lean::Lean;
-use super::parts::{part_files, rows_of};
+use super::lean::{Lean, without_lists};
+use super::parts::{lines_of, part_files};
 use super::row::{LeanRow, Status};
 use crate::diagnosis::scaled;
 use crate::io::Message;
@@ -37,9 +37,11 @@ struct Seen {
 pub(super) fn of(list: &Path, folder: &Path) -> Result<String, Message> {
     let mut seen = Seen::default();
     for part in part_files(folder)? {
-        for (_, row) in rows_of::<LeanRow>(&part)? {
-            seen.take(row);
-        }
+        lines_of(&part, |line| {
+            if let Ok(row) = serde_json::from_str(&without_lists(line)) {
+                seen.take(row);
+            }
+        })?;
     }
     Ok(seen.page(list).render())
 }

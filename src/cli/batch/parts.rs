@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use indicatif::ProgressBar;
@@ -188,22 +188,30 @@ impl Part {
         let mut seconds = Vec::new();
         work::all(&waiting, (inputs, &held), how.jobs, bar, |worked| {
             let failed = |e: std::io::Error| unwritable(&journal, &e);
-            let line = serde_json::to_string(&worked.row).map_err(|e| failed(e.into()))?;
             // A line that a kill has cut off ends before this one.
-            kept.write_all(format!("\n{line}\n").as_bytes())
-                .map_err(failed)?;
+            let mut line = vec![b'\n'];
+            serde_json::to_writer(&mut line, &worked.row).map_err(|e| failed(e.into()))?;
+            line.push(b'\n');
+            kept.write_all(&line).map_err(failed)?;
+            let line = String::from_utf8(line).map_err(|e| failed(std::io::Error::other(e)))?;
             seconds.push((worked.row.id.clone(), worked.seconds));
             lines[worked.at] = Some((line, worked.row.status));
             Ok(())
         })?;
-        let (mut text, mut failed) = (String::new(), 0);
-        for (line, status) in lines.into_iter().flatten() {
-            text += &line;
-            text.push('\n');
-            failed += usize::from(status == Status::Failed);
-        }
-        self.beside(&text, how)?;
-        replace(&place, text.as_bytes())?;
+        let kept = || lines.iter().flatten();
+        let failed = kept()
+            .filter(|(_, status)| *status == Status::Failed)
+            .count();
+        let rows: Vec<&str> = kept().map(|(line, _)| line.trim_matches('\n')).collect();
+        self.beside(&rows, how)?;
+        replace_by(&place, |file| {
+            let mut file = BufWriter::with_capacity(1 << 16, file);
+            for row in &rows {
+                file.write_all(row.as_bytes())?;
+                file.write_all(b"\n")?;
+            }
+            file.flush()
+        })?;
         let (size, changed) = state(&place).map_err(|e| unwritable(&place, &e))?;
         let part = PartDone {
             part: self.file_name(),
@@ -222,15 +230,18 @@ impl Part {
     }
 
     /// The rows as Parquet, where that is asked for; else what is there of other rows goes.
-    fn beside(&self, text: &str, how: &How) -> Result<(), Message> {
+    fn beside(&self, rows: &[&str], how: &How) -> Result<(), Message> {
         let place = self.parquet(&how.out);
         #[cfg(feature = "parquet")]
         if how.parquet {
-            let bytes = super::parquet::of(text.lines())
+            let bytes = super::parquet::of(rows.iter().copied())
                 .map_err(|e| unwritable(&place, &std::io::Error::other(e)))?;
             return replace(&place, &bytes);
         }
-        let same = || std::fs::read_to_string(self.place(&how.out)).is_ok_and(|old| old == text);
+        let same = || {
+            let old = std::fs::read_to_string(self.place(&how.out));
+            old.is_ok_and(|old| old.lines().eq(rows.iter().copied()))
+        };
         if place.exists() && !same() {
             std::fs::remove_file(&place).map_err(|e| unwritable(&place, &e))?;
         }
@@ -264,22 +275,37 @@ fn known(places: &[&Path], retry_failed: bool) -> Result<Known, Message> {
 
 /// The rows of a file that may not be there, with their lines; what is no row, as a kill leaves it, is
 /// passed over.
-pub(super) fn rows_of<T: DeserializeOwned>(place: &Path) -> Result<Vec<(String, T)>, Message> {
+fn rows_of<T: DeserializeOwned>(place: &Path) -> Result<Vec<(String, T)>, Message> {
+    let mut rows = Vec::new();
+    lines_of(place, |line| {
+        if let Ok(row) = serde_json::from_str(line) {
+            rows.push((line.to_owned(), row));
+        }
+    })?;
+    Ok(rows)
+}
+
+/// Goes through the lines of a file that may not be there, so far as they are text.
+///
+/// # Errors
+/// It cannot be read.
+pub(super) fn lines_of(place: &Path, mut take: impl FnMut(&str)) -> Result<(), Message> {
     let file = match File::open(place) {
         Ok(file) => file,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
         Err(e) => return Err(unreadable(place, &e)),
     };
-    let mut rows = Vec::new();
-    for line in BufReader::new(file).split(b'\n') {
-        let line = line.map_err(|e| unreadable(place, &e))?;
-        if let Ok(text) = String::from_utf8(line)
-            && let Ok(row) = serde_json::from_str(&text)
-        {
-            rows.push((text, row));
+    let (mut file, mut line) = (BufReader::with_capacity(1 << 16, file), Vec::new());
+    loop {
+        line.clear();
+        let read = file.read_until(b'\n', &mut line);
+        if read.map_err(|e| unreadable(place, &e))? == 0 {
+            return Ok(());
+        }
+        if let Ok(text) = std::str::from_utf8(&line) {
+            take(text.trim_end_matches('\n'));
         }
     }
-    Ok(rows)
 }
 
 fn unreadable(place: &Path, error: &std::io::Error) -> Message {
@@ -293,9 +319,18 @@ fn unreadable(place: &Path, error: &std::io::Error) -> Message {
 /// # Errors
 /// It cannot be written.
 pub(super) fn replace(place: &Path, content: &[u8]) -> Result<(), Message> {
+    replace_by(place, |mut file| file.write_all(content))
+}
+
+/// The same with what `write` writes.
+fn replace_by(
+    place: &Path,
+    write: impl FnOnce(File) -> std::io::Result<()>,
+) -> Result<(), Message> {
     let name = place.file_name().unwrap_or_default().to_string_lossy();
     let beside = place.with_file_name(format!(".{name}.new"));
-    std::fs::write(&beside, content)
+    File::create(&beside)
+        .and_then(write)
         .and_then(|()| std::fs::rename(&beside, place))
         .map_err(|e| unwritable(place, &e))
 }

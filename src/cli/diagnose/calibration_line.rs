@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     }
     .answer_with(args, |plan| {
         Some(
-            read(&plan.data, &ColumnMap::default())
+            read(&plan.data, &plan.columns.map())
                 .and_then(|readings| fitted(&readings, noise, plan)),
         )
     })

@@ -133,6 +133,7 @@ impl Given<'_> {
         let given = self;
         Args {
             data: given.data.to_owned(),
+            more: Vec::new(),
             setup: given.setup.map(Path::to_owned),
             model: Some(given.model.to_owned()),
             points: None,

@@ -8,27 +8,19 @@ use super::Args;
 use super::case::Case;
 use crate::cli::Answer;
 use crate::io::Message;
-use crate::io::machine::{Align, read_filed, read_points};
+use crate::io::machine::{Align, read_filed};
 use crate::io::parts::read_parts;
 use crate::io::units::urad_from_rad;
 use crate::report::number::measured;
 
 pub(super) fn run(args: &Args) -> Result<Answer, Message> {
-    let needed = |what: &str, option: &str| {
-        Message::bad_input(format!("{what} is needed to diagnose parts"))
-            .remedy(format!("give it with {option}"))
-    };
-    let machine_file = args
-        .setup
-        .as_ref()
-        .ok_or_else(|| needed("the model of the machine", "--setup MODEL.toml"))?;
-    let points_file = args
-        .points
-        .as_ref()
-        .ok_or_else(|| needed("the table of the points", "--points POINTS.csv"))?;
+    let machine_file = args.setup.as_ref().ok_or_else(|| {
+        Message::bad_input("the model of the machine is needed to diagnose parts")
+            .remedy("give it with --setup MODEL.toml")
+    })?;
     let filed = read_filed(machine_file, None)?;
-    let points = read_points(points_file)?;
-    let readings = read_parts(&args.data, &args.columns.map(), &points)?;
+    let files = [std::slice::from_ref(&args.data), &args.more].concat();
+    let readings = read_parts(&files, &args.columns.map(), args.points.as_deref())?;
     let count = readings.len();
     let model = MeasuredParts::new(&filed.machine, readings)
         .map_err(|e| filed.wrong(&e, "keep the points within the tables of the machine"))?;
@@ -51,7 +43,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         ),
         along: "coordinate",
         notes,
-        inputs: vec![points_file.clone()],
+        inputs: args.more.iter().chain(&args.points).cloned().collect(),
         model,
     }
     .answer(args)

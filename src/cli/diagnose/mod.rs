@@ -37,6 +37,7 @@ use crate::io::source::want_digests;
 Example: errsep diagnose readings.csv --out diagnosis
          errsep diagnose readings.csv --without taper --prove 200
          errsep diagnose parts.csv --setup machine.toml --points points.csv --with temperature
+         errsep diagnose plate-1.txt plate-2.txt --setup cmm.toml
 
 A file for --effects has one table an effect:
 
@@ -70,6 +71,9 @@ pub struct Args {
     /// The readings.
     #[arg(value_name = "DATA.csv")]
     data: PathBuf,
+    /// Further parts, a file each.
+    #[arg(value_name = "PART.csv", conflicts_with_all = ["learn", "seal"])]
+    more: Vec<PathBuf>,
     /// The set-up of the model's own command; for parts the model of the machine.
     #[arg(long, value_name = "SETUP.toml")]
     setup: Option<PathBuf>,
@@ -102,7 +106,12 @@ pub struct Args {
     #[arg(long, value_name = "FILE.toml", conflicts_with = "with")]
     law: Option<Option<PathBuf>>,
     /// Write what a further measurement is expected to show, before it is made, for `errsep check`.
-    #[arg(long, value_name = "FILE.toml", requires = "next", conflicts_with_all = ["with", "columns"])]
+    #[arg(
+        long,
+        value_name = "FILE.toml",
+        requires = "next",
+        conflicts_with = "with"
+    )]
     seal: Option<PathBuf>,
     /// The further measurement that --seal is for: the columns of the readings without the readings.
     #[arg(long, value_name = "PLAN.csv", requires = "seal")]
@@ -178,6 +187,14 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         want_digests();
     }
     let model = recognise::model(args)?;
+    if !args.more.is_empty() && model.name != "machine" {
+        return Err(Message::bad_input(format!(
+            "several files of readings belong to parts, not to {}",
+            model.name
+        ))
+        .in_file(&args.more[0])
+        .remedy("diagnose one file at a time"));
+    }
     if args.points.is_some() && model.name != "machine" {
         return Err(Message::bad_input(format!(
             "--points belongs to parts, not to {}",
@@ -209,6 +226,7 @@ pub(super) fn scored(
     })?;
     let given = joined::Given {
         setup: setup.as_deref(),
+        columns: seal.columns()?,
         ..joined::Given::to(model, data, &[], common)
     };
     let args = Args {

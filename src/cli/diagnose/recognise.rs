@@ -7,6 +7,7 @@ use super::{
     turning_bar,
 };
 use crate::cli::Answer;
+use crate::io::plates::is_plate;
 use crate::io::turning::is_run;
 use crate::io::{Message, SetupFile, TableReader};
 
@@ -69,7 +70,7 @@ pub(super) const MODELS: &[Model] = &[
         run: fourier::run,
     },
     Model {
-        name: "machine",
+        name: MACHINE,
         tables: &["chain", "errors", "part"],
         columns: &[&["part", "point", "axis", "value"]],
         reading: None,
@@ -93,10 +94,16 @@ pub(super) const MODELS: &[Model] = &[
 ];
 
 const TURNING_BAR: &str = "turning-bar";
+const MACHINE: &str = "machine";
 
 /// The model of a bar that turns.
 fn of_a_run() -> Option<&'static Model> {
     MODELS.iter().find(|m| m.name == TURNING_BAR)
+}
+
+/// The model of parts, whose tables may be those that measuring machines print.
+fn of_a_plate() -> Option<&'static Model> {
+    MODELS.iter().find(|m| m.name == MACHINE)
 }
 
 /// The names that `--model` takes.
@@ -113,8 +120,6 @@ pub(super) fn model(args: &Args) -> Result<&'static Model, Message> {
         let asked = MODELS.iter().find(|m| m.name == name);
         return asked.ok_or_else(|| Message::bad_input(format!("there is no model `{name}`")));
     }
-    let table = TableReader::open_as(&args.data, &args.columns.map())?;
-    let found: Vec<&str> = table.bare_names().collect();
     let tables = args
         .setup
         .as_deref()
@@ -128,6 +133,12 @@ pub(super) fn model(args: &Args) -> Result<&'static Model, Message> {
     if let [only] = by_setup[..] {
         return Ok(only);
     }
+    if let Some(model) = of_a_plate().filter(|_| !args.columns.are_given() && is_plate(&args.data))
+    {
+        return Ok(model);
+    }
+    let table = TableReader::open_as(&args.data, &args.columns.map())?;
+    let found: Vec<&str> = table.bare_names().collect();
     if let Some(model) = of_a_run().filter(|_| is_run(&found)) {
         return Ok(model);
     }

@@ -16,13 +16,13 @@ use super::joined::Given;
 use super::learnt::today;
 use super::recognise;
 use super::words::{number, shown};
-use crate::cli::progress;
+use crate::cli::{ColumnArgs, progress};
 use crate::diagnosis::{
     Diagnosis, Interval, Kind, NotSealed, Options, Sealed, SealedNumber, for_people, sealed,
 };
 use crate::io::provenance::Digested;
 use crate::io::source::{InMemory, Read256, Source, digest_of, hexadecimal, hold};
-use crate::io::{Message, OutFile, SetupFile, TableReader};
+use crate::io::{ColumnMap, Message, OutFile, SetupFile, TableReader};
 
 /// `schema` of the file.
 const SCHEMA: &str = "errsep.seal/1";
@@ -46,6 +46,9 @@ pub struct SealFile {
     /// The text of the user's own effects, where there were any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub effects: Option<String>,
+    /// Names and units of the columns, where they were given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    columns: Option<String>,
     /// The readings that it rests on.
     pub data: Digested,
     /// The plan.
@@ -67,6 +70,21 @@ impl SealFile {
         );
         let digest = digest(body.as_bytes());
         Ok((format!("{}{body}", first_line(&digest)), digest))
+    }
+
+    /// How the columns of the readings are called.
+    ///
+    /// # Errors
+    /// The seal was made by a version that knew more of columns.
+    pub fn columns(&self) -> Result<ColumnArgs, Message> {
+        let Some(text) = &self.columns else {
+            return Ok(ColumnArgs::default());
+        };
+        let map = text.parse().map_err(|why: String| {
+            Message::bad_input(format!("the columns of the seal are not understood: {why}"))
+                .remedy("score it with the version of errsep that sealed it")
+        })?;
+        Ok(ColumnArgs::of(map))
     }
 
     /// Reads a file whose digest holds.
@@ -158,7 +176,7 @@ impl<M: FittedModel> Seal<M> {
                 .remedy("seal a reversal or a calibration line; others are compared by --learn and --effects")
         };
         let column = model.reading.ok_or_else(refused)?;
-        let held = with_readings(next, &column_of(args, column)?)?;
+        let held = with_readings(next, &column_of(args, column)?, &args.columns.map())?;
         let Read256::Digest(sha256) = digest_of(next) else {
             return Err(Message::bad_input("the plan changed while it was read")
                 .in_file(next)
@@ -166,6 +184,7 @@ impl<M: FittedModel> Seal<M> {
         };
         let given = Given {
             setup: args.setup.as_deref(),
+            columns: args.columns.clone(),
             ..Given::to(model.name, &held, &[], &args.common)
         };
         let plan = plan(&given.args()).ok_or_else(refused)??;
@@ -217,6 +236,10 @@ impl<M: FittedModel> Seal<M> {
             statement: diagnosis.verdict.statement.clone(),
             setup: text(&args.setup)?,
             effects: text(&args.effects)?,
+            columns: args
+                .columns
+                .are_given()
+                .then(|| args.columns.map().to_string()),
             data: Digested {
                 file: args.data.display().to_string(),
                 sha256,
@@ -233,8 +256,12 @@ impl<M: FittedModel> Seal<M> {
     }
 }
 
-/// The name that a set-up gives the column of the readings, or its usual one.
+/// The name that options or a set-up give the column of the readings, or its usual one.
 fn column_of(args: &Args, usual: &str) -> Result<String, Message> {
+    if args.columns.are_given() {
+        let map = args.columns.map();
+        return Ok(map.column_of(usual).unwrap_or(usual).to_owned());
+    }
     let Some(setup) = &args.setup else {
         return Ok(usual.to_owned());
     };
@@ -248,9 +275,11 @@ fn column_of(args: &Args, usual: &str) -> Result<String, Message> {
 }
 
 /// Holds the plan with readings of zero in memory; the name under which it is held.
-fn with_readings(place: &Path, column: &str) -> Result<PathBuf, Message> {
+fn with_readings(place: &Path, column: &str, map: &ColumnMap) -> Result<PathBuf, Message> {
     let table = TableReader::open(place)?;
-    if let Some(index) = table.bare_names().position(|name| name == column) {
+    let there =
+        |(bare, written): (&str, &str)| written == column || (map.is_empty() && bare == column);
+    if let Some(index) = table.bare_names().zip(table.names()).position(there) {
         return Err(table
             .in_header(index, format!("the plan has readings (`{column}`) already"))
             .remedy("leave that column out: a seal is written before the measurement"));

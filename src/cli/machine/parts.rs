@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 
 use super::{Context, PropagationArgs};
 use crate::cli::{Answer, ColumnArgs, CommonArgs};
-use crate::io::machine::read_points;
 use crate::io::parts::read_parts;
 use crate::io::{CsvTable, Message, Status};
 use crate::report::plot::{Axis as PlotAxis, Chart, Series};
@@ -18,16 +17,24 @@ use crate::report::{Cell, Figure, Page, Section, Standing, Table, number};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 The readings have the columns part, point, axis (x, y or z), value (measured less nominal, um) and
-where it applies replicate. The machine is not fitted to them.
+where it applies replicate, with the places of the points in --points. Or they are tables as a measuring
+machine prints them, a file a part, nominal coordinates beside measured ones or deviations (mm unless a
+unit stands beside), whatever text is before:
 
-Example: errsep machine machine.toml parts readings.csv --points holes.csv --out parts")]
+    point  nominal x  nominal y  measured x  measured y
+
+The machine is not fitted to them.
+
+Examples:
+    errsep machine machine.toml parts readings.csv --points holes.csv --out parts
+    errsep machine machine.toml parts plate-1.txt plate-2.txt")]
 pub(super) struct Args {
-    /// The measured parts.
-    #[arg(value_name = "READINGS.csv")]
-    readings: PathBuf,
-    /// The points (columns point, x, y and z, mm).
+    /// The measured parts; several files hold parts of their own.
+    #[arg(value_name = "READINGS.csv", required = true)]
+    readings: Vec<PathBuf>,
+    /// The points (columns point, x, y and z, mm), where the readings have no nominal coordinates.
     #[arg(long, value_name = "POINTS.csv")]
-    points: PathBuf,
+    points: Option<PathBuf>,
     #[command(flatten)]
     columns: ColumnArgs,
     #[command(flatten)]
@@ -66,8 +73,8 @@ impl Feature<'_> {
 }
 
 pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
-    let points = read_points(&args.points)?;
-    let readings: Vec<PartReading> = read_parts(&args.readings, &args.columns.map(), &points)?;
+    let readings: Vec<PartReading> =
+        read_parts(&args.readings, &args.columns.map(), args.points.as_deref())?;
     let residuals =
         part_residuals(context.machine, &readings).map_err(|error| context.wrong(&error))?;
     let mut features: Vec<Feature> = Vec::new();
@@ -101,9 +108,14 @@ pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
         Standing::Caution
     };
     let machine = context.args.model.display().to_string();
+    let files: Vec<String> = args
+        .readings
+        .iter()
+        .map(|f| f.display().to_string())
+        .collect();
     let mut text = format!(
         "Parts of {} against {machine}\n\n{sentence}\n\n",
-        args.readings.display()
+        files.join(", ")
     );
     let _ = writeln!(
         text,
@@ -134,11 +146,7 @@ pub(super) fn run(context: &Context, args: &Args) -> Result<Answer, Message> {
         }),
         page: page(&machine, &sentence, standing, &features),
         tables: vec![csv(&residuals)],
-        inputs: [
-            context.inputs(Some(&args.points)),
-            vec![args.readings.clone()],
-        ]
-        .concat(),
+        inputs: [context.inputs(args.points.as_ref()), args.readings.clone()].concat(),
         setup: None,
         seed: None,
         status: Status::Done,

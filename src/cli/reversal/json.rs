@@ -25,6 +25,9 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
         "tilt_combinations": combinations(o)?,
         "contrasts": contrasts(o)?,
         "effects": effects::json(&o.effects),
+        "covariance": o.covariances.as_ref().map(|c| {
+            json!({"names": c.names, "units": c.units, "matrix": c.matrix})
+        }),
         "closure": match &o.closure {
             Some(c) => json!({
                 "slope": match c.slope {

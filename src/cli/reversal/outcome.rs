@@ -1,7 +1,7 @@
 //! The answer of either solution, in one form for terminal, JSON, tables and report.
 
 use errsep_models::noise::Law;
-use errsep_models::reversal::simultaneous::FittedEffect;
+use errsep_models::reversal::simultaneous::{Covariances, FittedEffect};
 use errsep_models::reversal::staged::Value;
 use errsep_models::reversal::{Channel, Contrast, Convention};
 use errsep_models::straightness::{ReferenceLine, straightness};
@@ -95,6 +95,8 @@ pub struct Outcome {
     pub effects: Vec<FittedEffect>,
     /// What they change in each reading, µm, in the order of the data.
     pub effect_changes: Vec<f64>,
+    /// Of tilts and effects, where they come from one fit.
+    pub covariances: Option<Covariances>,
 }
 
 impl Outcome {

@@ -185,12 +185,11 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         method: "simultaneous",
         convention: fit.convention,
         contrasts,
-        x,
         forms,
         residual_rms: (squares / residuals.len().max(1) as f64).sqrt(),
         residuals,
         noise: (variance / readings).sqrt(),
-        noise_words: noise_words(fit, data),
+        noise_words: noise_words(fit, data, &x),
         channel_noise: fit.noise.iter().map(|n| (n.channel, n.sigma)).collect(),
         degrees_of_freedom: fit.degrees_of_freedom,
         noise_law: match fit.noise_origin {
@@ -215,6 +214,8 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         warnings: warnings(fit, closure.as_ref(), setup),
         effects: fit.effects.clone(),
         effect_changes: fit.effect_changes.clone(),
+        covariances: Some(fit.covariances()),
+        x,
         closure,
         tilts,
     }
@@ -241,13 +242,12 @@ fn freedom(all: impl Iterator<Item = f64>) -> DegreesOfFreedom {
 }
 
 /// Where the noise comes from, and what is assumed of it.
-fn noise_words(fit: &Simultaneous, data: &Observations) -> String {
+fn noise_words(fit: &Simultaneous, data: &Observations, x: &[f64]) -> String {
     let alike = fit.noise.windows(2).all(|n| n[0].sigma == n[1].sigma);
     noise::words(fit.noise_origin, alike, fit.degrees_of_freedom, || {
-        let x = positions(data);
         let (share, part) = noise::SUPPOSED;
         let length = part * (x.last().unwrap_or(&0.0) - x.first().unwrap_or(&0.0));
-        let factors = fit.if_correlated(data, share, length).ok()?;
+        let factors = fit.if_correlated(data, 1, (share, length)).ok()?;
         let first = fit.tilts().into_iter().next();
         Some((
             length,

@@ -58,6 +58,7 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         .collect();
     Outcome {
         method: s.removal.name(),
+        covariances: None,
         convention: s.convention,
         tilts,
         contrasts: s.contrasts,

@@ -1,5 +1,6 @@
 //! `errsep simulate calibration-line`.
 
+use errsep_models::calibration_line::amplitude;
 use errsep_models::calibration_line::simulate::{CalibrationSimulation, Disturbance, simulate};
 use serde_json::json;
 
@@ -71,9 +72,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
                 .remedy("give --full-scale a number greater than zero"),
         );
     }
-    let disturbances = super::effects(&args.effects, &Disturbance::NAMES, |name, size| {
-        Disturbance::named(name, size, args.repeats)
-    })?;
+    let disturbances = super::effects(
+        &args.effects,
+        &Disturbance::NAMES,
+        amplitude,
+        |name, size| Disturbance::named(name, size, args.repeats),
+    )?;
     let what = CalibrationSimulation {
         line: [args.intercept, args.slope],
         full_scale: args.full_scale,

@@ -1,6 +1,6 @@
 //! `errsep simulate circle`.
 
-use errsep_models::circle::{CircleSimulation, Disturbance, Point, simulate_disturbed};
+use errsep_models::circle::{CircleSimulation, Disturbance, Point, amplitude, simulate_disturbed};
 use serde_json::json;
 
 use crate::cli::{Answer, CommonArgs};
@@ -77,9 +77,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         pass: (0, args.repeats.max(1)),
     };
     let seed = args.common.seed;
-    let disturbances = super::effects(&args.effects, &Disturbance::NAMES, |name, size| {
-        Disturbance::named(name, size, args.positions)
-    })?;
+    let disturbances = super::effects(
+        &args.effects,
+        &Disturbance::NAMES,
+        amplitude,
+        |name, size| Disturbance::named(name, size, args.positions),
+    )?;
     let mut points = Vec::new();
     let mut repeats = Vec::new();
     for repeat in 0..args.repeats {

@@ -1,7 +1,7 @@
 //! `errsep simulate four-sensor`: outputs of four sensors over a known surface, slide and zero.
 
 use errsep_models::four_sensor::simulate::{Disturbances, Example, Truth, simulate};
-use errsep_models::four_sensor::{FourSensorError, Geometry, Outputs};
+use errsep_models::four_sensor::{FourSensorError, Geometry, Outputs, amplitude};
 use serde_json::json;
 
 use super::super::{Answer, CommonArgs};
@@ -104,9 +104,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     }
     disturbances.slide_position = args.slide_position;
     disturbances.drift = args.drift;
-    super::effects(&args.effects, &Disturbances::NAMES, |name, size| {
-        disturbances.add(name, size).then_some(())
-    })?;
+    super::effects(
+        &args.effects,
+        &Disturbances::NAMES,
+        amplitude,
+        |name, size| disturbances.add(name, size).then_some(()),
+    )?;
     let passes: Vec<Outputs> = (0..args.repeats.max(1))
         .map(|repeat| {
             let seed = super::seed_of(args.common.seed, repeat);

@@ -1,7 +1,7 @@
 //! `errsep simulate fourier`.
 
 use errsep_models::fourier::{
-    Disturbance, FourierSimulation, Scan, ScanReading, simulate_disturbed,
+    Disturbance, FourierSimulation, Scan, ScanReading, amplitude, simulate_disturbed,
 };
 use serde_json::json;
 
@@ -85,9 +85,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         ..defaults
     };
     let seed = args.common.seed;
-    let disturbances = super::effects(&args.effects, &Disturbance::NAMES, |name, size| {
-        Disturbance::named(name, size, what.spacings.len())
-    })?;
+    let disturbances = super::effects(
+        &args.effects,
+        &Disturbance::NAMES,
+        amplitude,
+        |name, size| Disturbance::named(name, size, what.spacings.len()),
+    )?;
     let (scans, truth) = simulate_disturbed(&what, &disturbances, seed).map_err(|e| {
         Message::bad_input(e.to_string())
             .remedy("change --spacing, --length, --positions or --noise")

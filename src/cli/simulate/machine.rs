@@ -120,7 +120,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
             "value",
             readings.iter().map(|(_, o)| o.value).collect::<Vec<_>>(),
         );
-    let disturbances = super::effects_within(
+    let disturbances = super::effects(
         &args.effects,
         &PartDisturbance::NAMES,
         amplitude,

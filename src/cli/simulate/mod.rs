@@ -166,17 +166,9 @@ pub(super) fn few_enough(counts: &[usize], options: &str) -> Result<(), Message>
         .remedy(format!("give ten million at most: lower {options}")))
 }
 
-/// The effects that are switched on, by what `make` knows of a name and a size.
+/// The effects that are switched on, by what `make` knows of a name and a size, each of a size that its
+/// parameter in the catalogue, `parameter` by its name, can have.
 pub(super) fn effects<E>(
-    texts: &[String],
-    known: &[&str],
-    make: impl FnMut(&str, f64) -> Option<E>,
-) -> Result<Vec<E>, Message> {
-    effects_within(texts, known, |_| None, make)
-}
-
-/// The same, each of a size that its parameter in the catalogue, `parameter` by its name, can have.
-pub(super) fn effects_within<E>(
     texts: &[String],
     known: &[&str],
     parameter: impl Fn(&str) -> Option<Parameter>,

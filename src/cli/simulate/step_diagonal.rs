@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use errsep_models::diagonal::{
     Component, Diagonal, DiagonalSimulation, Disturbance, Location, Sequence, Target, WorkZone,
-    simulate_disturbed,
+    amplitude, simulate_disturbed,
 };
 use serde_json::{Value, json};
 
@@ -158,9 +158,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         reversal_rotation: back(args.reversal_rotation),
     };
     let seed = args.common.seed;
-    let disturbances = super::effects(&args.effects, &Disturbance::NAMES, |name, size| {
-        Disturbance::named(name, size, &what)
-    })?;
+    let disturbances = super::effects(
+        &args.effects,
+        &Disturbance::NAMES,
+        amplitude,
+        |name, size| Disturbance::named(name, size, &what),
+    )?;
     let (readings, errors, mirrors) = simulate_disturbed(&what, &disturbances, seed);
     let position = |a: usize| -> Vec<f64> {
         readings

@@ -17,6 +17,12 @@ impl Unit {
         "nm", "um", "mm", "m", "inch", "uinch", "ms", "s", "min", "h",
     ];
 
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        let same = |name: &&&str| Self::from_name(name) == Some(self);
+        Self::NAMES.iter().find(same).copied().unwrap_or("s")
+    }
+
     /// The unit of a name.
     pub fn from_name(name: &str) -> Option<Self> {
         let time = match name {

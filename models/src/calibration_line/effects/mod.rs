@@ -13,7 +13,7 @@ mod square_root;
 mod zero_jump;
 
 use super::CalibrationLine;
-use crate::model::Effect;
+use crate::model::{Effect, Parameter};
 
 /// The catalogue.
 pub(super) fn all() -> Vec<Box<dyn Effect<CalibrationLine>>> {
@@ -30,4 +30,10 @@ pub(super) fn all() -> Vec<Box<dyn Effect<CalibrationLine>>> {
         Box::new(square_root::SquareRoot),
         Box::new(zero_jump::ZeroJump),
     ]
+}
+
+/// What the size of an effect on calibration readings is: its first amplitude. `None` where the catalogue has no such
+/// effect.
+pub fn amplitude(effect: &str) -> Option<Parameter> {
+    crate::model::amplitude(&all(), effect)
 }

@@ -16,7 +16,7 @@ mod zero_jump;
 use nalgebra::DMatrix;
 
 use super::diagnosable::CirclePoints;
-use crate::model::{Column, Effect, Estimate, FittedModel};
+use crate::model::{Column, Effect, Estimate, FittedModel, Parameter};
 
 /// The catalogue.
 pub(super) fn all() -> Vec<Box<dyn Effect<CirclePoints>>> {
@@ -34,6 +34,12 @@ pub(super) fn all() -> Vec<Box<dyn Effect<CirclePoints>>> {
         Box::new(squareness::Squareness),
         Box::new(zero_jump::ZeroJump),
     ]
+}
+
+/// What the size of an effect on points of a circle is: its first amplitude. `None` where the catalogue has no such
+/// effect.
+pub fn amplitude(effect: &str) -> Option<Parameter> {
+    crate::model::amplitude(&all(), effect)
 }
 
 /// Cosine and sine of a number of undulations per revolution.

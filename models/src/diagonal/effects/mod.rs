@@ -10,7 +10,7 @@ mod mirror_misalignment;
 mod thermal_expansion;
 
 use super::diagnosable::DiagonalRuns;
-use crate::model::Effect;
+use crate::model::{Effect, Parameter};
 
 /// The catalogue.
 pub(super) fn all() -> Vec<Box<dyn Effect<DiagonalRuns>>> {
@@ -24,4 +24,10 @@ pub(super) fn all() -> Vec<Box<dyn Effect<DiagonalRuns>>> {
         Box::new(mirror_misalignment::MirrorMisalignment),
         Box::new(thermal_expansion::ThermalExpansion),
     ]
+}
+
+/// What the size of an effect on readings along diagonals is: its first amplitude. `None` where the catalogue has no such
+/// effect.
+pub fn amplitude(effect: &str) -> Option<Parameter> {
+    crate::model::amplitude(&all(), effect)
 }

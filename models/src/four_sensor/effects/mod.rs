@@ -12,7 +12,7 @@ mod slide_position;
 mod zero_jump;
 
 use super::diagnosable::FourSensors;
-use crate::model::Effect;
+use crate::model::{Effect, Parameter};
 
 /// The catalogue.
 pub(super) fn all() -> Vec<Box<dyn Effect<FourSensors>>> {
@@ -28,4 +28,10 @@ pub(super) fn all() -> Vec<Box<dyn Effect<FourSensors>>> {
         Box::new(slide_position::SlidePosition),
         Box::new(zero_jump::ZeroJump),
     ]
+}
+
+/// What the size of an effect on readings of four sensors is: its first amplitude. `None` where the catalogue has no such
+/// effect.
+pub fn amplitude(effect: &str) -> Option<Parameter> {
+    crate::model::amplitude(&all(), effect)
 }

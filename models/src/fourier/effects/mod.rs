@@ -9,7 +9,7 @@ mod yaw;
 mod zero_jump;
 
 use super::diagnosable::FourierScans;
-use crate::model::Effect;
+use crate::model::{Effect, Parameter};
 
 /// The catalogue.
 pub(super) fn all() -> Vec<Box<dyn Effect<FourierScans>>> {
@@ -22,4 +22,10 @@ pub(super) fn all() -> Vec<Box<dyn Effect<FourierScans>>> {
         Box::new(yaw::Yaw),
         Box::new(zero_jump::ZeroJump),
     ]
+}
+
+/// What the size of an effect on scans is: its first amplitude. `None` where the catalogue has no such
+/// effect.
+pub fn amplitude(effect: &str) -> Option<Parameter> {
+    crate::model::amplitude(&all(), effect)
 }

@@ -50,9 +50,7 @@ pub(super) fn of_aligned_parts() -> Vec<Box<dyn Effect<MeasuredParts>>> {
 
 /// What the size of an effect on parts is: its first amplitude. `None` where the catalogue has no such effect.
 pub fn amplitude(effect: &str) -> Option<Parameter> {
-    let catalogue = all();
-    let own = catalogue.iter().find(|known| known.name() == effect)?;
-    own.amplitudes().into_iter().next()
+    crate::model::amplitude(&all(), effect)
 }
 
 /// Root mean square of every `step`-th amplitude from `first` on, with its standard uncertainty.

@@ -30,6 +30,14 @@ impl Scatter {
         }
     }
 
+    /// Variance of white noise in weighted units, and its degrees of freedom.
+    pub fn white(&self) -> Option<(f64, f64)> {
+        match self {
+            Self::White { variance, freedom } => Some((*variance, *freedom)),
+            Self::Along(_) => None,
+        }
+    }
+
     /// Standard uncertainty of a combination of unknowns, and its degrees of freedom.
     pub fn spread(
         &self,

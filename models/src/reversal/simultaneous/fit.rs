@@ -89,7 +89,9 @@ fn solve(
     let (mut problem, start) = ground.problem(&breaks, effects)?;
     let start = match problem.unknowns.thickness_index() {
         Some(index) => start_of_thickness(&mut problem, index, start, &options.minimisation)?,
-        None => head_start(&problem, &start, &options.minimisation).unwrap_or(start),
+        None => head_start(&problem, &start, &options.minimisation)
+            .or_else(|| ground.linear_start(&problem, &start))
+            .unwrap_or(start),
     };
     let start = approach(&problem, start, &options.minimisation)?;
     let asked = Asked {

@@ -1,6 +1,6 @@
 //! What every stage of a fit stands on: readings, lines, axis, and how problems over them are made.
 
-use errsep_solvers::structured::Parameters;
+use errsep_solvers::structured::{Parameters, StructuredProblem};
 
 use super::effects::JoinedEffect;
 use super::error::{FEWEST_FREE, ReversalError};
@@ -10,10 +10,14 @@ use super::knots::{self, Choice, FEWEST_POSITIONS, KnotTrial};
 use super::options::{Knots, Noise, Options, Thickness};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
+use super::rungs::Rungs;
 use super::seed;
 use super::unknowns::Unknowns;
 use crate::basis::bspline::CubicBSpline;
 use crate::reversal::Observations;
+
+/// Up to this tilt (rad) a probe wanders by so little that the first step is nearly the last.
+const SMALL_TILT: f64 = 0.1;
 
 /// Readings and what is known of them before the fit.
 pub struct Ground<'a> {
@@ -197,6 +201,37 @@ impl<'a> Ground<'a> {
             self.weights.clone(),
         );
         Ok((problem.joining(effects.map(|e| &e.joined)), start))
+    }
+}
+
+impl Ground<'_> {
+    /// Where the linear model at the start of a problem has its least squares, by normal equations: what a
+    /// first pass over the readings would lead to, for a fraction of it. `None` with effects, at tilts that
+    /// let the probes wander, or where the normal equations do not tell.
+    pub fn linear_start(&self, problem: &Reversal, start: &Parameters) -> Option<Parameters> {
+        let unknowns = &problem.unknowns;
+        if problem.joined.is_some() || unknowns.thickness {
+            return None;
+        }
+        let begin: Vec<(f64, f64)> = (0..self.channels.len())
+            .map(|c| {
+                let offset = start.border[unknowns.offset(c)];
+                (unknowns.slope(c, &start.border), offset)
+            })
+            .collect();
+        if begin.iter().any(|(tilt, _)| tilt.abs() > SMALL_TILT) {
+            return None;
+        }
+        let place = (self.axis, self.thickness_mm);
+        let rungs = Rungs::new(self.channels, begin.into_iter(), &problem.weights, place)?;
+        let (band, border) = rungs.step(unknowns, &problem.bases)?;
+        let there = start.stepped(&band, &border);
+        let finite = there
+            .band
+            .iter()
+            .chain(&there.border)
+            .all(|v| v.is_finite());
+        (finite && problem.prepare(&there).is_ok()).then_some(there)
     }
 }
 

@@ -8,6 +8,7 @@
 mod closure;
 mod columns;
 mod counting;
+mod covariances;
 mod dense;
 mod descent;
 pub mod effects;
@@ -39,6 +40,7 @@ mod told;
 mod unknowns;
 mod weighed;
 
+pub use covariances::Covariances;
 #[doc(hidden)]
 pub use dense::DenseReversal;
 pub use error::ReversalError;

@@ -1,5 +1,6 @@
 //! The forms of a solution, with their bands.
 
+use errsep_solvers::linear::bordered::BorderedCovariance;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -14,6 +15,18 @@ const FORMS: [&str; 3] = ["M", "S_A", "S_B"];
 /// Weights of unknowns of band and border.
 type Terms = (Vec<(usize, f64)>, Vec<(usize, f64)>);
 
+/// What neighbouring positions of a form share.
+#[derive(Default)]
+struct Room {
+    terms: Terms,
+    /// Their weights alone.
+    weights: Vec<f64>,
+    /// The unknowns of the last position, band and border.
+    unknowns: (Vec<usize>, Vec<usize>),
+    /// Their covariance matrix for unit noise, where it is known.
+    among: Option<DMatrix<f64>>,
+}
+
 impl Simultaneous {
     /// The forms, or the combinations of forms which the channels determine, at positions (mm):
     /// M on the slide, S_A and S_B on the artefact's own axis.
@@ -23,9 +36,7 @@ impl Simultaneous {
             .map(|(name, weights)| {
                 let spread: Vec<(f64, f64)> = x
                     .par_iter()
-                    .map_init(Default::default, |room, x| {
-                        self.form_std(&weights, *x, room)
-                    })
+                    .map_init(Room::default, |room, x| self.form_std(&weights, *x, room))
                     .collect();
                 Profile {
                     name,
@@ -89,8 +100,10 @@ impl Simultaneous {
     }
 
     /// Standard uncertainty of a form and its degrees of freedom. What the model misses may lie in the
-    /// form itself, finer than the knots. `room` is for the weights of the unknowns.
-    fn form_std(&self, weights: &[f64], x: f64, (band, border): &mut Terms) -> (f64, f64) {
+    /// form itself, finer than the knots. Under white noise positions of one cell share the covariance of
+    /// its coefficients.
+    fn form_std(&self, weights: &[f64], x: f64, room: &mut Room) -> (f64, f64) {
+        let (band, border) = &mut room.terms;
         band.clear();
         border.clear();
         for (form, weight) in weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
@@ -99,7 +112,14 @@ impl Simultaneous {
             border.push((height, -weight));
             border.push((slope, -weight * self.axis.xi(x)));
         }
-        let (std, freedom) = self.scatter.spread(&self.covariance, band, border);
+        let white = self.scatter.white();
+        let (std, freedom) = match white.zip(room.variance(&self.covariance)) {
+            Some(((variance, freedom), own)) => ((variance * own).sqrt(), freedom),
+            None => {
+                let (band, border) = &room.terms;
+                self.scatter.spread(&self.covariance, band, border)
+            }
+        };
         (std.hypot(self.agreement.missed), freedom)
     }
 
@@ -124,5 +144,30 @@ impl Simultaneous {
                 band.push((j, factor * function));
             }
         }
+    }
+}
+
+impl Room {
+    /// The variance of the terms for unit noise, where their covariance matrix is known.
+    fn variance(&mut self, covariance: &BorderedCovariance) -> Option<f64> {
+        let (band, border) = &self.terms;
+        let same = |terms: &[(usize, f64)], unknowns: &[usize]| {
+            terms.iter().map(|t| t.0).eq(unknowns.iter().copied())
+        };
+        if !same(band, &self.unknowns.0) || !same(border, &self.unknowns.1) {
+            self.unknowns.0 = band.iter().map(|t| t.0).collect();
+            self.unknowns.1 = border.iter().map(|t| t.0).collect();
+            self.among = covariance.among(&self.unknowns.0, &self.unknowns.1);
+        }
+        let among = self.among.as_ref()?.as_slice();
+        let count = self.unknowns.0.len() + self.unknowns.1.len();
+        self.weights.clear();
+        self.weights.extend(band.iter().chain(border).map(|t| t.1));
+        let mut sum = 0.0;
+        for (column, own) in among.chunks_exact(count.max(1)).zip(&self.weights) {
+            let along: f64 = column.iter().zip(&self.weights).map(|(c, w)| c * w).sum();
+            sum += own * along;
+        }
+        Some(sum.max(0.0))
     }
 }

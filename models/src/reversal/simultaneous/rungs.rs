@@ -21,7 +21,10 @@
 //! trust the sum. A perturbation δN of them moves it by cᵀδN c, at most a few roundings of the squares
 //! over the least share that a pivot keeps of its diagonal.
 
-use nalgebra::DMatrix;
+mod normal;
+
+use errsep_solvers::by_processor;
+use nalgebra::{DMatrix, DVector};
 
 use super::gauge::{self, Axis};
 use super::readings::ChannelReadings;
@@ -29,9 +32,7 @@ use super::unknowns::{Form, Unknowns};
 use crate::basis::bspline::{Cubic, CubicBSpline};
 use crate::reversal::forward::Attitude;
 use crate::units::UM_PER_MM;
-
-/// A diagonal that is left with less than this share of itself is determined by nothing.
-const DETERMINED: f64 = 1e-10;
+use normal::{DETERMINED, Normal};
 
 /// Rounding of a sum of squares, relative to that of the readings less their lines, where no pivot loses
 /// anything: some hundred roundings.
@@ -64,6 +65,20 @@ pub struct Rungs<'a> {
 pub struct Squares {
     pub left: f64,
     pub rounding: f64,
+}
+
+/// The least over the unknowns of the border.
+struct Least {
+    /// Sum of squares.
+    left: f64,
+    /// The least share that a pivot keeps.
+    kept: f64,
+    /// The steps of the border's unknowns.
+    border: DVector<f64>,
+    /// What they make of the channels' lines.
+    lines: DVector<f64>,
+    /// The multipliers of the gauge, (WᵀN⁻¹W)⁻¹d.
+    multipliers: DVector<f64>,
 }
 
 /// A stretch of a channel between two breaks: its readings in moments of t = (x − start)/width.
@@ -118,6 +133,27 @@ impl<'a> Rungs<'a> {
     /// The least sum of squares with these unknowns on these bases; `None` where the normal equations
     /// determine none, or leave only rounding.
     pub fn squares(&self, unknowns: &Unknowns, bases: &[CubicBSpline]) -> Option<Squares> {
+        let (normal, least) = self.solved(unknowns, bases)?;
+        let left = least.left;
+        let rounding = ROUNDING * self.whole / normal.kept.min(least.kept) + self.of_readings;
+        (left > rounding).then_some(Squares { left, rounding })
+    }
+
+    /// The steps of band and border to the least sum of squares: the first step of Gauss and Newton from
+    /// where the fit begins, but for the rounding of normal equations.
+    pub fn step(
+        &self,
+        unknowns: &Unknowns,
+        bases: &[CubicBSpline],
+    ) -> Option<(Vec<f64>, Vec<f64>)> {
+        let (normal, least) = self.solved(unknowns, bases)?;
+        let mut beside: Vec<f64> = least.lines.iter().map(|y| -y).collect();
+        beside.push(-1.0);
+        beside.extend(least.multipliers.iter());
+        Some((normal.back(&beside), least.border.as_slice().to_vec()))
+    }
+
+    fn solved(&self, unknowns: &Unknowns, bases: &[CubicBSpline]) -> Option<(Normal, Least)> {
         let gathered: Vec<Vec<Stretch>> = (0..self.channels.len())
             .map(|c| self.stretches(c, unknowns, bases))
             .collect();
@@ -130,10 +166,12 @@ impl<'a> Rungs<'a> {
                 row[lines + 1 + l] = *value;
             }
         }
-        let kept = normal.factorise()?;
-        let (left, kept_beside) = self.least(unknowns, &constraints.border, &normal)?;
-        let rounding = ROUNDING * self.whole / kept.min(kept_beside) + self.of_readings;
-        (left > rounding).then_some(Squares { left, rounding })
+        normal.factorise();
+        if !(normal.kept > DETERMINED) {
+            return None;
+        }
+        let least = self.least(unknowns, &constraints.border, &normal)?;
+        Some((normal, least))
     }
 
     /// The readings of a channel, stretch by stretch.
@@ -189,11 +227,10 @@ impl<'a> Rungs<'a> {
                 powers: [0.0; 7],
                 left: [0.0; 4],
             };
-            let per_width = 1.0 / width;
-            while at < readings.len() && readings.x[at] < end {
-                stretch.add((readings.x[at] - start) * per_width, left[at]);
-                at += 1;
-            }
+            let count = readings.x[at..].partition_point(|x| *x < end);
+            let here = at..at + count;
+            gather(&mut stretch, &readings.x[here.clone()], &left[here]);
+            at += count;
             stretches.push(stretch);
         }
         stretches
@@ -244,14 +281,8 @@ impl<'a> Rungs<'a> {
         normal
     }
 
-    /// The least sum of squares over the unknowns of the border, and the least share that a pivot of
-    /// theirs keeps.
-    fn least(
-        &self,
-        unknowns: &Unknowns,
-        gauge: &DMatrix<f64>,
-        normal: &Normal,
-    ) -> Option<(f64, f64)> {
+    /// The least over the unknowns of the border.
+    fn least(&self, unknowns: &Unknowns, gauge: &DMatrix<f64>, normal: &Normal) -> Option<Least> {
         let lines = 2 * self.channels.len();
         let gauges = gauge.nrows();
         // What is left of lines and readings beside the coefficients, and the gauge among these.
@@ -272,6 +303,7 @@ impl<'a> Rungs<'a> {
         let mut matrix = made.tr_mul(&(inner * &made)) + d.tr_mul(&pull.solve(&d));
         let mut value = made.tr_mul(&left.view((0, lines), (lines, 1))) + d.tr_mul(&pulled);
         let whole = normal.corner.view((0, 0), (lines, lines)) * &made;
+        let mut scales = DVector::zeros(free.len());
         for j in 0..free.len() {
             let scale = 1.0 / made.column(j).dot(&whole.column(j)).sqrt();
             if !scale.is_finite() {
@@ -280,13 +312,28 @@ impl<'a> Rungs<'a> {
             matrix.row_mut(j).scale_mut(scale);
             matrix.column_mut(j).scale_mut(scale);
             value[j] *= scale;
+            scales[j] = scale;
         }
         let root = matrix.cholesky()?;
         let pivots = root.l_dirty().diagonal();
         let kept = pivots.iter().fold(1.0, |m: f64, p| m.min(p * p));
-        let taken = value.dot(&root.solve(&value));
-        let left = left[(lines, lines)] + d_left.dot(&pulled) - taken;
-        (kept > DETERMINED).then_some((left, kept))
+        let found = root.solve(&value);
+        let left = left[(lines, lines)] + d_left.dot(&pulled) - value.dot(&found);
+        if !(kept > DETERMINED) {
+            return None;
+        }
+        let step = DVector::from_fn(free.len(), |j, _| -scales[j] * found[j]);
+        let mut border = DVector::zeros(unknowns.border_count());
+        for (j, value) in free.iter().zip(&step) {
+            border[*j] = *value;
+        }
+        Some(Least {
+            left,
+            kept,
+            border,
+            lines: &made * &step,
+            multipliers: pull.solve(&(&d * &step + d_left)),
+        })
     }
 
     /// What the unknowns of the border make of the line of each channel: at ξ = 0 and a unit of ξ.
@@ -332,20 +379,6 @@ impl<'a> Rungs<'a> {
     }
 }
 
-impl Stretch {
-    fn add(&mut self, t: f64, left: f64) {
-        let t2 = t * t;
-        let t3 = t2 * t;
-        let powers = [1.0, t, t2, t3, t2 * t2, t2 * t3, t3 * t3];
-        for p in 0..7 {
-            self.powers[p] += powers[p];
-        }
-        for p in 0..4 {
-            self.left[p] += powers[p] * left;
-        }
-    }
-}
-
 /// Where a straight artefact is touched: u = from + per·x.
 fn contact(attitude: &Attitude) -> [f64; 2] {
     [
@@ -367,145 +400,48 @@ fn moved(p: &Cubic, shift: f64, scale: f64, factor: f64) -> Cubic {
     ]
 }
 
-/// Banded normal equations, and columns beside them.
-struct Normal {
-    /// Row i: columns i + 1 − width to i, the diagonal last.
-    band: Vec<f64>,
-    width: usize,
-    /// Row by row: the two functions of each channel's line, the readings, the gauge.
-    beside: Vec<f64>,
-    columns: usize,
-    /// Products of lines and readings among themselves.
-    corner: DMatrix<f64>,
+/// Readings taken together.
+const LANES: usize = 4;
+
+by_processor! {
+    fn gather(stretch: &mut Stretch, x: &[f64], left: &[f64]) from gather_generic
 }
 
-impl Normal {
-    fn new(unknowns: usize, width: usize, columns: usize, lines: usize) -> Self {
-        Self {
-            band: vec![0.0; unknowns * width],
-            width,
-            beside: vec![0.0; unknowns * columns],
-            columns,
-            corner: DMatrix::zeros(lines + 1, lines + 1),
+#[inline(always)]
+fn gather_generic<const FMA: bool>(stretch: &mut Stretch, x: &[f64], left: &[f64]) {
+    let (start, per_width) = (stretch.start, 1.0 / stretch.width);
+    let mut sums = [[0.0; LANES]; 11];
+    let mut add = |x: &[f64; LANES], left: &[f64; LANES], one: &[f64; LANES]| {
+        for l in 0..LANES {
+            let t = one[l] * ((x[l] - start) * per_width);
+            let t2 = t * t;
+            let t3 = t2 * t;
+            let powers = [one[l], t, t2, t3, t2 * t2, t2 * t3, t3 * t3];
+            for p in 0..7 {
+                sums[p][l] += powers[p];
+            }
+            for p in 0..4 {
+                sums[7 + p][l] += powers[p] * left[l];
+            }
         }
+    };
+    let (whole, last) = x.as_chunks::<LANES>();
+    let (whole_left, last_left) = left.as_chunks::<LANES>();
+    for (x, left) in whole.iter().zip(whole_left) {
+        add(x, left, &[1.0; LANES]);
     }
-
-    /// Adds a stretch of a channel with its functions and their places among the coefficients; ξ is
-    /// `xi[0]` + `xi[1]`·t.
-    fn add(
-        &mut self,
-        stretch: &Stretch,
-        (functions, places): (&[Cubic; 8], &[Option<usize>; 8]),
-        channel: usize,
-        xi: [f64; 2],
-        weight: f64,
-    ) {
-        let m = &stretch.powers;
-        let lines = self.corner.nrows() - 1;
-        for k in 0..8 {
-            let Some(i) = places[k] else { continue };
-            let f = &functions[k];
-            // Σ f tᵖ.
-            let mut with = [0.0; 4];
-            for (p, sum) in with.iter_mut().enumerate() {
-                let product = f[0] * m[p] + f[1] * m[p + 1] + f[2] * m[p + 2] + f[3] * m[p + 3];
-                *sum = weight * product;
-            }
-            let band = &mut self.band[i * self.width..(i + 1) * self.width];
-            for l in 0..8 {
-                if let Some(j) = places[l]
-                    && j <= i
-                {
-                    let g = &functions[l];
-                    let sum = with[0] * g[0] + with[1] * g[1] + with[2] * g[2] + with[3] * g[3];
-                    band[self.width - 1 - (i - j)] += sum;
-                }
-            }
-            let left = &stretch.left;
-            let row = &mut self.beside[i * self.columns..(i + 1) * self.columns];
-            row[2 * channel] += with[0];
-            row[2 * channel + 1] += xi[0] * with[0] + xi[1] * with[1];
-            row[lines] +=
-                weight * (f[0] * left[0] + f[1] * left[1] + f[2] * left[2] + f[3] * left[3]);
-        }
-        let (a, b) = (2 * channel, 2 * channel + 1);
-        let ones = weight * m[0];
-        let along = weight * (xi[0] * m[0] + xi[1] * m[1]);
-        let squares =
-            weight * (xi[0] * xi[0] * m[0] + 2.0 * xi[0] * xi[1] * m[1] + xi[1] * xi[1] * m[2]);
-        self.corner[(a, a)] += ones;
-        self.corner[(a, b)] += along;
-        self.corner[(b, a)] += along;
-        self.corner[(b, b)] += squares;
-        let [left, left_along] = [
-            weight * stretch.left[0],
-            weight * (xi[0] * stretch.left[0] + xi[1] * stretch.left[1]),
-        ];
-        for (row, value) in [(a, left), (b, left_along)] {
-            self.corner[(row, lines)] += value;
-            self.corner[(lines, row)] += value;
-        }
+    if !last.is_empty() {
+        let mut padded = [[0.0; LANES]; 3];
+        padded[0][..last.len()].copy_from_slice(last);
+        padded[1][..last.len()].copy_from_slice(last_left);
+        padded[2][..last.len()].fill(1.0);
+        add(&padded[0], &padded[1], &padded[2]);
     }
-
-    /// Brings in L⁻¹ before the columns beside. The least share that a pivot keeps of its diagonal;
-    /// `None` where a coefficient is determined by nothing.
-    fn factorise(&mut self) -> Option<f64> {
-        let (width, columns) = (self.width, self.columns);
-        let mut kept = 1.0_f64;
-        let count = self.band.len() / width;
-        for i in 0..count {
-            let reach = (width - 1).min(i);
-            let (above, rest) = self.band.split_at_mut(i * width);
-            let row = &mut rest[..width];
-            let whole = row[width - 1];
-            let (done, own) = self.beside.split_at_mut(i * columns);
-            let own = &mut own[..columns];
-            for j in i - reach..i {
-                let other = &above[j * width..(j + 1) * width];
-                // Where column j stands, and so many columns before it that both rows have.
-                let at = width - 1 - (i - j);
-                let before = &other[width - 1 - at..width - 1];
-                let mut l = row[at];
-                for (a, b) in row[..at].iter().zip(before) {
-                    l -= a * b;
-                }
-                l /= other[width - 1];
-                row[at] = l;
-                add(own, -l, &done[j * columns..(j + 1) * columns]);
-            }
-            let squares: f64 = row[..width - 1].iter().map(|l| l * l).sum();
-            let pivot = whole - squares;
-            if !(pivot > DETERMINED * whole) {
-                return None;
-            }
-            kept = kept.min(pivot / whole);
-            let root = pivot.sqrt();
-            row[width - 1] = root;
-            own.iter_mut().for_each(|value| *value /= root);
-        }
-        Some(kept)
+    let sum = |lanes: [f64; LANES]| (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]);
+    for p in 0..7 {
+        stretch.powers[p] = sum(sums[p]);
     }
-
-    /// Products of the columns beside.
-    fn gram(&self) -> DMatrix<f64> {
-        let n = self.columns;
-        let mut gram = DMatrix::zeros(n, n);
-        let sums = gram.as_mut_slice();
-        for row in self.beside.chunks_exact(n) {
-            for (a, factor) in row.iter().enumerate() {
-                add(&mut sums[a * n..(a + 1) * n], *factor, row);
-            }
-        }
-        gram
-    }
-}
-
-/// Adds a multiple of a row.
-#[inline]
-fn add(sums: &mut [f64], factor: f64, row: &[f64]) {
-    let n = sums.len().min(row.len());
-    let (sums, row) = (&mut sums[..n], &row[..n]);
-    for k in 0..n {
-        sums[k] += factor * row[k];
+    for p in 0..4 {
+        stretch.left[p] = sum(sums[7 + p]);
     }
 }

@@ -204,7 +204,7 @@ impl Simultaneous {
     }
 
     /// The combinations of tilts that the channels determine, by name.
-    fn tilt_combinations(&self) -> Vec<(String, Combination)> {
+    pub(super) fn tilt_combinations(&self) -> Vec<(String, Combination)> {
         let contrasts = self.convention.tilts();
         let channels = self.channels();
         let design = DMatrix::from_fn(channels.len(), 3, |r, c| contrasts[c].sign(channels[r]));
@@ -224,7 +224,7 @@ impl Simultaneous {
     }
 
     /// Σ weight·slope, each slope a sum of the fitted tilts: weights on the border's unknowns.
-    fn tilt_weights(&self, combination: &Combination) -> Vec<f64> {
+    pub(super) fn tilt_weights(&self, combination: &Combination) -> Vec<f64> {
         let mut border = vec![0.0; self.unknowns.border_count()];
         for (c, weight) in combination.weights.iter().enumerate() {
             for (j, sign) in self.unknowns.slope_signs(c).into_iter().enumerate() {
@@ -277,16 +277,16 @@ impl Simultaneous {
         (Value { value, std }, freedom)
     }
 
-    /// By what factor the standard uncertainty of each of [`Self::tilts`] would change if that share of
-    /// the noise's variance were correlated along the traces over a length, mm, instead of white.
+    /// By what factor the standard uncertainty of each of the first `most` of [`Self::tilts`] would change if
+    /// that share of the noise's variance were correlated along the traces over a length, mm, instead of white.
     ///
     /// # Errors
     /// [`NoValue`] where a probe touches in two places.
     pub fn if_correlated(
         &self,
         observations: &Observations,
-        share: f64,
-        length: f64,
+        most: usize,
+        (share, length): (f64, f64),
     ) -> Result<Vec<f64>, NoValue> {
         let channels = ChannelReadings::sort(observations);
         let survey = Survey::new(&channels, |i| observations.taken(i));
@@ -297,6 +297,7 @@ impl Simultaneous {
         let combinations: Vec<_> = self
             .tilt_terms()
             .into_iter()
+            .take(most)
             .map(|(_, terms)| self.covariance.times(&[], &terms))
             .collect();
         let counting = problem.counting(&self.parameters, &combinations)?;

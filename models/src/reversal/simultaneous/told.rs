@@ -20,6 +20,8 @@ pub struct EffectParameter {
     pub degrees_of_freedom: f64,
     /// Its unit.
     pub unit: &'static str,
+    /// Its weights on the border's unknowns, to first order; `None` where its uncertainty is not theirs.
+    pub(super) weights: Option<Vec<f64>>,
 }
 
 /// An effect in the fit.
@@ -84,6 +86,7 @@ pub fn effects(
                 std,
                 degrees_of_freedom,
                 unit: told.unit,
+                weights: (step.is_none() && !held).then_some(weights),
             }
         });
         effects.push(FittedEffect {

@@ -228,7 +228,7 @@ fn four_channels_have_the_noise_of_the_four_channel_fit() {
         let x = &new
             .if_correlated(&as_design(&observations), 0.5, 15.0)
             .unwrap();
-        let y = old.if_correlated(&observations, 0.5, 15.0).unwrap();
+        let y = old.if_correlated(&observations, 3, (0.5, 15.0)).unwrap();
         assert!((x[0] / y[0] - 1.0).abs() < 1e-6, "{x:?} {y:?}");
     }
 }

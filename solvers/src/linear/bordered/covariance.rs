@@ -127,6 +127,32 @@ impl BorderedCovariance {
         (own - squares(lost) + squares(gained)).max(0.0)
     }
 
+    /// The covariance matrix of some unknowns, those of the band first; `None` where two of these are farther
+    /// apart than the band is wide.
+    pub fn among(&self, band: &[usize], border: &[usize]) -> Option<DMatrix<f64>> {
+        let lowest = band.iter().min().copied().unwrap_or(0);
+        let highest = band.iter().max().copied().unwrap_or(0);
+        if highest - lowest >= self.triangle.width() {
+            return None;
+        }
+        let (q, stride) = (self.border.nrows(), self.border.nrows() + self.p.ncols());
+        let of_band = band.iter().map(|i| &self.beside[i * stride..][..stride]);
+        let of_border = border.iter().map(|j| &self.root[j * q..][..q]);
+        // Those of the border have no part that the constraints take away.
+        let beside: Vec<(&[f64], &[f64])> = of_band
+            .map(|row| row.split_at(q))
+            .chain(of_border.map(|row| (row, [].as_slice())))
+            .collect();
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        Some(DMatrix::from_fn(beside.len(), beside.len(), |a, b| {
+            let own = match (band.get(a), band.get(b)) {
+                (Some(i), Some(j)) => self.inverse.get(*i, *j),
+                _ => 0.0,
+            };
+            own - product(beside[a].1, beside[b].1) + product(beside[a].0, beside[b].0)
+        }))
+    }
+
     /// The covariance matrix times a vector over the unknowns of band and border: what each unknown has
     /// in common with that linear combination of all.
     pub fn times(&self, band: &[(usize, f64)], border: &[(usize, f64)]) -> (Vec<f64>, Vec<f64>) {

@@ -79,9 +79,6 @@ pub(in crate::diagnosis) const SLACK: f64 = 0.1;
 pub(in crate::diagnosis) const HOPELESS: f64 = 80.0;
 /// See [`HOPELESS`].
 pub(in crate::diagnosis) const HOPELESS_PART: f64 = 0.1;
-/// *Limit.* What stands out beside the strongest cause by more than this, [`HOPELESS`] and its part of that cause
-/// would stand out beside any other that explains about as much: none is tried in its place.
-pub(in crate::diagnosis) const STANDS_OUT_STILL: f64 = 60.0;
 /// *Tuned* on withheld effects: part of the strongest cause's change, squared, that a further one must
 /// reach. What is less may be the remainder of a cause taken for another whose signature is off by a
 /// seventh of its size.
@@ -117,9 +114,6 @@ pub(in crate::diagnosis) const REFINED: usize = 5;
 pub(in crate::diagnosis) const POLISHED: usize = 3;
 /// *Limit.* Part of a statistic that searching may add to that of a relative where it stands.
 pub(in crate::diagnosis) const UNSEARCHED: f64 = 0.2;
-/// *Limit.* How many times the statistic of its start the search of an effect may reach, for the purpose of
-/// whether it is worth it.
-pub(in crate::diagnosis) const SEARCH_GAIN: f64 = 2.0;
 /// *Limit.* Part of the greatest statistic from which on values that come back are tried around their cycles.
 pub(in crate::diagnosis) const IN_REACH: f64 = 0.5;
 

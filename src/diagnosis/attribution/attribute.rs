@@ -11,7 +11,6 @@ use crate::diagnosis::attribution::confidence::{Answer, confidence_set, possible
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder, finer};
 use crate::diagnosis::levels::{
     BETTER, EARNED, HOPELESS, IN_REACH, MOST_CAUSES, PAIR_REACH, PAIRS, POLISHED, REFINED,
-    SEARCH_GAIN,
 };
 
 /// Seeks the causes of what stands out in readings; `begun` are those without which noise and state were had.
@@ -160,8 +159,6 @@ fn strongest<M: FittedModel>(
         .collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     ranked.truncate(REFINED);
-    let most = ranked.first().map_or(known, |(start, _)| start.max(known));
-    ranked.retain(|(start, _)| SEARCH_GAIN * start > most);
     let refined: Vec<(Cause, f64)> = ranked
         .into_par_iter()
         .filter_map(|(_, effect)| {

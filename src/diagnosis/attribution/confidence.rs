@@ -14,8 +14,8 @@ use crate::diagnosis::attribution::shrink::held_out_square;
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::detection::space::{Space, orthonormal};
 use crate::diagnosis::levels::{
-    EARNED, EQUAL_EVIDENCE, HELD, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, OUTDONE, SEARCH_GAIN,
-    STANDS, STANDS_OUT_STILL, WEIGHTY, chi_squared_of_two, chi_squared_quantile,
+    EARNED, EQUAL_EVIDENCE, HELD, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, OUTDONE, STANDS,
+    WEIGHTY, chi_squared_of_two, chi_squared_quantile,
 };
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
 
@@ -60,11 +60,7 @@ pub(in crate::diagnosis) fn confidence_set<M: FittedModel>(
     let mut remainder = context.judged(readings, &best);
     let mut groups = Vec::new();
     for k in 0..causes.len() {
-        let members = if could_pass(context, readings, &best, k, &remainder) {
-            alternatives(context, readings, &best, k)
-        } else {
-            Vec::new()
-        };
+        let members = alternatives(context, readings, &best, k);
         let mut group: Vec<Alternative> = members
             .iter()
             .map(|m| Alternative {
@@ -109,25 +105,6 @@ fn stand_together<M: FittedModel>(
     needed
         && (0..causes.len()).all(|k| is_beyond_limit(context, readings, causes, k))
         && sized(context, readings, causes)
-}
-
-/// Whether another effect in the place of cause `k` that explains about as much could leave nothing that stands
-/// out: what is left in one place beside the causes is left by any of them.
-fn could_pass<M: FittedModel>(
-    context: &Context<'_, M>,
-    readings: &DVector<f64>,
-    causes: &[Cause],
-    k: usize,
-    remainder: &Remainder,
-) -> bool {
-    let beside = context.misfit(readings, &without(causes, k));
-    let own = beside - remainder.residual.norm_squared();
-    let families = 0..context.dictionary.families.len();
-    let left = families.map(|family| context.best(remainder, family).0);
-    let most = left.fold(0.0, f64::max);
-    let as_much = HOPELESS + HOPELESS_PART * own + STANDS_OUT_STILL;
-    // It would be stronger by far, and would have been exchanged for the cause before.
-    most < as_much.min(SEARCH_GAIN * own + 0.5 * STANDS_OUT_STILL)
 }
 
 /// Whether of every cause one size at least is beyond its standard uncertainty, of several causes
@@ -239,11 +216,6 @@ fn alternatives<M: FittedModel>(
             own
         } else {
             if context.p_value(&remainder, effect) > EARNED {
-                return None;
-            }
-            let family = context.family_of(effect)?;
-            let (reach, _) = context.best(&remainder, family);
-            if SEARCH_GAIN * reach < own - HOPELESS - HOPELESS_PART * own {
                 return None;
             }
             let start = context.start(&remainder, effect);

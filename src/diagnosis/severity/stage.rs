@@ -14,7 +14,7 @@ use crate::diagnosis::attribution::doubt::FEW_DRAWS;
 use crate::diagnosis::detection::dictionary::Dictionary;
 use crate::diagnosis::detection::folding::Sums;
 use crate::diagnosis::detection::null::{BATCH, add_surprises, seen};
-use crate::diagnosis::levels::{EARNED, HOPELESS, HOPELESS_PART, REFINED, UNSEARCHED};
+use crate::diagnosis::levels::{EARNED, REFINED, UNSEARCHED};
 use crate::diagnosis::severity::rivals::Drawn;
 
 /// A name that was given.
@@ -137,16 +137,9 @@ impl Name {
         if !passes(cause) || !is_tried(*effect) {
             return false;
         }
-        // What explains so much less cannot stand in its place, here as in the diagnosis.
-        let least = *most - HOPELESS - HOPELESS_PART * most;
-        let in_reach = |effect: &usize| {
-            let family = context.family_of(*effect);
-            let start = family.map_or(0.0, |family| context.best(&first, family).0);
-            (1.0 + UNSEARCHED) * start > least
-        };
-        let ranked = ranked(context, &first).into_iter().filter(in_reach);
+        let ranked = ranked(context, &first);
         let mut others = Vec::new();
-        for effect in ranked.filter(|k| !self.members.contains(k)) {
+        for effect in ranked.into_iter().filter(|k| !self.members.contains(k)) {
             match refined(effect) {
                 Some((_, t)) if t > *most => return false,
                 Some((cause, _)) => others.push(cause),

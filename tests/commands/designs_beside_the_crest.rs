@@ -173,7 +173,7 @@ fn a_set_up_that_contradicts_itself_is_told() {
         ),
         (
             "tip_radius = 1.5\noff_crest = { 0 = 0.1 }\n",
-            "not given for the indicator at 90",
+            "not given for the indicator at 180",
         ),
         (
             "tip_radius = 1.5\noff_crest = { 45 = 0.1 }\n",
@@ -262,7 +262,7 @@ fn a_thickness_that_shows_is_told() {
     assert!(warnings.contains("the thickness was fitted"), "{warnings}");
 }
 
-/// An indicator that reads with the other sign is named.
+/// An indicator that reads with the other sign is named, with the one that faces it: either may be wrong.
 #[test]
 fn an_indicator_of_the_wrong_sign_is_told() {
     let folder = simulated(&["--thickness", "40"]);
@@ -284,7 +284,7 @@ fn an_indicator_of_the_wrong_sign_is_told() {
     let answer = solved(&folder, "made/setup.toml");
     let warnings = answer["warnings"].to_string();
     assert!(
-        warnings.contains("with the sign of the readings of the indicator at 180° turned"),
+        warnings.contains("with the sign of the readings of the indicator at 0° or 180° turned"),
         "{warnings}"
     );
 }

@@ -28,29 +28,38 @@ fn turned_sign(found: &DesignFit, data: &DesignData, options: &DesignOptions) ->
         (squares / residuals.len() as f64).sqrt()
     };
     let before = rms(&found.residuals);
-    indicators.into_iter().find_map(|indicator| {
+    let alike = DesignOptions {
+        alike: true,
+        fit_thickness: false,
+        ..options.clone()
+    };
+    let with = |indicator: f64| {
         let mut turned: DesignObservations = observations.clone();
         for reading in &mut turned.readings {
             if design.channels()[reading.channel].indicator == indicator {
                 reading.value = -reading.value;
             }
         }
-        let alike = DesignOptions {
-            alike: true,
-            fit_thickness: false,
-            ..options.clone()
-        };
-        let after = rms(&fit(&turned, &alike).ok()?.residuals);
-        (after < TURNED * before).then(|| {
-            format!(
-                "with the sign of the readings of the indicator at {}° turned, {} µm rms are left in place of {}: \
-                 readings are positive towards their own indicator; check the sign of this one",
-                angle_name(indicator),
-                number::plain(after, 3),
-                number::plain(before, 3)
-            )
-        })
-    })
+        Some(rms(&fit(&turned, &alike).ok()?.residuals))
+    };
+    // Of two that face each other either may be the wrong one.
+    let better: Vec<(f64, f64)> = indicators
+        .into_iter()
+        .filter_map(|indicator| Some((indicator, with(indicator)?)))
+        .filter(|(_, after)| *after < TURNED * before)
+        .collect();
+    let after = better.first()?.1;
+    let names: Vec<String> = better
+        .iter()
+        .map(|b| format!("{}°", angle_name(b.0)))
+        .collect();
+    Some(format!(
+        "with the sign of the readings of the indicator at {} turned, {} µm rms are left in place of {}: readings \
+         are positive towards their own indicator; check the sign",
+        names.join(" or "),
+        number::plain(after, 3),
+        number::plain(before, 3)
+    ))
 }
 
 /// What the fit takes as known across the line of an indicator, and a thickness that was fitted.

@@ -63,7 +63,7 @@ enum Answering {
     Anova(anova::Args),
     Check(check::Args),
     Circle(circle::Args),
-    Diagnose(diagnose::Args),
+    Diagnose(Box<diagnose::Args>),
     FourSensor(four_sensor::Args),
     Fourier(fourier::Args),
     Machine(machine::Args),

@@ -112,6 +112,9 @@ struct Line<'a> {
 /// Part, point, replicate.
 type Key = (String, String, u32);
 
+/// Nominal coordinates, mm, and the line of the first.
+type Nominal = ([Option<f64>; 3], usize);
+
 /// A table being read.
 struct Plate<'p> {
     path: &'p Path,
@@ -121,8 +124,8 @@ struct Plate<'p> {
     comma: Option<bool>,
     /// More fields than columns, words of the points' names, as the first row has them.
     spare: Option<usize>,
-    /// Nominal coordinates by part and point, mm, and the line of the first.
-    nominal: BTreeMap<(String, String), ([Option<f64>; 3], usize)>,
+    /// By part and point.
+    nominal: BTreeMap<(String, String), Nominal>,
     seen: HashSet<(Key, usize)>,
     /// Measured less nominal, µm, in the order of the file.
     values: Vec<(Key, Axis, f64)>,

@@ -34,7 +34,8 @@ fn a_thickness_that_shows_is_found() {
     for seed in 0..16 {
         let (readings, _) = simulate(&plan(8e-3, seed)).unwrap();
         let found = fit(&readings, &options()).unwrap().thickness().unwrap();
-        assert!(found.value.std < 2.0, "{found:?}");
+        // What shows is known to a tenth of itself; how much better depends on the slopes that the forms have.
+        assert!(found.value.std < 4.0, "{found:?}");
         squares += ((found.value.value - 40.0) / found.value.std).powi(2);
     }
     let rms = f64::sqrt(squares / 16.0);

@@ -9,6 +9,9 @@ use nalgebra::DVector;
 use crate::other_models::calibration_line_made;
 use crate::scene::scene;
 
+/// The change of a reading by its circumstances.
+type Form = Box<dyn Fn(&Place) -> f64>;
+
 fn options() -> Options {
     Options {
         draws: 100,
@@ -100,7 +103,7 @@ fn a_sum_of_two_terms_is_found() {
 #[test]
 fn what_is_no_law_is_not_told() {
     let wave = |u: f64| (2.0 * (u - 0.3)).sinh().sin() * (1.0 + u) + 0.6 * (9.0 * u * u).cos();
-    let cases: [(&str, Box<dyn Fn(&Place) -> f64>); 4] = [
+    let cases: [(&str, Form); 4] = [
         ("nothing", Box::new(|_: &Place| 0.0)),
         (
             "a curve",

@@ -45,7 +45,7 @@ def test_two_channels_say_what_they_leave_open(made: errsep.Result) -> None:
 def test_a_batch_takes_designs(made: errsep.Result, tmp_path: Path) -> None:
     (tmp_path / "planes.csv").write_text(made.summary())
     campaigns = {"id": ["one"], "command": ["reversal"], "data": [str(tmp_path / "planes.csv")]}
-    errsep.batch(campaigns, tmp_path / "answers")
+    errsep.batch(campaigns, out=tmp_path / "answers")
     (part,) = sorted((tmp_path / "answers").glob("part-*.ndjson"))
     row = json.loads(part.read_text())
     assert (row["status"], row["result"]["schema"]) == ("done", "errsep.reversal/2")

@@ -96,7 +96,7 @@ def test_a_covariance_has_names(answers: dict[str, errsep.Result]) -> None:
     frame = covariance.to_dataframe()
     assert frame.loc["centre_x", "radius"] == covariance["radius", "centre_x"]
     assert -1 < covariance.correlation("radius", "centre_y") < 1
-    assert answers["reversal"].covariance is None
+    assert answers["fourier"].covariance is None
 
 
 def test_tilts_of_one_fit_are_correlated(readings: Path, setup: Path) -> None:

@@ -251,7 +251,7 @@ fn apart(name: &str, plan: &DesignPlan, visible: f64) -> Option<f64> {
         draws: 200,
         ..Options::default()
     };
-    let rows = certificate(&model, &model.effects(), &law, &options);
+    let rows = certificate(&model, model.effects(), &law, &options);
     let row = rows.into_iter().find(|row| row.effect == name)?;
     // The certificate's visible root mean square belongs to the smallest size seen.
     Some(APART * visible / (row.visible_rms? * row.identifiable? / row.detectable?))

@@ -148,7 +148,7 @@ const CIRCLE: [Listed; 1] = [(
 )];
 
 /// The circumstances of all readings. A reading is the mean of those that differ by nothing but noise.
-fn circumstances<M: FittedModel>(model: &M) -> Vec<At> {
+fn circumstances<M: FittedModel + 'static>(model: &M) -> Vec<At> {
     let places = model.places();
     let mut sums: BTreeMap<(usize, usize), (f64, f64)> = BTreeMap::new();
     for (place, value) in places.iter().zip(model.observed()) {
@@ -183,7 +183,7 @@ fn circumstances<M: FittedModel>(model: &M) -> Vec<At> {
 struct Absorbed(Vec<DVector<f64>>);
 
 impl Absorbed {
-    fn of<M: FittedModel>(model: &M) -> Self {
+    fn of<M: FittedModel + 'static>(model: &M) -> Self {
         let freedom = model.freedom();
         let mut columns: Vec<DVector<f64>> = freedom
             .columns
@@ -251,7 +251,7 @@ enum Outcome {
     Told(Box<Law>),
 }
 
-fn sought<M: FittedModel>(model: &M, forced: bool) -> Outcome {
+fn sought<M: FittedModel + 'static>(model: &M, forced: bool) -> Outcome {
     let options = options();
     if !forced && diagnose_with(model, Vec::new(), &options).verdict.kind != Kind::Unknown {
         return Outcome::NotUnknown;
@@ -274,7 +274,7 @@ struct Count {
     inside: usize,
 }
 
-fn case<M: FittedModel>(base: &M, noise: f64, listed: &Listed, seed: u64) -> Count {
+fn case<M: FittedModel + 'static>(base: &M, noise: f64, listed: &Listed, seed: u64) -> Count {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let parameters = [0; 4].map(|_| random.random::<f64>());
     let places = circumstances(base);
@@ -371,7 +371,7 @@ fn limits(count: usize, of: usize) -> String {
     )
 }
 
-fn table<M: FittedModel>(
+fn table<M: FittedModel + 'static>(
     name: &str,
     listed: &[Listed],
     (cases, first): (u64, u64),
@@ -423,7 +423,7 @@ fn table<M: FittedModel>(
 
 /// A gap that is no law of the grammar: a Gaussian process or a bump along one coordinate, each channel with a weight
 /// of chance or all alike.
-fn no_law<M: FittedModel>(model: &M, random: &mut ChaCha8Rng) -> DVector<f64> {
+fn no_law<M: FittedModel + 'static>(model: &M, random: &mut ChaCha8Rng) -> DVector<f64> {
     let places = circumstances(model);
     let along = random.random_range(0..3);
     let bump = random.random::<f64>() < 0.25;
@@ -453,7 +453,7 @@ fn no_law<M: FittedModel>(model: &M, random: &mut ChaCha8Rng) -> DVector<f64> {
 }
 
 /// How many gaps that are no law are told as one.
-fn false_laws<M: FittedModel>(
+fn false_laws<M: FittedModel + 'static>(
     name: &str,
     (cases, first): (u64, u64),
     noise: f64,

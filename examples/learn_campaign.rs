@@ -83,7 +83,7 @@ struct Formula {
 }
 
 impl Formula {
-    fn drawn<M: FittedModel>(model: &M, bound: Bound, random: &mut ChaCha8Rng) -> Self {
+    fn drawn<M: FittedModel + 'static>(model: &M, bound: Bound, random: &mut ChaCha8Rng) -> Self {
         let range = |value: &dyn Fn(usize) -> f64| {
             let all = (0..model.places().len()).map(value);
             let low = all.clone().fold(f64::INFINITY, f64::min);
@@ -135,7 +135,7 @@ impl Formula {
 }
 
 /// A campaign with an effect laid over its readings.
-fn with<M: FittedModel>(model: &M, noise: f64, formula: &Formula) -> M {
+fn with<M: FittedModel + 'static>(model: &M, noise: f64, formula: &Formula) -> M {
     let readings = model.observed();
     let change = DVector::from_fn(readings.len(), |k, _| {
         noise * formula.at(&model.places()[k], readings[k])
@@ -168,7 +168,11 @@ impl Count {
     }
 }
 
-fn one<M: FittedModel>(make: &(dyn Fn(u64, u64) -> M + Sync), bound: Bound, seed: u64) -> Count {
+fn one<M: FittedModel + 'static>(
+    make: &(dyn Fn(u64, u64) -> M + Sync),
+    bound: Bound,
+    seed: u64,
+) -> Count {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut count = Count {
         cases: 1,
@@ -252,7 +256,7 @@ fn one<M: FittedModel>(make: &(dyn Fn(u64, u64) -> M + Sync), bound: Bound, seed
     count
 }
 
-fn table<M: FittedModel>(
+fn table<M: FittedModel + 'static>(
     name: &str,
     chosen: Option<&String>,
     (cases, first): (u64, u64),

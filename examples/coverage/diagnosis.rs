@@ -99,7 +99,7 @@ const QUANTITIES: [&str; 7] = [
     "answer moved",
 ];
 
-fn counted<M: FittedModel>(
+fn counted<M: FittedModel + 'static>(
     model: &str,
     effects: &[&str],
     cases: u64,
@@ -132,7 +132,7 @@ fn counted<M: FittedModel>(
     rows.filter(|row| row.seeds > 0).collect()
 }
 
-fn one<M: FittedModel>(
+fn one<M: FittedModel + 'static>(
     put: Option<(&str, f64)>,
     seed: u64,
     make: &impl Fn(Put<'_>, u64, f64) -> M,
@@ -193,7 +193,12 @@ fn freedom(diagnosis: &Diagnosis) -> f64 {
 }
 
 /// The numbers people act on: before, with the effect in them; after, without it.
-fn answers<M: FittedModel>(counts: &mut Counts, diagnosis: &Diagnosis, exact: &M, clean: &M) {
+fn answers<M: FittedModel + 'static>(
+    counts: &mut Counts,
+    diagnosis: &Diagnosis,
+    exact: &M,
+    clean: &M,
+) {
     let (with, without) = (exact.linearised(), clean.linearised());
     let freedom = freedom(diagnosis);
     for quantity in clean.quantities() {
@@ -217,7 +222,7 @@ fn answers<M: FittedModel>(counts: &mut Counts, diagnosis: &Diagnosis, exact: &M
 }
 
 /// Orthonormal columns of what a fit absorbs, by their singular values.
-fn absorbed<M: FittedModel>(model: &M) -> DMatrix<f64> {
+fn absorbed<M: FittedModel + 'static>(model: &M) -> DMatrix<f64> {
     let freedom = model.freedom();
     let mut columns: Vec<DVector<f64>> = freedom
         .columns
@@ -267,7 +272,7 @@ fn absorbed<M: FittedModel>(model: &M) -> DMatrix<f64> {
 
 /// What a model leaves of readings without noise: root of the sum of squares over the degrees of
 /// freedom.
-fn left<M: FittedModel>(model: &M, absorbed: &DMatrix<f64>) -> f64 {
+fn left<M: FittedModel + 'static>(model: &M, absorbed: &DMatrix<f64>) -> f64 {
     let readings = model.linearised();
     let residual = &readings - absorbed * absorbed.tr_mul(&readings);
     (residual.norm_squared() / (readings.len() - absorbed.ncols()) as f64).sqrt()

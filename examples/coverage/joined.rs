@@ -38,7 +38,7 @@ pub fn rows(seeds: u64) -> Vec<Row> {
     rows
 }
 
-fn of<M: FittedModel>(
+fn of<M: FittedModel + 'static>(
     model: &str,
     seeds: u64,
     make: &(impl Fn(Put<'_>, u64, f64) -> M + Sync),
@@ -83,7 +83,7 @@ fn of<M: FittedModel>(
     rows
 }
 
-fn one<M: FittedModel>(
+fn one<M: FittedModel + 'static>(
     effect: &str,
     size: f64,
     seed: u64,

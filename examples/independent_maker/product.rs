@@ -147,7 +147,7 @@ pub fn apart(
         draws: 200,
         ..Options::default()
     };
-    let rows = certificate(&model, &model.effects(), &law, &options);
+    let rows = certificate(&model, model.effects(), &law, &options);
     let row = rows.into_iter().find(|row| row.effect == effect)?;
     // The certificate's visible root mean square belongs to the detectable amplitude.
     let told_from = row.visible_rms? * row.identifiable? / row.detectable?;

@@ -104,9 +104,9 @@ fn options(without: &[&str], severity: usize) -> Options {
 /// What the certificate of a measurement says of two effects: with the visible length |Ê| in units of the
 /// noise they are told apart with 99 % from |Ê| sin θ/2 = 2.33 on, θ the angle between them. An effect that
 /// could only imitate the other at a size that is not plausible is told from it.
-fn told_by<M: FittedModel>(model: &M, noise: f64) -> Told {
+fn told_by<M: FittedModel + 'static>(model: &M, noise: f64) -> Told {
     let law = NoiseLaw::white(noise, f64::INFINITY, NoiseSource::Stated);
-    let rows = certificate(model, &model.effects(), &law, &options(&[], 0));
+    let rows = certificate(model, model.effects(), &law, &options(&[], 0));
     let readings = model.places().len() as f64;
     let cosine = move |of: &Diagnosability, other: &str| {
         let rival = of.rivals.iter().find(|(name, _)| name == other);

@@ -1,13 +1,13 @@
 //! How often the score stage and a whole diagnosis say the same of a rival.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::attribution::examined::examined;
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::fitted::without_misfit;
-use crate::diagnosis::diagnose::diagnose;
+use crate::diagnosis::diagnose::diagnose_with;
 use crate::diagnosis::noise::spikes::calmed;
 use crate::diagnosis::options::Options;
 use crate::diagnosis::severity::rivals::{Drawn, Family};
@@ -28,9 +28,8 @@ pub struct Agreement {
     pub both: usize,
 }
 
-/// Names what is in a model's readings, draws rivals of every name, `each` of each family, and names
-/// every one by the score stage and by a diagnosis of its own. One row for each name and family.
-pub fn agreement<M: FittedModel>(model: &M, options: &Options, each: usize) -> Vec<Agreement> {
+/// See [`crate::diagnosis::agreement`].
+pub(super) fn agreement(model: &AnyModel, options: &Options, each: usize) -> Vec<Agreement> {
     let is_known = |name: &str| !options.without.iter().any(|out| out == name);
     let mut catalogue = model.effects();
     catalogue.retain(|effect| is_known(effect.name()));
@@ -54,8 +53,8 @@ pub fn agreement<M: FittedModel>(model: &M, options: &Options, each: usize) -> V
     })
 }
 
-fn compared<M: FittedModel>(
-    context: &Context<'_, M>,
+fn compared(
+    context: &Context<'_>,
     name: &Name,
     family: Family,
     options: &Options,
@@ -72,7 +71,7 @@ fn compared<M: FittedModel>(
                 severity: 0,
                 ..options.clone()
             };
-            let verdict = diagnose(&made, &own).verdict;
+            let verdict = diagnose_with(&made, made.effects(), &own).verdict;
             let causes = verdict.causes();
             let of_group = |said: &&str| {
                 let mut own = name.members.iter();

@@ -1,6 +1,6 @@
 //! A diagnosis from a fitted model to its verdict.
 
-use errsep_models::model::{Effect, FittedModel};
+use errsep_models::model::{AnyModel, Effect, FittedModel};
 
 use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::attribution::examined::examined;
@@ -10,15 +10,10 @@ use crate::diagnosis::options::Options;
 use crate::diagnosis::verdict::compose::compose;
 use crate::diagnosis::verdict::types::Diagnosis;
 
-/// Diagnoses the gap of a fitted model with its own catalogue.
-pub fn diagnose<M: FittedModel>(model: &M, options: &Options) -> Diagnosis {
-    diagnose_with(model, model.effects(), options)
-}
-
-/// Diagnoses the gap of a fitted model with a given catalogue.
-pub fn diagnose_with<M: FittedModel>(
-    model: &M,
-    catalogue: Vec<Box<dyn Effect<M>>>,
+/// See [`crate::diagnosis::diagnose_with`].
+pub(super) fn diagnose_with(
+    model: &AnyModel,
+    catalogue: Vec<Box<dyn Effect<AnyModel>>>,
     options: &Options,
 ) -> Diagnosis {
     let catalogue: Vec<_> = catalogue

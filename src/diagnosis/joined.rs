@@ -5,7 +5,7 @@
 //! round (`attribution/sizes.rs`, `attribution/bias.rs`). The noise is what the repeats leave without
 //! the effects.
 
-use errsep_models::model::{Effect, FittedModel, Shape};
+use errsep_models::model::{AnyModel, Effect, FittedModel, Shape};
 use nalgebra::DVector;
 use serde::Serialize;
 use thiserror::Error;
@@ -140,13 +140,10 @@ pub struct Joined {
     pub change: Vec<f64>,
 }
 
-/// Fits effects of a catalogue along with a model.
-///
-/// # Errors
-/// An effect is not known, or the readings do not determine it beside the model and the others.
-pub fn joined<M: FittedModel>(
-    model: &M,
-    catalogue: Vec<Box<dyn Effect<M>>>,
+/// See [`crate::diagnosis::joined`].
+pub(super) fn joined(
+    model: &AnyModel,
+    catalogue: Vec<Box<dyn Effect<AnyModel>>>,
     names: &[String],
     options: &Options,
 ) -> Result<Joined, NotJoined> {
@@ -161,12 +158,12 @@ pub fn joined<M: FittedModel>(
 
 /// What is made of a fit that effects have joined: its workbench, the readings seen from there, the effects in
 /// the order in which they are named, and what should be known beside.
-pub(in crate::diagnosis) fn in_the_fit<M: FittedModel, R>(
-    model: &M,
-    catalogue: Vec<Box<dyn Effect<M>>>,
+pub(in crate::diagnosis) fn in_the_fit<R>(
+    model: &AnyModel,
+    catalogue: Vec<Box<dyn Effect<AnyModel>>>,
     names: &[String],
     options: &Options,
-    then: impl FnOnce(&Context<'_, M>, &DVector<f64>, &[Cause], Vec<String>) -> R,
+    then: impl FnOnce(&Context<'_>, &DVector<f64>, &[Cause], Vec<String>) -> R,
 ) -> Result<R, NotJoined> {
     let chosen = chosen(catalogue, names)?;
     let (calmed, calm) = calmed(model);
@@ -199,12 +196,13 @@ pub(in crate::diagnosis) fn in_the_fit<M: FittedModel, R>(
 }
 
 /// The effects that are given, in their order.
-fn chosen<M: FittedModel>(
-    catalogue: Vec<Box<dyn Effect<M>>>,
+fn chosen(
+    catalogue: Vec<Box<dyn Effect<AnyModel>>>,
     names: &[String],
-) -> Result<Vec<Box<dyn Effect<M>>>, NotJoined> {
+) -> Result<Vec<Box<dyn Effect<AnyModel>>>, NotJoined> {
     let known: Vec<String> = catalogue.iter().map(|e| e.name().to_owned()).collect();
-    let mut left: Vec<Option<Box<dyn Effect<M>>>> = catalogue.into_iter().map(Some).collect();
+    let mut left: Vec<Option<Box<dyn Effect<AnyModel>>>> =
+        catalogue.into_iter().map(Some).collect();
     let mut chosen = Vec::new();
     for name in names {
         let Some(at) = known.iter().position(|own| own == name) else {
@@ -225,7 +223,7 @@ fn chosen<M: FittedModel>(
 }
 
 /// Refuses what no reading could show.
-fn shown<M: FittedModel>(context: &Context<'_, M>) -> Result<(), NotJoined> {
+fn shown(context: &Context<'_>) -> Result<(), NotJoined> {
     for (k, effect) in context.catalogue.iter().enumerate() {
         let name = || effect.name().to_owned();
         let family = context
@@ -239,7 +237,7 @@ fn shown<M: FittedModel>(context: &Context<'_, M>) -> Result<(), NotJoined> {
 }
 
 /// Every effect at its best shape beside the others, with the state that is left without them.
-fn fitted<M: FittedModel>(context: &Context<'_, M>, readings: &DVector<f64>) -> Vec<Cause> {
+fn fitted(context: &Context<'_>, readings: &DVector<f64>) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     for effect in 0..context.catalogue.len() {
         let remainder = context.remainder(readings, &causes);
@@ -268,8 +266,8 @@ fn fitted<M: FittedModel>(context: &Context<'_, M>, readings: &DVector<f64>) -> 
     context.relinearised(readings, &causes, f64::INFINITY)
 }
 
-fn told<M: FittedModel>(
-    context: &Context<'_, M>,
+fn told(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     mut notes: Vec<String>,
@@ -360,8 +358,8 @@ fn told<M: FittedModel>(
 }
 
 /// One of the effects as it stands in the fit.
-fn effect<M: FittedModel>(
-    context: &Context<'_, M>,
+fn effect(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     (sizes, allowed): (&Sizes, &[Allowed]),

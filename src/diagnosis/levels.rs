@@ -114,6 +114,11 @@ pub(in crate::diagnosis) const REFINED: usize = 5;
 pub(in crate::diagnosis) const POLISHED: usize = 3;
 /// *Limit.* Part of a statistic that searching may add to that of a relative where it stands.
 pub(in crate::diagnosis) const UNSEARCHED: f64 = 0.2;
+/// *Limit.* Causes that were judged are not judged again where the squares that they leave are not less by more
+/// than this: a standard deviation.
+pub(in crate::diagnosis) const NO_BETTER: f64 = 1.0;
+/// *Limit.* Relatives of one variant that are searched: the best of those that are tried.
+pub(in crate::diagnosis) const ALIKE: usize = 4;
 /// *Limit.* Part of the greatest statistic from which on values that come back are tried around their cycles.
 pub(in crate::diagnosis) const IN_REACH: f64 = 0.5;
 

@@ -19,7 +19,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 /// The part of vectors that the fit of a model cannot absorb.
-fn visible<M: FittedModel>(model: &M, vectors: &DMatrix<f64>) -> DMatrix<f64> {
+fn visible<M: FittedModel + 'static>(model: &M, vectors: &DMatrix<f64>) -> DMatrix<f64> {
     let columns = model.freedom().columns;
     if columns.ncols() == 0 {
         return vectors.clone();
@@ -38,7 +38,7 @@ fn visible<M: FittedModel>(model: &M, vectors: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// How much of the exact change the signature at a shape leaves unexplained, as a part of it.
-fn left<M: FittedModel>(bare: &M, with: &M, effect: &str, shape: &Shape) -> f64 {
+fn left<M: FittedModel + 'static>(bare: &M, with: &M, effect: &str, shape: &Shape) -> f64 {
     let effects = bare.effects();
     let effect = effects.iter().find(|e| e.name() == effect).unwrap();
     let n = bare.observed().len();

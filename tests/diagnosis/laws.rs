@@ -30,12 +30,12 @@ fn line(seed: u64, change: impl Fn(&Place) -> f64) -> CalibrationLine {
     changed(&calibration_line_made(&[], seed, 1.0), change)
 }
 
-fn changed<M: FittedModel>(model: &M, change: impl Fn(&Place) -> f64) -> M {
+fn changed<M: FittedModel + 'static>(model: &M, change: impl Fn(&Place) -> f64) -> M {
     let changes = model.places().iter().map(change);
     model.refit(model.observed() + DVector::from_iterator(model.places().len(), changes))
 }
 
-fn told<M: FittedModel>(model: &M) -> Law {
+fn told<M: FittedModel + 'static>(model: &M) -> Law {
     match law(model, &options(), 0) {
         Ok(LawFound::Law(law)) => *law,
         other => panic!("{other:?}"),

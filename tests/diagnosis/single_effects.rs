@@ -267,7 +267,7 @@ fn sealed_effects_are_found_again() {
         draws: 200,
         ..Options::default()
     };
-    let trials = prove(&model, &model.effects(), &options, 40);
+    let trials = prove(&model, model.effects(), &options, 40);
     assert_eq!(trials.counts.iter().flatten().sum::<usize>(), 40);
     // Nine or more of the eleven effects that can be seen, and none at all.
     assert!(trials.truths.len() >= 10, "{:?}", trials.truths);

@@ -4,6 +4,7 @@
 //! for what the fit can absorb, for the quantities people act on, and for a catalogue of effects
 //! that the model leaves out.
 
+mod any;
 mod effect;
 mod moments;
 
@@ -15,6 +16,7 @@ use nalgebra::{DMatrix, DVector};
 /// Relative rounding of numbers that a calculation has gone through.
 pub(crate) const ROUNDING: f64 = 1e-12;
 
+pub use any::AnyModel;
 pub(crate) use effect::amplitude;
 pub(crate) use effect::each;
 pub use effect::{About, Effect, Estimate, Link, Parameter, Shape};

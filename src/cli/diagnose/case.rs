@@ -29,7 +29,7 @@ pub(super) struct Case<M> {
     pub inputs: Vec<PathBuf>,
 }
 
-impl<M: FittedModel> Case<M> {
+impl<M: FittedModel + 'static> Case<M> {
     /// Diagnoses the case.
     pub(super) fn answer(self, args: &Args) -> Result<Answer, Message> {
         self.answer_with(args, |_| None)
@@ -71,7 +71,6 @@ impl<M: FittedModel> Case<M> {
         let bar = progress("diagnosing", None);
         let diagnosis = diagnose_with(&self.model, catalogue, &options);
         bar.finish_and_clear();
-        let own = self::catalogue(args, &self.model)?;
         let learnt = file.map(|file| learnt(&self.model, args, file, &diagnosis, &options));
         let learnt = learnt.transpose()?;
         let law = args
@@ -81,7 +80,7 @@ impl<M: FittedModel> Case<M> {
         let law = law.transpose()?;
         let sealed = seal.map(|seal| seal.written(&self.model, args, &diagnosis, &options));
         let sealed = sealed.transpose()?;
-        let trials = args.prove.map(|count| {
+        let trials = args.prove.map(|count| -> Result<_, Message> {
             let bar = progress("proving", None);
             // The trials are made on readings without what was found in them.
             let clean = self
@@ -92,10 +91,11 @@ impl<M: FittedModel> Case<M> {
                 severity: 0,
                 ..options.clone()
             };
-            let trials = prove(&clean, &own, &options, count);
+            let trials = prove(&clean, self::catalogue(args, &self.model)?, &options, count);
             bar.finish_and_clear();
-            trials
+            Ok(trials)
         });
+        let trials = trials.transpose()?;
         let tests = all_tested(
             &self.model,
             args,
@@ -203,7 +203,7 @@ fn tell_learnt(
 }
 
 /// The model's effects and the user's own.
-pub(super) fn catalogue<M: FittedModel>(
+pub(super) fn catalogue<M: FittedModel + 'static>(
     args: &Args,
     model: &M,
 ) -> Result<Vec<Box<dyn Effect<M>>>, Message> {
@@ -215,7 +215,10 @@ pub(super) fn catalogue<M: FittedModel>(
 }
 
 /// The user's own effects.
-fn own_effects<M: FittedModel>(args: &Args, model: &M) -> Result<Vec<Tabulated>, Message> {
+fn own_effects<M: FittedModel + 'static>(
+    args: &Args,
+    model: &M,
+) -> Result<Vec<Tabulated>, Message> {
     let Some(path) = &args.effects else {
         return Ok(Vec::new());
     };
@@ -250,7 +253,11 @@ fn own_effects<M: FittedModel>(args: &Args, model: &M) -> Result<Vec<Tabulated>,
 }
 
 /// What the fit leaves of every reading, without and with the effects.
-pub(super) fn residuals<M: FittedModel>(model: &M, before: &[f64], after: &[f64]) -> CsvTable {
+pub(super) fn residuals<M: FittedModel + 'static>(
+    model: &M,
+    before: &[f64],
+    after: &[f64],
+) -> CsvTable {
     let places = model.places();
     let numbers = |value: fn(&Place) -> f64| -> Vec<f64> { places.iter().map(value).collect() };
     let suffix = |unit: &str| match unit {

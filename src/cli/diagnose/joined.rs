@@ -16,7 +16,7 @@ use crate::io::{CsvTable, Message, Status};
 use crate::report::diagnosis as sheet;
 use crate::report::number::probability;
 
-impl<M: FittedModel> Case<M> {
+impl<M: FittedModel + 'static> Case<M> {
     /// The fit with the effects that are given.
     pub(super) fn with_effects(self, args: &Args) -> Result<(Answer, Joined), Message> {
         let options = Options {

@@ -24,7 +24,7 @@ use crate::report::number::{percent, plain, probability};
 /// # Errors
 /// The verdict is not `unknown`, or the readings do not tell what the gap is bound to; the file cannot be
 /// written.
-pub(super) fn learnt<M: FittedModel>(
+pub(super) fn learnt<M: FittedModel + 'static>(
     model: &M,
     args: &Args,
     (place, file): (&Path, OutFile),
@@ -111,7 +111,7 @@ pub(super) fn only_unknown(
 }
 
 /// The effect's name: that of its file.
-pub(super) fn named<M: FittedModel>(place: &Path, model: &M) -> Result<String, Message> {
+pub(super) fn named<M: FittedModel + 'static>(place: &Path, model: &M) -> Result<String, Message> {
     let stem = place.file_stem().map(|stem| stem.to_string_lossy());
     let name = stem.unwrap_or_default().trim().to_owned();
     let known = model.effects();
@@ -129,7 +129,7 @@ pub(super) fn named<M: FittedModel>(place: &Path, model: &M) -> Result<String, M
 ///
 /// # Errors
 /// The file changed while it was read.
-pub(super) fn seen<M: FittedModel>(model: &M, data: &Path) -> Result<Seen, Message> {
+pub(super) fn seen<M: FittedModel + 'static>(model: &M, data: &Path) -> Result<Seen, Message> {
     let Read256::Digest(sha256) = digest_of(data) else {
         return Err(Message::bad_input("the file changed while it was read")
             .in_file(data)
@@ -183,7 +183,7 @@ fn refused(why: &NotLearnt, data: &Path) -> Message {
     })
 }
 
-fn in_words<M: FittedModel>(model: &M, learnt: &Learnt) -> String {
+fn in_words<M: FittedModel + 'static>(model: &M, learnt: &Learnt) -> String {
     let others: Vec<&HeldOutAlong> = learnt.ways.iter().skip(1).collect();
     let mut text = format!(
         "Learnt as `{}`: a smooth function of {}, {} {} RMS.",
@@ -229,7 +229,7 @@ fn in_words<M: FittedModel>(model: &M, learnt: &Learnt) -> String {
 }
 
 /// How the learnt effects of a file fare on readings that they were not learnt from.
-pub(super) fn all_tested<M: FittedModel>(
+pub(super) fn all_tested<M: FittedModel + 'static>(
     model: &M,
     args: &Args,
     effects: &[Tabulated],

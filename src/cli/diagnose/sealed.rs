@@ -156,7 +156,7 @@ pub(super) struct Seal<M> {
     planned: Digested,
 }
 
-impl<M: FittedModel> Seal<M> {
+impl<M: FittedModel + 'static> Seal<M> {
     /// Begins a seal where one is asked for.
     ///
     /// # Errors

@@ -196,7 +196,7 @@ fn effects(
         seed: plan.seed,
         ..Options::default()
     };
-    Ok(certificate(&model, &model.effects(), &law, &options))
+    Ok(certificate(&model, model.effects(), &law, &options))
 }
 
 /// The standard uncertainty of a slope, or that of a form by its root mean square over the travel; of

@@ -218,7 +218,7 @@ fn certified(planned: &Planned, seed: u64) -> Result<Vec<Diagnosability>, Messag
         seed,
         ..Options::default()
     };
-    Ok(certificate(&model, &model.effects(), &law, &options))
+    Ok(certificate(&model, model.effects(), &law, &options))
 }
 
 /// Changes of a plan that a shop can make.

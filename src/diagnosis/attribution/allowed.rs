@@ -7,7 +7,7 @@
 //! at that shape. What is told is the greater of the standard uncertainty by the covariance and
 //! a k-th of the interval's longer arm.
 
-use errsep_models::model::{Estimate, FittedModel, Shape};
+use errsep_models::model::{Estimate, Shape};
 use nalgebra::DVector;
 
 use crate::diagnosis::attribution::bias::biases;
@@ -48,8 +48,8 @@ impl Allowed {
 }
 
 /// The fits that the readings allow, along each free shape parameter and over the variants.
-pub(in crate::diagnosis) fn allowed_fits<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn allowed_fits(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     sizes: &Sizes,
@@ -90,8 +90,8 @@ pub(in crate::diagnosis) fn allowed_fits<M: FittedModel>(
 
 /// Shapes of a cause to one side along a parameter, to the end of what it may be; none where it is
 /// not free.
-fn along<M: FittedModel>(
-    context: &Context<'_, M>,
+fn along(
+    context: &Context<'_>,
     causes: &[Cause],
     sizes: &Sizes,
     (which, parameter): (usize, usize),
@@ -133,8 +133,8 @@ fn along<M: FittedModel>(
 
 /// The estimates of a cause with standard uncertainties that hold over all fits of the same variant; a
 /// shape parameter at an end of what it may be is not bounded.
-pub(in crate::diagnosis) fn widened<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn widened(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     which: usize,
@@ -180,8 +180,8 @@ fn apart(own: &Estimate, their: &Estimate) -> f64 {
 }
 
 /// Answers with standard uncertainties that hold over all fits, those of other variants among them.
-pub(in crate::diagnosis) fn answers_widened<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn answers_widened(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     mut answers: Vec<Bias>,
     profiles: &[(String, Vec<f64>, Vec<f64>)],

@@ -3,19 +3,19 @@
 //! One cause is tried first, then two, then three; each further one must earn its place beside the
 //! others (`confidence.rs`). If no step forward succeeds, all pairs are tried.
 
-use errsep_models::model::FittedModel;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::confidence::{Answer, confidence_set, possible, without};
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder, finer};
 use crate::diagnosis::levels::{
-    BETTER, EARNED, HOPELESS, IN_REACH, MOST_CAUSES, PAIR_REACH, PAIRS, POLISHED, REFINED,
+    BETTER, EARNED, HOPELESS, IN_REACH, MOST_CAUSES, NO_BETTER, PAIR_REACH, PAIRS, POLISHED,
+    REFINED,
 };
 
 /// Seeks the causes of what stands out in readings; `begun` are those without which noise and state were had.
-pub(in crate::diagnosis) fn attribute<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn attribute(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     first: &Remainder,
     begun: &[Cause],
@@ -58,11 +58,16 @@ pub(in crate::diagnosis) fn attribute<M: FittedModel>(
         causes.clone_from(&answer.causes);
         partial = Some(answer);
     }
-    let least = partial.as_ref().map_or(f64::INFINITY, |answer| {
-        answer.remainder.residual.norm_squared() + HOPELESS
+    let judged = partial.as_ref().map_or(f64::INFINITY, |answer| {
+        answer.remainder.residual.norm_squared()
     });
+    let least = judged + HOPELESS;
     pairs(context, readings, first)
         .into_iter()
+        .filter(|causes| {
+            let known = partial.as_ref().is_some_and(|a| same(&a.causes, causes));
+            !known || context.misfit(readings, causes) < judged - NO_BETTER
+        })
         .filter(|causes| {
             context.misfit(readings, &context.relinearised(readings, causes, least)) < least
         })
@@ -73,8 +78,8 @@ pub(in crate::diagnosis) fn attribute<M: FittedModel>(
 
 /// The causes without which noise and state cannot be had: by strength, each refitted, no others
 /// tried in their place.
-pub(in crate::diagnosis) fn roughly<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn roughly(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     first: &Remainder,
 ) -> Vec<Cause> {
@@ -101,11 +106,7 @@ pub(in crate::diagnosis) fn roughly<M: FittedModel>(
 
 /// Pairs of effects of which each stands out beside the other though neither need do so alone, the
 /// best fits first.
-fn pairs<M: FittedModel>(
-    context: &Context<'_, M>,
-    readings: &DVector<f64>,
-    first: &Remainder,
-) -> Vec<Vec<Cause>> {
+fn pairs(context: &Context<'_>, readings: &DVector<f64>, first: &Remainder) -> Vec<Vec<Cause>> {
     let beside_each = |effect: usize| {
         let mut found: Vec<(f64, Vec<Cause>)> = Vec::new();
         let Some(start) = context.start(first, effect) else {
@@ -135,15 +136,33 @@ fn pairs<M: FittedModel>(
     found.truncate(PAIRS);
     let polished = found.into_par_iter().map(|(_, mut pair)| {
         polish(context, readings, &mut pair);
-        pair
+        (context.misfit(readings, &pair), pair)
     });
-    polished.collect()
+    let mut polished: Vec<(f64, Vec<Cause>)> = polished.collect();
+    polished.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut distinct: Vec<Vec<Cause>> = Vec::new();
+    for (_, pair) in polished {
+        // Begun elsewhere, the search may have come to the same.
+        if !distinct.iter().any(|known| same(known, &pair)) {
+            distinct.push(pair);
+        }
+    }
+    distinct
+}
+
+/// Whether causes are the same effects in the same variants.
+fn same(one: &[Cause], other: &[Cause]) -> bool {
+    let holds = |c: &Cause| {
+        let mut all = other.iter();
+        all.any(|o| o.effect == c.effect && o.shape.variant == c.shape.variant)
+    };
+    one.len() == other.len() && one.iter().all(holds)
 }
 
 /// The refined effect with the greatest statistic beside the causes, and that statistic. `known`: one that
 /// another cause has there already.
-fn strongest<M: FittedModel>(
-    context: &Context<'_, M>,
+fn strongest(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     remainder: &Remainder,
     causes: &[Cause],
@@ -181,7 +200,7 @@ fn strongest<M: FittedModel>(
 
 /// Refines each cause beside the others, and swaps it for any effect that explains more, itself
 /// begun elsewhere among them.
-fn polish<M: FittedModel>(context: &Context<'_, M>, readings: &DVector<f64>, causes: &mut [Cause]) {
+fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause]) {
     for _ in 0..POLISHED {
         let mut changed = false;
         for k in 0..causes.len() {

@@ -10,7 +10,7 @@
 //! whatever the amplitudes: a change m of the readings in each draw of the state. The move's error
 //! is then gᵀδ + wᵀm, and what wᵀm adds to the variances is taken from the draws.
 
-use errsep_models::model::{FittedModel, Profile};
+use errsep_models::model::{AnyModel, FittedModel, Profile};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -29,8 +29,8 @@ const STATES: usize = 32;
 type MovedProfile = (String, Vec<f64>, Vec<f64>);
 
 /// How the quantities move when the causes are taken out of readings, and the profiles with them.
-pub(in crate::diagnosis) fn biases<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn biases(
+    context: &Context<'_>,
     observed: &DVector<f64>,
     causes: &[Cause],
 ) -> (Vec<Bias>, Vec<MovedProfile>) {
@@ -159,11 +159,7 @@ struct Taken {
 }
 
 impl Taken {
-    fn out_of<M: FittedModel>(
-        context: &Context<'_, M>,
-        readings: &DVector<f64>,
-        causes: &[Cause],
-    ) -> Option<Self> {
+    fn out_of(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) -> Option<Self> {
         if causes.is_empty() {
             return None;
         }
@@ -236,8 +232,8 @@ struct ByState {
 
 /// Signatures of causes as they stand in the readings, readings × amplitudes: those that are linear in
 /// the state at the state as read without the causes.
-fn signatures<M: FittedModel>(
-    context: &Context<'_, M>,
+fn signatures(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     amplitudes: &DVector<f64>,
@@ -260,11 +256,7 @@ fn signatures<M: FittedModel>(
 }
 
 /// Σ w, the scatter that the model expects included.
-fn covariance_times<M: FittedModel>(
-    model: &M,
-    law: &NoiseLaw,
-    weights: &DVector<f64>,
-) -> DVector<f64> {
+fn covariance_times(model: &AnyModel, law: &NoiseLaw, weights: &DVector<f64>) -> DVector<f64> {
     let mut spread = weights * law.white;
     for trace in model.traces() {
         let w = weights.rows(trace.start, trace.len());
@@ -302,8 +294,8 @@ fn covariance_times<M: FittedModel>(
 }
 
 /// √(wᵀ Σ w).
-pub(in crate::diagnosis) fn weighted_std<M: FittedModel>(
-    model: &M,
+pub(in crate::diagnosis) fn weighted_std(
+    model: &AnyModel,
     law: &NoiseLaw,
     weights: &DVector<f64>,
 ) -> f64 {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use errsep_models::model::{FittedModel, Shape};
+use errsep_models::model::Shape;
 use nalgebra::DVector;
 
 use crate::diagnosis::attribution::confidence::{Alternative, possible, without};
@@ -13,8 +13,8 @@ use crate::diagnosis::detection::dictionary::statistic;
 use crate::diagnosis::levels::chi_squared_of_two;
 
 /// What each effect explains, by that. `groups` are those of the causes, where they are named.
-pub(in crate::diagnosis) fn candidates<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn candidates(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     first: &Remainder,
     excess: f64,
@@ -99,8 +99,8 @@ pub(in crate::diagnosis) fn candidates<M: FittedModel>(
 
 /// The variants of a named cause that fit as well: which sensor, which channel may be open where
 /// the effect is not.
-pub(in crate::diagnosis) fn elsewhere<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn elsewhere(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     which: usize,
@@ -119,8 +119,8 @@ pub(in crate::diagnosis) fn elsewhere<M: FittedModel>(
 }
 
 /// Those variants in words, with the causes of the fit in which the cause has them.
-pub(in crate::diagnosis) fn variants_alike<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn variants_alike(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     which: usize,

@@ -4,7 +4,7 @@
 //! of the noise: no other effect, no place. All causes that pass are the confidence set (the
 //! inversion of the test); significance alone names nothing. Of several each must earn its place.
 
-use errsep_models::model::{FittedModel, Shape};
+use errsep_models::model::Shape;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -51,8 +51,8 @@ struct Member {
 }
 
 /// All effects that could stand in place of each cause, the others kept.
-pub(in crate::diagnosis) fn confidence_set<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn confidence_set(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
 ) -> Answer {
@@ -90,11 +90,7 @@ pub(in crate::diagnosis) fn confidence_set<M: FittedModel>(
 }
 
 /// Whether each of some causes is needed beside the others, is no other effect at its limit, and has a size.
-fn stand_together<M: FittedModel>(
-    context: &Context<'_, M>,
-    readings: &DVector<f64>,
-    causes: &[Cause],
-) -> bool {
+fn stand_together(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) -> bool {
     let needed = causes.len() == 1
         || weighty(context, readings, causes)
             && (0..causes.len()).all(|k| {
@@ -110,11 +106,7 @@ fn stand_together<M: FittedModel>(
 /// Whether of every cause one size at least is beyond its standard uncertainty, of several causes
 /// beyond twice that, the state's included: what may as well be nothing stands for something that it
 /// only imitates.
-fn sized<M: FittedModel>(
-    context: &Context<'_, M>,
-    readings: &DVector<f64>,
-    causes: &[Cause],
-) -> bool {
+fn sized(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) -> bool {
     let all = |sizes: Sizes| (0..causes.len()).all(|k| stands(context, causes, &sizes, k));
     // Without the state it is seen sooner.
     Sizes::fitted(context, readings, causes).is_some_and(all)
@@ -122,12 +114,7 @@ fn sized<M: FittedModel>(
 }
 
 /// Whether one of the sizes that are told of a cause is known to better than itself.
-fn stands<M: FittedModel>(
-    context: &Context<'_, M>,
-    causes: &[Cause],
-    sizes: &Sizes,
-    which: usize,
-) -> bool {
+fn stands(context: &Context<'_>, causes: &[Cause], sizes: &Sizes, which: usize) -> bool {
     let shapes = context.catalogue[causes[which].effect].shape_parameters();
     let own = sizes.of(context, causes, which);
     let least = STANDS[usize::from(causes.len() > 1)];
@@ -140,11 +127,7 @@ fn stands<M: FittedModel>(
 /// of the strongest of them because its signature is not quite that of the true cause. Counted in
 /// the readings' own unit, as signatures differ, and not by the noise, under which a slow change
 /// shows less; of the strongest all that shows, as that is what a wrong signature errs by.
-fn weighty<M: FittedModel>(
-    context: &Context<'_, M>,
-    readings: &DVector<f64>,
-    causes: &[Cause],
-) -> bool {
+fn weighty(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) -> bool {
     let Some(changes) = context.changes(readings, causes) else {
         return false;
     };
@@ -166,11 +149,7 @@ fn weighty<M: FittedModel>(
 
 /// Whether each of several causes makes the prediction of held-out repeats better; a cause that
 /// happened once cannot be judged so.
-fn predicts<M: FittedModel>(
-    context: &Context<'_, M>,
-    readings: &DVector<f64>,
-    causes: &[Cause],
-) -> bool {
+fn predicts(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) -> bool {
     let noise = context.law.sigma().powi(2);
     let square = |causes: &[Cause]| {
         let signatures = raw_signatures(context, causes);
@@ -183,8 +162,8 @@ fn predicts<M: FittedModel>(
 }
 
 /// The effects that are adequate in the place of cause `k`, the best fit first.
-fn alternatives<M: FittedModel>(
-    context: &Context<'_, M>,
+fn alternatives(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     best: &[Cause],
     k: usize,
@@ -283,7 +262,7 @@ fn alternatives<M: FittedModel>(
 /// Drops what stands in the place of the member of greatest evidence by its freedom alone: what a search of
 /// relatives has freed beyond the dictionary must pay for it, and so must unknowns by which it explains no
 /// more than chance.
-fn drop_outdone<M: FittedModel>(context: &Context<'_, M>, members: &mut Vec<Member>, k: usize) {
+fn drop_outdone(context: &Context<'_>, members: &mut Vec<Member>, k: usize) {
     let known = |m: &Member| (m.evidence, m.causes[k].unknowns(), m.misfit);
     let leader = members.iter().map(known);
     let Some((most, fewest, misfit)) = leader.max_by(|a, b| a.0.total_cmp(&b.0)) else {
@@ -305,7 +284,7 @@ fn drop_outdone<M: FittedModel>(context: &Context<'_, M>, members: &mut Vec<Memb
 
 /// Drops what holds the signature of the member of greatest evidence among others of its own that explain no
 /// more than chance: it is that member, and something that is not seen.
-fn drop_holders<M: FittedModel>(context: &Context<'_, M>, members: &mut Vec<Member>, k: usize) {
+fn drop_holders(context: &Context<'_>, members: &mut Vec<Member>, k: usize) {
     let Some(most) =
         (0..members.len()).max_by(|a, b| members[*a].evidence.total_cmp(&members[*b].evidence))
     else {
@@ -328,8 +307,8 @@ fn drop_holders<M: FittedModel>(context: &Context<'_, M>, members: &mut Vec<Memb
 
 /// Brings the greatest evidence of each group to its front and makes it the cause, where these causes
 /// pass together too; else the cause that was kept goes first.
-fn led_by_evidence<M: FittedModel>(
-    context: &Context<'_, M>,
+fn led_by_evidence(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     groups: &mut [Vec<Alternative>],
     best: &mut Vec<Cause>,
@@ -368,8 +347,8 @@ fn led_by_evidence<M: FittedModel>(
 
 /// Logarithm of the evidence for cause `k` beside the others against nothing in its place, by the
 /// misfit that all of them leave (Schwarz, Ann. Statist. 6 (1978) 461).
-fn evidence<M: FittedModel>(
-    context: &Context<'_, M>,
+fn evidence(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     k: usize,
@@ -381,8 +360,8 @@ fn evidence<M: FittedModel>(
 }
 
 /// The greatest amplitude of a cause as a part of the plausible one.
-fn part_of_plausible<M: FittedModel>(
-    context: &Context<'_, M>,
+fn part_of_plausible(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     k: usize,
@@ -400,8 +379,8 @@ fn part_of_plausible<M: FittedModel>(
 }
 
 /// Whether a cause beside others has a physically possible size.
-pub(in crate::diagnosis) fn possible<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn possible(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     others: &[Cause],
     cause: &Cause,

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use errsep_models::model::{Column, Effect, FittedModel, Shape};
+use errsep_models::model::{AnyModel, Column, Effect, Shape};
 use nalgebra::{DMatrix, DVector};
 
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use crate::diagnosis::detection::dictionary::{
 };
 use crate::diagnosis::detection::folding::Sums;
 use crate::diagnosis::detection::null::NullLaw;
-use crate::diagnosis::detection::space::{Space, orthonormal};
+use crate::diagnosis::detection::space::{Space, inner_products, orthonormal};
 use crate::diagnosis::levels::{ADEQUATE, FAR, SEPARABLE, SLACK};
 use crate::diagnosis::noise::law::NoiseLaw;
 
@@ -21,9 +21,9 @@ use crate::diagnosis::noise::law::NoiseLaw;
 const WIDTH: usize = 8;
 
 /// Everything that is fixed while causes are sought.
-pub(in crate::diagnosis) struct Context<'a, M: FittedModel> {
-    pub model: &'a M,
-    pub catalogue: &'a [Box<dyn Effect<M>>],
+pub(in crate::diagnosis) struct Context<'a> {
+    pub model: &'a AnyModel,
+    pub catalogue: &'a [Box<dyn Effect<AnyModel>>],
     pub law: NoiseLaw,
     pub space: Space,
     pub dictionary: Dictionary,
@@ -59,11 +59,11 @@ pub(in crate::diagnosis) struct Remainder {
     best: Vec<OnceLock<(f64, Option<usize>)>>,
 }
 
-impl<'a, M: FittedModel> Context<'a, M> {
+impl<'a> Context<'a> {
     /// A context with a null law of its own.
     pub fn new(
-        model: &'a M,
-        catalogue: &'a [Box<dyn Effect<M>>],
+        model: &'a AnyModel,
+        catalogue: &'a [Box<dyn Effect<AnyModel>>],
         law: NoiseLaw,
         draws: usize,
         seed: u64,
@@ -93,7 +93,7 @@ impl<'a, M: FittedModel> Context<'a, M> {
     /// The context of another state and law of noise of the same readings. The null law is kept: it
     /// is one of standardised scores, so it knows the noise only through the angles between the
     /// signatures, and a state some hundredths away leaves those as they are.
-    pub fn moved<'b>(&self, model: &'b M, law: NoiseLaw) -> Context<'b, M>
+    pub fn moved<'b>(&self, model: &'b AnyModel, law: NoiseLaw) -> Context<'b>
     where
         'a: 'b,
     {
@@ -117,7 +117,7 @@ impl<'a, M: FittedModel> Context<'a, M> {
     }
 
     /// A cause of the catalogue at a shape, by the signature at a state of the model.
-    pub fn cause(&self, state: &M, effect: usize, shape: Shape) -> Cause {
+    pub fn cause(&self, state: &AnyModel, effect: usize, shape: Shape) -> Cause {
         let columns = self.catalogue[effect].columns(state, &shape);
         Cause {
             effect,
@@ -149,7 +149,7 @@ impl<'a, M: FittedModel> Context<'a, M> {
         let freedom = self.space.degrees_of_freedom() as f64;
         let most = freedom + FAR * (2.0 * freedom).sqrt();
         let mut open = self.open(readings, causes);
-        let along = basis.tr_mul(&open);
+        let along = inner_products(&basis, &open);
         open.gemm(-1.0, &basis, &along, 1.0);
         let far = |residual: &DVector<f64>| plain.residual.dot(residual) > most;
         if far(&plain.residual) && far(&Doubt::of_open(&open).trusted(&plain.residual)) {
@@ -376,8 +376,8 @@ pub(in crate::diagnosis) fn stack(causes: &[Cause], readings: usize) -> DMatrix<
 }
 
 /// Signatures as they stand in the readings, readings × amplitudes.
-pub(in crate::diagnosis) fn raw_signatures<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn raw_signatures(
+    context: &Context<'_>,
     causes: &[Cause],
 ) -> DMatrix<f64> {
     let n = context.space.readings();

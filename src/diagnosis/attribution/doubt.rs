@@ -11,13 +11,14 @@
 
 use std::sync::{Arc, OnceLock};
 
-use errsep_models::model::{Column, FittedModel};
+use errsep_models::model::{AnyModel, Column, FittedModel};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::context::{Cause, Context};
+use crate::diagnosis::detection::space::inner_products;
 
 /// Draws of the state.
 pub(in crate::diagnosis) const DRAWS: usize = 128;
@@ -50,7 +51,7 @@ impl Doubt {
     /// (I + W Wᵀ)⁻¹ = I − Q Qᵀ with Q = W L⁻ᵀ and L Lᵀ = I + WᵀW.
     pub fn of_open(changes: &DMatrix<f64>) -> Self {
         let count = changes.ncols();
-        let gram = DMatrix::identity(count, count) + changes.tr_mul(changes);
+        let gram = DMatrix::identity(count, count) + inner_products(changes, changes);
         let Some(root) = gram.cholesky().filter(|_| count > 0) else {
             return Self::default();
         };
@@ -96,7 +97,7 @@ pub(in crate::diagnosis) struct StateDraws {
     pub moved_as_read: DMatrix<f64>,
 }
 
-impl<M: FittedModel> Context<'_, M> {
+impl Context<'_> {
     /// The noise of all draws.
     fn noise_draws(&self) -> Arc<NoiseDraws> {
         let drawn = |draw: u64| {
@@ -182,7 +183,7 @@ impl<M: FittedModel> Context<'_, M> {
     pub fn columns_at(
         &self,
         which: usize,
-        (state, read): (&M, &M),
+        (state, read): (&AnyModel, &AnyModel),
         causes: &[Cause],
         changes: &DMatrix<f64>,
     ) -> Vec<Column> {
@@ -228,7 +229,7 @@ impl<M: FittedModel> Context<'_, M> {
             return Doubt::of_open(&open);
         };
         let mut moved = self.space.forward(moved).0;
-        let along = basis.tr_mul(&moved);
+        let along = inner_products(basis, &moved);
         moved.gemm(-1.0, basis, &along, 1.0);
         if open.ncols() > 0 {
             let at = open.ncols();
@@ -237,7 +238,7 @@ impl<M: FittedModel> Context<'_, M> {
                 .copy_from(&(moved / (draws as f64).sqrt()));
             return Doubt::of_open(&all);
         }
-        let eigen = SymmetricEigen::new(moved.tr_mul(&moved) / draws as f64);
+        let eigen = SymmetricEigen::new(inner_products(&moved, &moved) / draws as f64);
         let mut order: Vec<usize> = (0..draws)
             .filter(|k| eigen.eigenvalues[*k] > LEAST)
             .collect();
@@ -257,8 +258,8 @@ impl<M: FittedModel> Context<'_, M> {
 }
 
 /// What drawn states are made of.
-struct States<'s, M: FittedModel> {
-    context: &'s Context<'s, M>,
+struct States<'s> {
+    context: &'s Context<'s>,
     readings: &'s DVector<f64>,
     causes: &'s [Cause],
     amplitudes: &'s DVector<f64>,
@@ -266,9 +267,9 @@ struct States<'s, M: FittedModel> {
     noise: &'s NoiseDraws,
 }
 
-impl<M: FittedModel> States<'_, M> {
+impl States<'_> {
     /// What each cause changes at a state, and at the state as read, readings × causes.
-    fn change_at(&self, states: (&M, &M)) -> DMatrix<f64> {
+    fn change_at(&self, states: (&AnyModel, &AnyModel)) -> DMatrix<f64> {
         let mut changed = DMatrix::zeros(self.readings.len(), self.causes.len());
         let mut at = 0;
         for (k, mut changed) in changed.column_iter_mut().enumerate() {
@@ -288,7 +289,12 @@ impl<M: FittedModel> States<'_, M> {
 
     /// The state fitted to noisy readings less a change, and the same with a draw of what its smoothing may
     /// have taken away.
-    fn fitted(&self, draw: usize, noisy: &DVector<f64>, change: &DMatrix<f64>) -> (M, M) {
+    fn fitted(
+        &self,
+        draw: usize,
+        noisy: &DVector<f64>,
+        change: &DMatrix<f64>,
+    ) -> (AnyModel, AnyModel) {
         let clean = self.context.without(noisy, self.causes, change);
         let fitted = self.context.model.refit_as_smooth(clean);
         let state = match &self.noise.away[draw] {

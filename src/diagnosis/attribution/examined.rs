@@ -1,6 +1,6 @@
 //! Detection and attribution in their order, and what they come to before it is put in words.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::attribution::attribute::{attribute, roughly};
@@ -10,8 +10,8 @@ use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::noise::law::NoiseLaw;
 
 /// What a diagnosis has come to before it is put in words.
-pub(in crate::diagnosis) struct Examined<'a, M: FittedModel> {
-    pub context: &'a Context<'a, M>,
+pub(in crate::diagnosis) struct Examined<'a> {
+    pub context: &'a Context<'a>,
     pub readings: &'a DVector<f64>,
     pub first: &'a Remainder,
     /// Probability of as much standing out with nothing there.
@@ -21,11 +21,11 @@ pub(in crate::diagnosis) struct Examined<'a, M: FittedModel> {
 
 /// Causes bend the fitted state and swell the noise; both are found again without them, and the
 /// diagnosis is made once more from there.
-pub(in crate::diagnosis) fn examined<M: FittedModel, R>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn examined<R>(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     false_alarm: f64,
-    then: impl FnOnce(Examined<'_, M>) -> R,
+    then: impl FnOnce(Examined<'_>) -> R,
 ) -> R {
     let first = context.remainder(readings, &[]);
     let detected = context.detection(&first);
@@ -55,11 +55,11 @@ pub(in crate::diagnosis) fn examined<M: FittedModel, R>(
 
 /// State and noise without what causes change in the readings, readings × causes, and the readings seen
 /// from there. `context` is that of the readings as they came.
-pub(in crate::diagnosis) fn afresh<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn afresh(
+    context: &Context<'_>,
     found: &[Cause],
     changes: Option<&DMatrix<f64>>,
-) -> (M, NoiseLaw, DVector<f64>) {
+) -> (AnyModel, NoiseLaw, DVector<f64>) {
     let observed = context.model.observed();
     let (change, state) = match changes {
         Some(changes) => {

@@ -1,14 +1,14 @@
 //! Causes that are freer than what they show: at the limit of their freedom they are another effect.
 
-use errsep_models::model::{FittedModel, Shape};
+use errsep_models::model::Shape;
 use nalgebra::DVector;
 
 use crate::diagnosis::attribution::context::{Cause, Context};
 
 /// Whether the evidence for cause `k` of several is greater than that for its limit (Schwarz, Ann. Statist.
 /// 6 (1978) 461).
-pub(in crate::diagnosis) fn is_beyond_limit<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn is_beyond_limit(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     k: usize,

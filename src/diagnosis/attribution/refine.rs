@@ -1,11 +1,11 @@
 //! The best member of an effect's family beside other causes, from a start.
 
-use errsep_models::model::{Effect, FittedModel, Shape};
+use errsep_models::model::{AnyModel, Effect, Shape};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::attribution::context::{Cause, Context, as_matrix, column, span};
 use crate::diagnosis::detection::dictionary::{inverse, is_positive, products, statistic};
-use crate::diagnosis::levels::UNSEARCHED;
+use crate::diagnosis::levels::{ALIKE, UNSEARCHED};
 use crate::diagnosis::search::{around, coordinate_search};
 
 /// Part of a shape's first step that its search settles to.
@@ -13,12 +13,12 @@ const PRECISION: f64 = 1e-2;
 /// How often values that come back are tried around their cycles.
 const ROUNDS: usize = 4;
 
-impl<M: FittedModel> Context<'_, M> {
+impl Context<'_> {
     /// The best shape of an effect beside other causes, from a start, and the statistic there; its
     /// relatives are tried too, and the one of greatest evidence is taken.
     pub fn refine(
         &self,
-        state: &M,
+        state: &AnyModel,
         readings: &DVector<f64>,
         effect: usize,
         start: &Shape,
@@ -40,13 +40,16 @@ impl<M: FittedModel> Context<'_, M> {
             .collect();
         // The best first: what it is searched to spares the search of many others.
         relatives.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut searched: Vec<usize> = Vec::new();
         for (here, own, other) in relatives {
             let (least, columns) = weighed(&shape, t);
+            let alike = searched.iter().filter(|v| **v == other.variant).count();
             // One that holds the other needs no search to be better; one of another kind does.
             let reach = if own == columns { UNSEARCHED * t } else { 0.0 };
-            if here <= least - reach {
+            if here <= least - reach || alike >= ALIKE {
                 continue;
             }
+            searched.push(other.variant);
             let (found, own_t) = seen.searched(&other);
             if weighed(&found, own_t).0 > least {
                 (shape, t) = (found, own_t);
@@ -59,7 +62,7 @@ impl<M: FittedModel> Context<'_, M> {
     /// cause as it is where none does.
     pub fn come_back(
         &self,
-        state: &M,
+        state: &AnyModel,
         readings: &DVector<f64>,
         (cause, t): (Cause, f64),
         beside: &[Cause],
@@ -76,7 +79,7 @@ impl<M: FittedModel> Context<'_, M> {
     /// As [`Context::refine`], without relatives.
     pub fn refine_alone(
         &self,
-        state: &M,
+        state: &AnyModel,
         readings: &DVector<f64>,
         effect: usize,
         start: &Shape,
@@ -88,18 +91,18 @@ impl<M: FittedModel> Context<'_, M> {
 }
 
 /// An effect as it is seen beside other causes at a state of the model.
-struct Seen<'s, M: FittedModel> {
-    context: &'s Context<'s, M>,
-    effect: &'s dyn Effect<M>,
-    state: &'s M,
+struct Seen<'s> {
+    context: &'s Context<'s>,
+    effect: &'s dyn Effect<AnyModel>,
+    state: &'s AnyModel,
     adjoint: DVector<f64>,
     directions: Vec<DVector<f64>>,
 }
 
-impl<'s, M: FittedModel> Seen<'s, M> {
+impl<'s> Seen<'s> {
     fn of(
-        context: &'s Context<'s, M>,
-        state: &'s M,
+        context: &'s Context<'s>,
+        state: &'s AnyModel,
         readings: &DVector<f64>,
         effect: usize,
         beside: &[Cause],

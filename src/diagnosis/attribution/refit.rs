@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::attribution::context::{Cause, Context, finer};
@@ -21,7 +21,7 @@ const MANY: usize = 12;
 /// Most rounds of fitting the state without the causes.
 const ROUNDS: usize = 16;
 
-impl<M: FittedModel> Context<'_, M> {
+impl Context<'_> {
     /// Causes bend the state at which their signatures are taken: takes their change out of the
     /// readings, fits the model again and refines each there, until the change rests. The rounds
     /// are those of a fixed point, sped up by Anderson's mixing; the best fit seen is kept. They
@@ -78,7 +78,7 @@ impl<M: FittedModel> Context<'_, M> {
     /// A cause at another state, its shape kept but for what its size makes of it.
     fn at_rest(
         &self,
-        state: &M,
+        state: &AnyModel,
         readings: &DVector<f64>,
         cause: &Cause,
         others: &[Cause],
@@ -95,10 +95,10 @@ impl<M: FittedModel> Context<'_, M> {
     pub fn seen_by<'s>(
         &self,
         which: usize,
-        state: &'s M,
+        state: &'s AnyModel,
         causes: &[Cause],
         changes: &DMatrix<f64>,
-    ) -> Cow<'s, M> {
+    ) -> Cow<'s, AnyModel> {
         let link = |k: usize| self.catalogue[causes[k].effect].link();
         let mut sum = DVector::zeros(self.space.readings());
         let mut any = false;

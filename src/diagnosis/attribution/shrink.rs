@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -54,7 +54,7 @@ pub(in crate::diagnosis) struct GapMeter {
 }
 
 impl GapMeter {
-    pub fn new<M: FittedModel>(model: &M, law: &NoiseLaw, seed: u64) -> Self {
+    pub fn new(model: &AnyModel, law: &NoiseLaw, seed: u64) -> Self {
         let space = Space::new(model, &unit_noise());
         let noise = draws(model, law, seed);
         let scatter = scatter_draws(model, seed);
@@ -122,9 +122,9 @@ impl GapMeter {
     }
 
     /// Held-out repeats: fit and amplitudes on half of them, the gap on the others.
-    pub fn held_out<M: FittedModel>(
+    pub fn held_out(
         &self,
-        model: &M,
+        model: &AnyModel,
         readings: &DVector<f64>,
         signatures: &DMatrix<f64>,
     ) -> Option<HeldOut> {
@@ -169,8 +169,8 @@ impl GapMeter {
 
 /// Mean square of what a model with effects misses of held-out repeats; nothing where they are
 /// too few, or where an effect does not show in every half.
-pub(in crate::diagnosis) fn held_out_square<M: FittedModel>(
-    model: &M,
+pub(in crate::diagnosis) fn held_out_square(
+    model: &AnyModel,
     readings: &DVector<f64>,
     signatures: &DMatrix<f64>,
     noise: f64,
@@ -185,7 +185,7 @@ pub(in crate::diagnosis) fn held_out_square<M: FittedModel>(
 }
 
 /// The ways in which the repeats are split.
-fn splits<M: FittedModel>(model: &M) -> Option<Vec<Split>> {
+fn splits(model: &AnyModel) -> Option<Vec<Split>> {
     let repeats: Vec<u32> = model
         .places()
         .iter()
@@ -254,7 +254,7 @@ struct SplitFit<'a> {
 }
 
 impl Split {
-    fn new<M: FittedModel>(model: &M, inside: impl Fn(usize) -> bool) -> Option<Self> {
+    fn new(model: &AnyModel, inside: impl Fn(usize) -> bool) -> Option<Self> {
         let (chosen, others): (Vec<usize>, Vec<usize>) =
             (0..model.traces().len()).partition(|t| inside(*t));
         if chosen.is_empty() || others.is_empty() {
@@ -392,14 +392,14 @@ impl SplitFit<'_> {
 }
 
 /// Noise of the law for all readings, readings × draws.
-fn draws<M: FittedModel>(model: &M, law: &NoiseLaw, seed: u64) -> DMatrix<f64> {
+fn draws(model: &AnyModel, law: &NoiseLaw, seed: u64) -> DMatrix<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x006e_6f69_7365);
     let columns: Vec<DVector<f64>> = (0..DRAWS).map(|_| law.draw(model, &mut random)).collect();
     DMatrix::from_columns(&columns)
 }
 
 /// The scatter that the model expects, readings × draws; no columns where it expects none.
-fn scatter_draws<M: FittedModel>(model: &M, seed: u64) -> DMatrix<f64> {
+fn scatter_draws(model: &AnyModel, seed: u64) -> DMatrix<f64> {
     let count = if model.expected_scatter().is_empty() {
         0
     } else {

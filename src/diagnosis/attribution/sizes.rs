@@ -40,8 +40,8 @@ pub(in crate::diagnosis) enum Unknown {
 
 impl Sizes {
     /// Causes at fixed signatures.
-    pub fn fitted<M: FittedModel>(
-        context: &Context<'_, M>,
+    pub fn fitted(
+        context: &Context<'_>,
         readings: &DVector<f64>,
         causes: &[Cause],
     ) -> Option<Self> {
@@ -63,8 +63,8 @@ impl Sizes {
     }
 
     /// The same where signatures depend on the sizes and on the state.
-    pub fn fitted_with_state<M: FittedModel>(
-        context: &Context<'_, M>,
+    pub fn fitted_with_state(
+        context: &Context<'_>,
         readings: &DVector<f64>,
         causes: &[Cause],
     ) -> Option<Self> {
@@ -106,12 +106,7 @@ impl Sizes {
     }
 
     /// What is reported of one of the causes.
-    pub fn of<M: FittedModel>(
-        &self,
-        context: &Context<'_, M>,
-        causes: &[Cause],
-        which: usize,
-    ) -> Vec<Estimate> {
+    pub fn of(&self, context: &Context<'_>, causes: &[Cause], which: usize) -> Vec<Estimate> {
         let cause = &causes[which];
         let (effect, shape) = (&context.catalogue[cause.effect], &cause.shape);
         let first = first_amplitude(causes, which);
@@ -156,8 +151,8 @@ pub(in crate::diagnosis) fn first_amplitude(causes: &[Cause], which: usize) -> u
 }
 
 /// Signatures and their derivatives by the shapes, and what they belong to.
-fn instruments<M: FittedModel>(
-    context: &Context<'_, M>,
+fn instruments(
+    context: &Context<'_>,
     causes: &[Cause],
     amplitudes: &DVector<f64>,
 ) -> (DMatrix<f64>, Vec<Unknown>) {
@@ -207,8 +202,8 @@ pub(in crate::diagnosis) fn beside(cause: &Cause, parameter: usize) -> Option<(S
 
 /// The whitened, projected change by causes of given amplitudes, at the state that is left without
 /// them.
-fn predicted<M: FittedModel>(
-    context: &Context<'_, M>,
+fn predicted(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     amplitudes: &DVector<f64>,

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use errsep_models::model::{Column, Effect, FittedModel, Shape};
+use errsep_models::model::{AnyModel, Column, Effect, FittedModel, Shape};
 use nalgebra::{DMatrix, DMatrixView, DVector, RealField};
 use rayon::prelude::*;
 
@@ -84,7 +84,7 @@ pub struct Places {
 
 impl Places {
     /// All places at which a model's readings can be looked.
-    pub fn new<M: FittedModel>(model: &M) -> Self {
+    pub fn new(model: &AnyModel) -> Self {
         let folding = Folding::new(model.places());
         let axes = scan_items(model)
             .into_iter()
@@ -128,9 +128,9 @@ pub struct Dictionary {
 
 impl Dictionary {
     /// All signatures of a catalogue and all places to look at.
-    pub fn new<M: FittedModel>(
-        model: &M,
-        catalogue: &[Box<dyn Effect<M>>],
+    pub fn new(
+        model: &AnyModel,
+        catalogue: &[Box<dyn Effect<AnyModel>>],
         places: Arc<Places>,
         space: &Space,
     ) -> Self {
@@ -192,7 +192,7 @@ impl Dictionary {
 }
 
 /// Whether only positive amplitudes of an effect are possible.
-pub(in crate::diagnosis) fn is_positive<M>(effect: &dyn Effect<M>, shape: &Shape) -> bool {
+pub(in crate::diagnosis) fn is_positive(effect: &dyn Effect<AnyModel>, shape: &Shape) -> bool {
     matches!(effect.amplitudes_at(shape).as_slice(), [only] if only.low >= 0.0)
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -20,10 +20,7 @@ const NEIGHBOUR_DRAWS: usize = 64;
 
 /// The law that is stated, or that the repeats of a model's readings follow, or what stands in
 /// for it.
-pub(in crate::diagnosis) fn estimate<M: FittedModel>(
-    model: &M,
-    readings: &DVector<f64>,
-) -> NoiseLaw {
+pub(in crate::diagnosis) fn estimate(model: &AnyModel, readings: &DVector<f64>) -> NoiseLaw {
     if let Some(sigma) = model.stated_noise() {
         return NoiseLaw::white(sigma, f64::INFINITY, NoiseSource::Stated);
     }
@@ -45,7 +42,7 @@ pub(in crate::diagnosis) fn estimate<M: FittedModel>(
 
 /// White noise from second differences of the residuals, (e₋ − 2e₀ + e₊)/√6, by their median. What
 /// the fit leaves of white noise in them, and how well they tell it, is drawn.
-fn neighbours<M: FittedModel>(model: &M, readings: &DVector<f64>, floor: f64) -> NoiseLaw {
+fn neighbours(model: &AnyModel, readings: &DVector<f64>, floor: f64) -> NoiseLaw {
     let space = Space::new(
         model,
         &NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated),
@@ -100,8 +97,8 @@ pub(in crate::diagnosis) struct Scatter {
 }
 
 /// The scatter of neighbours in readings free of causes, where there are enough of them.
-pub(in crate::diagnosis) fn neighbour_scatter<M: FittedModel>(
-    model: &M,
+pub(in crate::diagnosis) fn neighbour_scatter(
+    model: &AnyModel,
     law: &NoiseLaw,
     clean: &DVector<f64>,
 ) -> Option<Scatter> {

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use errsep_models::model::{Column, FittedModel, Place};
+use errsep_models::model::{AnyModel, Column, FittedModel, Place};
 
 /// A place along one axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +25,7 @@ fn hat(at: f64, centre: f64, half: f64) -> f64 {
 }
 
 /// All places to look at, by axis.
-pub(in crate::diagnosis) fn scan_items<M: FittedModel>(model: &M) -> Vec<(&'static str, Items)> {
+pub(in crate::diagnosis) fn scan_items(model: &AnyModel) -> Vec<(&'static str, Items)> {
     let scan = Scan::new(model);
     vec![
         ("pattern", scan.patterns()),
@@ -40,8 +40,8 @@ pub(in crate::diagnosis) fn scan_items<M: FittedModel>(model: &M) -> Vec<(&'stat
     .collect()
 }
 
-struct Scan<'a, M> {
-    model: &'a M,
+struct Scan<'a, AnyModel> {
+    model: &'a AnyModel,
     places: &'a [Place],
     first: f64,
     last: f64,
@@ -51,8 +51,8 @@ struct Scan<'a, M> {
     weights: Vec<(String, Vec<f64>)>,
 }
 
-impl<'a, M: FittedModel> Scan<'a, M> {
-    fn new(model: &'a M) -> Self {
+impl<'a> Scan<'a, AnyModel> {
+    fn new(model: &'a AnyModel) -> Self {
         let places = model.places();
         let first = places.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
         let last = places.iter().map(|p| p.x).fold(f64::NEG_INFINITY, f64::max);

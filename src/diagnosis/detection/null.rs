@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::AnyModel;
 use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -74,8 +74,8 @@ impl Tail {
 
 impl NullLaw {
     /// The law under a space and a dictionary, from a number of draws.
-    pub fn simulate<M: FittedModel>(
-        model: &M,
+    pub fn simulate(
+        model: &AnyModel,
         dictionary: &Dictionary,
         space: &Space,
         law: &NoiseLaw,
@@ -179,8 +179,8 @@ impl NullLaw {
 }
 
 /// The greatest score of each family, and last the misfit, in each draw of one batch.
-fn greatest<M: FittedModel>(
-    model: &M,
+fn greatest(
+    model: &AnyModel,
     dictionary: &Dictionary,
     space: &Space,
     (law, spikes): (&NoiseLaw, &Spikes),

@@ -8,7 +8,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use errsep_models::model::{Column, FittedModel, Profiles};
+use errsep_models::model::{AnyModel, Column, FittedModel, Freedom, Profiles, Record};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::detection::scatter::ScatterRoot;
@@ -17,6 +17,9 @@ use crate::diagnosis::noise::whitening::Whitening;
 
 /// Columns that project to less than this part of their length lie in the span of the others.
 const DEPENDENT: f64 = 1e-7;
+
+/// Columns below which products are taken one by one.
+const FEW: usize = 8;
 
 /// The whitened space of one set of readings under one model and one law of noise.
 #[derive(Debug, Clone)]
@@ -48,28 +51,37 @@ impl Space {
 
     /// The space of all readings, in units of the noise and of the scatter that the model expects.
     /// (Profiles that are free at every position and such scatter do not go together.)
-    pub fn expecting<M: FittedModel>(model: &M, law: &NoiseLaw) -> Self {
+    pub fn expecting(model: &AnyModel, law: &NoiseLaw) -> Self {
         let all: Vec<usize> = (0..model.traces().len()).collect();
-        Self::made(model, law, &all, model.expected_scatter())
+        Self::made(
+            model.record(),
+            &model.freedom(),
+            law,
+            &all,
+            model.expected_scatter(),
+        )
     }
 
     /// The space of the readings of some traces, in the order of those traces.
     pub fn of_traces<M: FittedModel>(model: &M, law: &NoiseLaw, chosen: &[usize]) -> Self {
-        Self::made(model, law, chosen, &[])
+        Self::made(model.record(), &model.freedom(), law, chosen, &[])
     }
 
     /// The same with the scatter that the model expects.
-    pub fn of_traces_expecting<M: FittedModel>(
-        model: &M,
-        law: &NoiseLaw,
-        chosen: &[usize],
-    ) -> Self {
-        Self::made(model, law, chosen, model.expected_scatter())
+    pub fn of_traces_expecting(model: &AnyModel, law: &NoiseLaw, chosen: &[usize]) -> Self {
+        Self::made(
+            model.record(),
+            &model.freedom(),
+            law,
+            chosen,
+            model.expected_scatter(),
+        )
     }
 
     /// `scatter`: by the rows of all readings.
-    fn made<M: FittedModel>(
-        model: &M,
+    fn made(
+        record: &Record,
+        freedom: &Freedom,
         law: &NoiseLaw,
         chosen: &[usize],
         scatter: &[Column],
@@ -80,8 +92,8 @@ impl Space {
         let mut rows = Vec::new();
         let mut start = 0;
         for &t in chosen {
-            let trace = model.traces()[t].clone();
-            let x: Vec<f64> = model.places()[trace.clone()].iter().map(|p| p.x).collect();
+            let trace = record.traces[t].clone();
+            let x: Vec<f64> = record.places[trace.clone()].iter().map(|p| p.x).collect();
             let known = cache.iter().find(|(positions, _)| *positions == x);
             let inverse = if let Some((_, inverse)) = known {
                 Arc::clone(inverse)
@@ -95,7 +107,6 @@ impl Space {
             start += trace.len();
             rows.extend(trace);
         }
-        let freedom = model.freedom();
         let trace_of = traces
             .iter()
             .enumerate()
@@ -114,7 +125,7 @@ impl Space {
         };
         if !scatter.is_empty() {
             let whitened = scatter.iter().map(|column| {
-                let mut all = DVector::<f64>::zeros(model.places().len());
+                let mut all = DVector::<f64>::zeros(record.places.len());
                 for (&row, &value) in column.rows.iter().zip(&column.values) {
                     all[row] += value;
                 }
@@ -130,8 +141,8 @@ impl Space {
         let sizes: Vec<f64> = whitened.column_iter().map(|c| c.norm()).collect();
         if let Some(profiles) = &freedom.profiles {
             let x: Vec<f64> = chosen.first().map_or_else(Vec::new, |t| {
-                let trace = model.traces()[*t].clone();
-                model.places()[trace].iter().map(|p| p.x).collect()
+                let trace = record.traces[*t].clone();
+                record.places[trace].iter().map(|p| p.x).collect()
             });
             space.free_profiles(profiles, chosen, &law.covariance(&x));
         }
@@ -206,7 +217,7 @@ impl Space {
         let Some(patterns) = &self.patterns else {
             return;
         };
-        let given_back = self.returned.tr_mul(columns);
+        let given_back = inner_products(&self.returned, columns);
         let length = self.traces.first().map_or(0, Range::len);
         let functions = patterns.ncols();
         let count = columns.ncols();
@@ -232,7 +243,7 @@ impl Space {
     fn project(&self, columns: &mut DMatrix<f64>) {
         self.project_profiles(columns);
         if self.absorbed.ncols() > 0 {
-            let along = self.absorbed.tr_mul(columns);
+            let along = inner_products(&self.absorbed, columns);
             columns.gemm(-1.0, &self.absorbed, &along, 1.0);
         }
     }
@@ -414,6 +425,15 @@ impl Part {
         };
         whole - self.sums.dot(&other.sums) + self.returned.dot(&other.returned)
             - self.absorbed.dot(&other.absorbed)
+    }
+}
+
+/// AᵀB of tall matrices, by blocks where there are many products.
+pub(in crate::diagnosis) fn inner_products(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    if a.ncols().min(b.ncols()) < FEW {
+        a.tr_mul(b)
+    } else {
+        a.transpose() * b
     }
 }
 

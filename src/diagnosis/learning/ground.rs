@@ -1,7 +1,7 @@
 //! What a smooth curve may be a function of, and its cubic B-splines over that.
 
 use errsep_models::basis::bspline::CubicBSpline;
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::catalogue::curve::{Along, Way};
@@ -27,7 +27,7 @@ pub(super) struct Ground {
 
 impl Ground {
     /// All ways of a model, those of few curves first, and of these what is the same in another campaign.
-    pub fn all<M: FittedModel>(model: &M) -> Vec<Self> {
+    pub fn all(model: &AnyModel) -> Vec<Self> {
         let backward = model.places().iter().any(|p| p.direction < 0.0);
         let forward = model.places().iter().any(|p| p.direction >= 0.0);
         let both = backward && forward;
@@ -51,12 +51,7 @@ impl Ground {
         grounds
     }
 
-    fn new<M: FittedModel>(
-        model: &M,
-        along: Along,
-        by_direction: bool,
-        by_channel: bool,
-    ) -> Option<Self> {
+    fn new(model: &AnyModel, along: Along, by_direction: bool, by_channel: bool) -> Option<Self> {
         let values = along.values(model);
         let mut curves = Vec::new();
         let mut curve_of = Vec::with_capacity(values.len());

@@ -1,6 +1,6 @@
 //! The gap as an effect of its own: smooth, orthogonal to the model, with its band.
 
-use errsep_models::model::{Effect, FittedModel, Shape};
+use errsep_models::model::{AnyModel, Effect, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
@@ -80,11 +80,11 @@ impl NotLearnt {
     }
 }
 
-/// Learns what a model leaves of its readings, whatever the verdict on them.
-///
-/// # Errors
-/// No repeats, or no smooth curve that held-out repeats confirm and that leaves nothing.
-pub fn learn<M: FittedModel>(model: &M, options: &Options) -> Result<Learnt, NotLearnt> {
+/// See [`crate::diagnosis::learn`].
+pub(in crate::diagnosis) fn learn(
+    model: &AnyModel,
+    options: &Options,
+) -> Result<Learnt, NotLearnt> {
     let (calmed, calm) = calmed(model);
     let model = calmed.as_ref().unwrap_or(model);
     let grounds = Ground::all(model);
@@ -141,8 +141,8 @@ struct Bound<'g> {
     spread: [DMatrix<f64>; 2],
 }
 
-fn bound<'g, M: FittedModel>(
-    model: &M,
+fn bound<'g>(
+    model: &AnyModel,
     law: &NoiseLaw,
     readings: &DVector<f64>,
     grounds: &'g [Ground],
@@ -174,7 +174,7 @@ impl Bound<'_> {
         self.ground.columns() * &self.coefficients
     }
 
-    fn effect<M: FittedModel>(&self, model: &M) -> Tabulated {
+    fn effect(&self, model: &AnyModel) -> Tabulated {
         let channels = model.channel_names();
         let points = self.ground.points();
         let at = |which: usize, spread: &DMatrix<f64>| -> Vec<Vec<f64>> {
@@ -207,14 +207,14 @@ impl Bound<'_> {
 }
 
 /// Probability of what remains beside an effect, and where most of it shows if that stands out.
-fn left_beside<M: FittedModel>(
-    model: &M,
+fn left_beside(
+    model: &AnyModel,
     effect: &Tabulated,
     law: NoiseLaw,
     readings: &DVector<f64>,
     options: &Options,
 ) -> (f64, Option<String>) {
-    let catalogue: Vec<Box<dyn Effect<M>>> = vec![Box::new(effect.clone())];
+    let catalogue: Vec<Box<dyn Effect<AnyModel>>> = vec![Box::new(effect.clone())];
     let context = Context::new(model, &catalogue, law, options.draws, options.seed);
     let causes = [context.cause(model, 0, Shape::only())];
     let left = context.judged(readings, &causes);

@@ -7,6 +7,8 @@ mod smooth;
 mod tested;
 mod weighed;
 
-pub use learn::{Learnt, NotLearnt, learn};
-pub use tested::{Tested, tested};
+pub(super) use learn::learn;
+pub use learn::{Learnt, NotLearnt};
+pub use tested::Tested;
+pub(super) use tested::tested;
 pub use weighed::HeldOutAlong;

@@ -1,6 +1,6 @@
 //! How a learnt effect fares on a campaign that it was not learnt from.
 
-use errsep_models::model::{Effect, FittedModel, Shape};
+use errsep_models::model::{AnyModel, Effect, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -53,8 +53,12 @@ pub struct Tested {
     pub outside: f64,
 }
 
-/// Tests an effect of curves on readings; nothing where it was not learnt, or where nothing of it shows.
-pub fn tested<M: FittedModel>(model: &M, effect: &Tabulated, options: &Options) -> Option<Tested> {
+/// See [`crate::diagnosis::tested`].
+pub(in crate::diagnosis) fn tested(
+    model: &AnyModel,
+    effect: &Tabulated,
+    options: &Options,
+) -> Option<Tested> {
     let seen = effect.seen.clone()?;
     let (calmed, _) = calmed(model);
     let model = calmed.as_ref().unwrap_or(model);
@@ -113,8 +117,8 @@ pub fn tested<M: FittedModel>(model: &M, effect: &Tabulated, options: &Options) 
 /// What smooth curves explain of a residual, squared, each with its size fitted: bound to what the effect is
 /// bound to, as many as it has, independent, of a length log-uniform between two spacings of the points and
 /// the whole range.
-fn by_chance<M: FittedModel>(
-    model: &M,
+fn by_chance(
+    model: &AnyModel,
     effect: &Tabulated,
     space: &Space,
     residual: &DVector<f64>,
@@ -148,7 +152,7 @@ fn by_chance<M: FittedModel>(
 }
 
 /// What is drawn in place of an effect: its curves, or of a formula one curve over what it is a function of.
-fn curved<M: FittedModel>(model: &M, effect: &Tabulated) -> Tabulated {
+fn curved(model: &AnyModel, effect: &Tabulated) -> Tabulated {
     let Some(formula) = &effect.formula else {
         return effect.clone();
     };

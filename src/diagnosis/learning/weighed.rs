@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -59,7 +59,7 @@ struct Fold {
     left: [DVector<f64>; 2],
 }
 
-fn folds<M: FittedModel>(model: &M, law: &NoiseLaw, readings: &DVector<f64>) -> Vec<Fold> {
+fn folds(model: &AnyModel, law: &NoiseLaw, readings: &DVector<f64>) -> Vec<Fold> {
     let repeats: BTreeSet<u32> = model.places().iter().map(|p| p.repeat).collect();
     let repeats: Vec<u32> = repeats.into_iter().collect();
     // Two repeats are held out together where there are enough: what lies between them shows too. They are
@@ -130,8 +130,8 @@ fn apart(a: &[DVector<f64>], b: &[DVector<f64>]) -> f64 {
 /// the truth |e − a|² − |e − b|² has the standard deviation 2 |a − b|. Of the ways that are no worse than the
 /// best by more than that, the one of fewest curves is chosen (one standard error: Breiman and others,
 /// *Classification and Regression Trees* (1984), 3.4.3).
-pub(super) fn weighed<M: FittedModel>(
-    model: &M,
+pub(super) fn weighed(
+    model: &AnyModel,
     law: &NoiseLaw,
     space: &Space,
     grounds: &[Ground],

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal, StudentT};
@@ -52,9 +52,9 @@ impl Components {
     }
 
     /// Noise of all readings of a model.
-    pub(in crate::diagnosis) fn draw_all<M: FittedModel>(
+    pub(in crate::diagnosis) fn draw_all(
         &self,
-        model: &M,
+        model: &AnyModel,
         random: &mut ChaCha8Rng,
     ) -> DVector<f64> {
         let mut noise = DVector::zeros(model.places().len());
@@ -204,9 +204,9 @@ impl NoiseLaw {
     }
 
     /// Noise of all readings of a model.
-    pub(in crate::diagnosis) fn draw<M: FittedModel>(
+    pub(in crate::diagnosis) fn draw(
         &self,
-        model: &M,
+        model: &AnyModel,
         random: &mut ChaCha8Rng,
     ) -> DVector<f64> {
         self.components().draw_all(model, random)
@@ -214,9 +214,9 @@ impl NoiseLaw {
 
     /// Noise of all readings for a draw of the null law: by a law that the readings allow, with
     /// the tails of the readings, its spikes pulled in.
-    pub(in crate::diagnosis) fn draw_possible<M: FittedModel>(
+    pub(in crate::diagnosis) fn draw_possible(
         &self,
-        model: &M,
+        model: &AnyModel,
         spikes: &Spikes,
         draw: usize,
         random: &mut ChaCha8Rng,
@@ -274,8 +274,8 @@ impl NoiseLaw {
 }
 
 /// A draw of the scatter that the model expects beside the noise.
-pub(in crate::diagnosis) fn draw_scatter<M: FittedModel>(
-    model: &M,
+pub(in crate::diagnosis) fn draw_scatter(
+    model: &AnyModel,
     random: &mut ChaCha8Rng,
 ) -> DVector<f64> {
     let mut scatter = DVector::zeros(model.places().len());
@@ -290,8 +290,8 @@ pub(in crate::diagnosis) fn draw_scatter<M: FittedModel>(
 
 /// What the repeats say of a single reading's noise where it is stated: standard deviation and
 /// degrees of freedom.
-pub(in crate::diagnosis) fn of_repeats<M: FittedModel>(
-    model: &M,
+pub(in crate::diagnosis) fn of_repeats(
+    model: &AnyModel,
     readings: &DVector<f64>,
 ) -> Option<(f64, f64)> {
     let contrasts = Contrasts::new(model.places(), model.traces(), readings);

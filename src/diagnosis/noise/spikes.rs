@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -44,7 +44,7 @@ pub(in crate::diagnosis) struct Group {
 }
 
 /// Traces on the same cells in the same direction.
-pub(in crate::diagnosis) fn groups<M: FittedModel>(model: &M) -> impl Iterator<Item = Group> {
+pub(in crate::diagnosis) fn groups(model: &AnyModel) -> impl Iterator<Item = Group> {
     let mut groups: BTreeMap<(Vec<usize>, bool), Group> = BTreeMap::new();
     for trace in model.traces() {
         let places = &model.places()[trace.clone()];
@@ -79,7 +79,7 @@ struct Weight {
 }
 
 /// A model fitted to readings whose spikes are pulled in, where there are any, and what was done.
-pub(in crate::diagnosis) fn calmed<M: FittedModel>(model: &M) -> (Option<M>, Calmed) {
+pub(in crate::diagnosis) fn calmed(model: &AnyModel) -> (Option<AnyModel>, Calmed) {
     let readings = model.linearised();
     let calm = Spikes::new(model).calmed(model, &readings);
     let changed =
@@ -88,7 +88,7 @@ pub(in crate::diagnosis) fn calmed<M: FittedModel>(model: &M) -> (Option<M>, Cal
 }
 
 impl Spikes {
-    pub fn new<M: FittedModel>(model: &M) -> Self {
+    pub fn new(model: &AnyModel) -> Self {
         if model.names_single_readings() {
             return Self { groups: Vec::new() };
         }
@@ -100,7 +100,7 @@ impl Spikes {
     }
 
     /// The readings with their spikes pulled in, and the law of heavy tails if they have them.
-    pub fn calmed<M: FittedModel>(&self, model: &M, readings: &DVector<f64>) -> Calmed {
+    pub fn calmed(&self, model: &AnyModel, readings: &DVector<f64>) -> Calmed {
         let mut calmed = readings.clone();
         let count = self.pull_in(&mut calmed);
         let tails = self
@@ -121,12 +121,7 @@ impl Spikes {
     }
 
     /// How far Student's law is from the tails seen, and what it leaves when pulled in.
-    fn compared<M: FittedModel>(
-        &self,
-        model: &M,
-        freedom: f64,
-        seen: &Weight,
-    ) -> Option<(f64, Tails)> {
+    fn compared(&self, model: &AnyModel, freedom: f64, seen: &Weight) -> Option<(f64, Tails)> {
         let law = StudentT::new(freedom).ok()?;
         let mut random = ChaCha8Rng::seed_from_u64(SEED);
         let mut noise = DVector::from_fn(model.places().len(), |_, _| law.sample(&mut random));
@@ -292,10 +287,11 @@ mod tests {
     use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
     use rand_distr::StandardNormal;
 
-    fn model() -> Linearised {
+    fn model() -> AnyModel {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let scene = Scene::random(100, 4, 1e-5, 2.0, SceneNoise::default(), &mut random);
-        Linearised::new(&scene.exact(), Assumptions::default()).unwrap()
+        let fitted = Linearised::new(&scene.exact(), Assumptions::default()).unwrap();
+        AnyModel::new(&fitted)
     }
 
     /// Student's noise with three degrees of freedom is taken for 2.5 to 4, with 3200 readings, and

@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::DVector;
 
 use crate::diagnosis::levels::{KEPT, MOST_STEPS, STAYS, STAYS_FREEDOM, STEP};
@@ -20,10 +20,7 @@ struct Lifted {
 }
 
 /// Readings without steps of single repeats.
-pub(in crate::diagnosis) fn levelled<M: FittedModel>(
-    model: &M,
-    readings: &DVector<f64>,
-) -> DVector<f64> {
+pub(in crate::diagnosis) fn levelled(model: &AnyModel, readings: &DVector<f64>) -> DVector<f64> {
     let mut level = readings.clone();
     for group in groups(model).filter(|g| g.starts.len() > 1) {
         for _ in 0..MOST_STEPS {
@@ -72,7 +69,7 @@ impl Stayed {
 
 /// The step between the traces of a channel, in the order of time and each against the others of its
 /// direction, beside which next to nothing differs.
-fn later<M: FittedModel>(model: &M, own: &[&Group], readings: &DVector<f64>) -> Option<Stayed> {
+fn later(model: &AnyModel, own: &[&Group], readings: &DVector<f64>) -> Option<Stayed> {
     let mut traces: Vec<(f64, usize, Range<usize>)> = Vec::new();
     for (k, group) in own.iter().enumerate() {
         for start in &group.starts {
@@ -164,7 +161,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    fn readings(repeats: u32, correlated: f64, seed: u64) -> Linearised {
+    fn readings(repeats: u32, correlated: f64, seed: u64) -> AnyModel {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let noise = SceneNoise {
             white: 0.1,
@@ -173,7 +170,7 @@ mod tests {
             shift: correlated,
         };
         let scene = Scene::random(80, repeats, 1e-5, 2.0, noise, &mut random);
-        Linearised::new(&scene.measured(seed), Assumptions::default()).unwrap()
+        AnyModel::new(&Linearised::new(&scene.measured(seed), Assumptions::default()).unwrap())
     }
 
     /// k·u: two medians of eight differences from another repeat know a step to

@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use errsep_models::model::{Effect, FittedModel};
+use errsep_models::model::{AnyModel, Effect, FittedModel};
 use nalgebra::DMatrix;
 use serde::Serialize;
 
@@ -49,10 +49,10 @@ pub struct Diagnosability {
     pub harm_per_visible: Vec<(String, f64, String)>,
 }
 
-/// The certificate of a plan.
-pub fn certificate<M: FittedModel>(
-    model: &M,
-    catalogue: &[Box<dyn Effect<M>>],
+/// See [`crate::diagnosis::certificate`].
+pub(in crate::diagnosis) fn certificate(
+    model: &AnyModel,
+    catalogue: &[Box<dyn Effect<AnyModel>>],
     law: &NoiseLaw,
     options: &Options,
 ) -> Vec<Diagnosability> {
@@ -169,7 +169,7 @@ pub fn certificate<M: FittedModel>(
 }
 
 /// The greatest plausible size of an effect.
-pub(in crate::diagnosis) fn greatest_plausible<M>(effect: &dyn Effect<M>) -> f64 {
+pub(in crate::diagnosis) fn greatest_plausible(effect: &dyn Effect<AnyModel>) -> f64 {
     effect
         .amplitudes()
         .first()

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use errsep_models::model::{Effect, FittedModel};
+use errsep_models::model::{AnyModel, Effect, FittedModel};
 use nalgebra::DVector;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -45,11 +45,10 @@ pub struct Trials {
     pub wrong: usize,
 }
 
-/// Puts sealed effects into a model's readings and diagnoses them blind; one trial in ten holds
-/// none. The causes that were found in the readings are to be taken out of them beforehand.
-pub fn prove<M: FittedModel>(
-    model: &M,
-    catalogue: &[Box<dyn Effect<M>>],
+/// See [`crate::diagnosis::prove`].
+pub(in crate::diagnosis) fn prove(
+    model: &AnyModel,
+    catalogue: &[Box<dyn Effect<AnyModel>>],
     options: &Options,
     trials: usize,
 ) -> Trials {
@@ -107,11 +106,7 @@ pub fn prove<M: FittedModel>(
 }
 
 /// The residuals of the traces, each given to another trace of the same length with a random sign.
-fn dealt<M: FittedModel>(
-    model: &M,
-    residual: &DVector<f64>,
-    random: &mut ChaCha8Rng,
-) -> DVector<f64> {
+fn dealt(model: &AnyModel, residual: &DVector<f64>, random: &mut ChaCha8Rng) -> DVector<f64> {
     let traces = model.traces();
     let mut givers: Vec<usize> = (0..traces.len()).collect();
     givers.shuffle(random);
@@ -132,8 +127,8 @@ fn dealt<M: FittedModel>(
 }
 
 /// An effect at a random shape and a size that shows, its signature that which belongs to its size.
-fn sealed_change<M: FittedModel>(
-    context: &Context<'_, M>,
+fn sealed_change(
+    context: &Context<'_>,
     plain: &Space,
     effect: usize,
     random: &mut ChaCha8Rng,
@@ -190,11 +185,7 @@ fn sealed_change<M: FittedModel>(
 }
 
 /// The whole diagnosis of a trial, its noise estimated anew; only the null law is kept.
-fn answer<M: FittedModel>(
-    context: &Context<'_, M>,
-    sealed: &DVector<f64>,
-    options: &Options,
-) -> String {
+fn answer(context: &Context<'_>, sealed: &DVector<f64>, options: &Options) -> String {
     let shift = context.model.observed() - context.model.linearised();
     let model = context.model.refit(sealed + shift);
     let readings = model.linearised();
@@ -205,7 +196,7 @@ fn answer<M: FittedModel>(
     })
 }
 
-fn said<M: FittedModel>(examined: &Examined<'_, M>, options: &Options) -> String {
+fn said(examined: &Examined<'_>, options: &Options) -> String {
     if examined.detected > options.false_alarm {
         return "none".to_owned();
     }

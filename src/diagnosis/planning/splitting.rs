@@ -5,7 +5,7 @@
 //! |(1 − Q)c| standard deviations apart. The first measurement on the model's list that takes them
 //! far enough apart is named; if none does, the one that takes them farthest.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::attribution::confidence::{Alternative, Answer};
@@ -32,8 +32,8 @@ impl Split {
 
 /// For each cause of an answer that stands for a group, the measurement that splits it,
 /// where the model knows of any.
-pub(in crate::diagnosis) fn splits<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn splits(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     answer: &Answer,
 ) -> Vec<Option<Split>> {
@@ -42,7 +42,7 @@ pub(in crate::diagnosis) fn splits<M: FittedModel>(
     if groups.peek().is_none() {
         return Vec::new();
     }
-    let further: Vec<(String, M, Space)> = context
+    let further: Vec<(String, AnyModel, Space)> = context
         .model
         .further()
         .into_iter()
@@ -56,13 +56,13 @@ pub(in crate::diagnosis) fn splits<M: FittedModel>(
         .collect()
 }
 
-fn split<M: FittedModel>(
-    context: &Context<'_, M>,
+fn split(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     k: usize,
     group: &[Alternative],
-    further: &[(String, M, Space)],
+    further: &[(String, AnyModel, Space)],
 ) -> Option<Split> {
     let (amplitudes, _) = context.amplitudes(readings, causes)?;
     let from: usize = causes[..k].iter().map(|c| c.columns.len()).sum();
@@ -74,7 +74,7 @@ fn split<M: FittedModel>(
         .map(|alternative| &alternative.cause)
         .filter(|rival| rival.effect != named.effect)
         .collect();
-    let apart = |extra: Option<&(String, M, Space)>| -> Option<f64> {
+    let apart = |extra: Option<&(String, AnyModel, Space)>| -> Option<f64> {
         let signatures = |cause: &Cause| {
             let here = cause.projected.clone();
             extra.map_or(here.clone(), |(_, model, space)| {

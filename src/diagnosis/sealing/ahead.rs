@@ -1,6 +1,6 @@
 //! Causes at another measurement: their shapes as they were, their sizes fitted or carried over.
 
-use errsep_models::model::{Effect, Estimate, FittedModel, Shape};
+use errsep_models::model::{AnyModel, Effect, Estimate, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::attribution::context::{Cause, Context};
@@ -22,12 +22,12 @@ pub(super) fn held(shape: &Shape) -> Shape {
 }
 
 /// Causes of given shapes and amplitudes at the state of a context, and what each changes, readings × causes.
-pub(super) fn placed<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(super) fn placed(
+    context: &Context<'_>,
     shapes: &[(usize, Shape)],
     amplitudes: &DVector<f64>,
 ) -> (Vec<Cause>, DMatrix<f64>) {
-    let own = |k: usize, state: &M| {
+    let own = |k: usize, state: &AnyModel| {
         let (effect, shape) = &shapes[k];
         context.cause(state, *effect, shape.clone())
     };
@@ -44,8 +44,8 @@ pub(super) fn placed<M: FittedModel>(
 }
 
 /// Causes of given shapes with their sizes fitted, the state without them.
-pub(super) fn fitted<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(super) fn fitted(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: Vec<Cause>,
 ) -> Option<Vec<Cause>> {
@@ -81,8 +81,8 @@ pub(super) fn fitted<M: FittedModel>(
 }
 
 /// The change of the readings per unit of each unknown of the causes, readings × unknowns.
-pub(super) fn derivatives<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(super) fn derivatives(
+    context: &Context<'_>,
     causes: &[Cause],
     amplitudes: &DVector<f64>,
     unknowns: &[Unknown],
@@ -113,8 +113,8 @@ pub(super) fn derivatives<M: FittedModel>(
 }
 
 /// What is reported of a cause whose unknowns have a covariance.
-pub(super) fn reported<M>(
-    effect: &dyn Effect<M>,
+pub(super) fn reported(
+    effect: &dyn Effect<AnyModel>,
     (which, shape): (usize, &Shape),
     amplitudes: &[f64],
     unknowns: &[Unknown],

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use errsep_models::model::{FittedModel, Place};
+use errsep_models::model::{AnyModel, FittedModel, Place};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::detection::space::orthonormal;
@@ -23,7 +23,7 @@ impl Carried {
     ///
     /// # Errors
     /// A channel was not read, or a position lies outside those that were.
-    pub fn new<M: FittedModel>(model: &M, plan: &M) -> Result<Self, NotSealed> {
+    pub fn new(model: &AnyModel, plan: &AnyModel) -> Result<Self, NotSealed> {
         let (known, planned) = (model.channel_names(), plan.channel_names());
         let mut seen: BTreeMap<&str, Vec<(f64, usize)>> = BTreeMap::new();
         for (row, place) in model.places().iter().enumerate() {

@@ -6,7 +6,7 @@
 //! causes' changes by δ here and there, ν and ν′ the noise of both measurements. From that the least-squares
 //! fit of what a new set-up changes is taken out. Laws of the noise are drawn from those that the repeats allow.
 
-use errsep_models::model::{Effect, Estimate, FittedModel, Shape};
+use errsep_models::model::{AnyModel, Effect, Estimate, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -62,14 +62,11 @@ pub enum NotSealed {
     Undetermined,
 }
 
-/// What a plan is expected to show: `plan` is the model of the planned readings, whatever their values.
-///
-/// # Errors
-/// Causes cannot join the fit, or what is planned does not follow from what was measured.
-pub fn sealed<M: FittedModel>(
-    model: &M,
-    plan: &M,
-    catalogue: Vec<Box<dyn Effect<M>>>,
+/// See [`crate::diagnosis::sealed`].
+pub(in crate::diagnosis) fn sealed(
+    model: &AnyModel,
+    plan: &AnyModel,
+    catalogue: Vec<Box<dyn Effect<AnyModel>>>,
     names: &[String],
     options: &Options,
 ) -> Result<Sealed, NotSealed> {
@@ -97,11 +94,7 @@ struct Known {
 }
 
 impl Known {
-    fn new<M: FittedModel>(
-        context: &Context<'_, M>,
-        readings: &DVector<f64>,
-        causes: &[Cause],
-    ) -> Option<Self> {
+    fn new(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) -> Option<Self> {
         let n = readings.len();
         if causes.is_empty() {
             return Some(Self {
@@ -131,11 +124,11 @@ impl Known {
     }
 }
 
-fn forecast<M: FittedModel>(
-    context: &Context<'_, M>,
+fn forecast(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
-    plan: &M,
+    plan: &AnyModel,
     options: &Options,
 ) -> Result<Sealed, NotSealed> {
     let model = context.model;
@@ -185,12 +178,7 @@ struct There {
 }
 
 impl There {
-    fn new<M: FittedModel>(
-        context: &Context<'_, M>,
-        causes: &[Cause],
-        known: &Known,
-        ahead: &Context<'_, M>,
-    ) -> Self {
+    fn new(context: &Context<'_>, causes: &[Cause], known: &Known, ahead: &Context<'_>) -> Self {
         let mut shapes = Vec::with_capacity(causes.len());
         let mut amplitudes = known.amplitudes.clone();
         for (which, cause) in causes.iter().enumerate() {
@@ -223,10 +211,10 @@ impl There {
     }
 
     /// The causes as they are sealed.
-    fn told<M: FittedModel>(
+    fn told(
         &self,
-        (context, causes, known): (&Context<'_, M>, &[Cause], &Known),
-        ahead: &Context<'_, M>,
+        (context, causes, known): (&Context<'_>, &[Cause], &Known),
+        ahead: &Context<'_>,
         expected: &DVector<f64>,
     ) -> Result<Vec<SealedEffect>, NotSealed> {
         if causes.is_empty() {
@@ -293,9 +281,9 @@ struct Spread {
 }
 
 impl Spread {
-    fn drawn<M: FittedModel>(
-        (context, flat, known): (&Context<'_, M>, &Space, &Known),
-        (ahead, there): (&Context<'_, M>, &There),
+    fn drawn(
+        (context, flat, known): (&Context<'_>, &Space, &Known),
+        (ahead, there): (&Context<'_>, &There),
         (carried, anew): (&Carried, &Anew),
         expected: &DVector<f64>,
         seed: u64,
@@ -361,9 +349,9 @@ impl Spread {
 }
 
 /// What the forecast is off by and what the further measurement misses it by, planned readings × draws.
-fn drawn<M: FittedModel>(
-    (context, flat, known): (&Context<'_, M>, &Space, &Known),
-    (ahead, there): (&Context<'_, M>, &There),
+fn drawn(
+    (context, flat, known): (&Context<'_>, &Space, &Known),
+    (ahead, there): (&Context<'_>, &There),
     carried: &Carried,
     batch: usize,
     random: &mut ChaCha8Rng,

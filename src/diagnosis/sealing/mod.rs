@@ -12,7 +12,8 @@ mod score;
 mod scored;
 mod sealed;
 
-pub use forecast::{NotSealed, sealed};
+pub use forecast::NotSealed;
+pub(super) use forecast::sealed;
 pub use score::{Checked, CheckedEffect, CheckedGap, CheckedNumber, CheckedTrace, Standing};
-pub use scored::checked;
+pub(super) use scored::checked;
 pub use sealed::{Interval, Sealed, SealedEffect, SealedGap, SealedNumber, SealedTrace};

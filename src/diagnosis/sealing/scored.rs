@@ -1,6 +1,6 @@
 //! A measurement against what was sealed before it was made.
 
-use errsep_models::model::{Effect, FittedModel, Shape};
+use errsep_models::model::{AnyModel, Effect, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::attribution::context::{Cause, Context};
@@ -21,21 +21,21 @@ const FAR: f64 = 2.575_829;
 /// *Limit.* A size that the measurement itself tells to less than so many standard deviations is not tested.
 const TOLD: f64 = 3.0;
 
-/// Compares a measurement with what was sealed; nothing where an effect is in the catalogue no more, or no
-/// reading was planned.
-pub fn checked<M: FittedModel>(
-    model: &M,
-    catalogue: Vec<Box<dyn Effect<M>>>,
+/// See [`crate::diagnosis::checked`].
+pub(in crate::diagnosis) fn checked(
+    model: &AnyModel,
+    catalogue: Vec<Box<dyn Effect<AnyModel>>>,
     sealed: &Sealed,
     options: &Options,
 ) -> Option<Checked> {
     let mut catalogue: Vec<Option<_>> = catalogue.into_iter().map(Some).collect();
     let mut take = |name: &str| {
-        let own =
-            |e: &&mut Option<Box<dyn Effect<M>>>| e.as_ref().is_some_and(|e| e.name() == name);
+        let own = |e: &&mut Option<Box<dyn Effect<AnyModel>>>| {
+            e.as_ref().is_some_and(|e| e.name() == name)
+        };
         catalogue.iter_mut().find(own).and_then(Option::take)
     };
-    let chosen: Option<Vec<Box<dyn Effect<M>>>> =
+    let chosen: Option<Vec<Box<dyn Effect<AnyModel>>>> =
         sealed.effect.iter().map(|e| take(&e.name)).collect();
     let chosen = chosen?;
     let law = NoiseLaw::stated(sealed.noise);
@@ -83,11 +83,11 @@ pub fn checked<M: FittedModel>(
 type Carried = Vec<(Shape, Vec<f64>)>;
 
 /// The state without the causes as they were sealed, their shapes and amplitudes there, and what they change.
-fn set_up<M: FittedModel>(
-    context: &Context<'_, M>,
+fn set_up(
+    context: &Context<'_>,
     sealed: &Sealed,
-    planned: &M,
-) -> (M, Carried, DVector<f64>) {
+    planned: &AnyModel,
+) -> (AnyModel, Carried, DVector<f64>) {
     let model = context.model;
     let mut change = DVector::zeros(model.places().len());
     let mut state = model.clone();
@@ -124,10 +124,10 @@ fn doubt_of(sealed: &Sealed) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn carried_to<M: FittedModel>(
-    effect: &dyn Effect<M>,
+fn carried_to(
+    effect: &dyn Effect<AnyModel>,
     sealed: &SealedEffect,
-    (from, to): (&M, &M),
+    (from, to): (&AnyModel, &AnyModel),
 ) -> (Shape, Vec<f64>) {
     let shape = Shape {
         variant: sealed.variant_number,
@@ -138,10 +138,7 @@ fn carried_to<M: FittedModel>(
     (held(&shape), amplitudes)
 }
 
-fn changes<M: FittedModel>(
-    context: &Context<'_, M>,
-    carried: &[(Shape, Vec<f64>)],
-) -> (Vec<Cause>, DMatrix<f64>) {
+fn changes(context: &Context<'_>, carried: &[(Shape, Vec<f64>)]) -> (Vec<Cause>, DMatrix<f64>) {
     let shapes: Vec<(usize, Shape)> = carried
         .iter()
         .enumerate()
@@ -151,8 +148,8 @@ fn changes<M: FittedModel>(
     placed(context, &shapes, &DVector::from_vec(amplitudes))
 }
 
-fn effects<M: FittedModel>(
-    context: &Context<'_, M>,
+fn effects(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     causes: Vec<Cause>,
     sealed: &[SealedEffect],
@@ -232,7 +229,7 @@ struct Matched {
 }
 
 impl Matched {
-    fn new<M: FittedModel>(model: &M, sealed: &Sealed, readings: &DVector<f64>) -> Self {
+    fn new(model: &AnyModel, sealed: &Sealed, readings: &DVector<f64>) -> Self {
         let names = model.channel_names();
         let sorted = |trace: &SealedTrace| {
             let mut nodes: Vec<(f64, usize)> =
@@ -273,11 +270,7 @@ impl Matched {
     }
 
     /// What readings without the causes differ by, with half their bands; nothing where none was planned.
-    fn missed<M: FittedModel>(
-        &self,
-        model: &M,
-        clean: &DVector<f64>,
-    ) -> Option<Vec<Option<(f64, f64)>>> {
+    fn missed(&self, model: &AnyModel, clean: &DVector<f64>) -> Option<Vec<Option<(f64, f64)>>> {
         let rows: Vec<usize> = (0..self.bands.len())
             .filter(|k| self.bands[*k].is_some())
             .collect();
@@ -296,9 +289,9 @@ impl Matched {
         Some(missed)
     }
 
-    fn told<M: FittedModel>(
+    fn told(
         &self,
-        model: &M,
+        model: &AnyModel,
         sealed: &Sealed,
         missed: &[Option<(f64, f64)>],
     ) -> CheckedTrace {

@@ -1,6 +1,6 @@
 //! What is sealed, as plain values.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -161,8 +161,8 @@ pub struct SealedTrace {
 
 impl SealedTrace {
     /// Those of a plan: the expected readings without the causes, what the causes change, standard deviations.
-    pub(super) fn all<M: FittedModel>(
-        plan: &M,
+    pub(super) fn all(
+        plan: &AnyModel,
         clean: &DVector<f64>,
         causes: &DVector<f64>,
         stds: &DVector<f64>,

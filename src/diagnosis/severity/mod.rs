@@ -10,7 +10,6 @@ mod named_alike;
 pub(super) mod rivals;
 pub(super) mod stage;
 
-use errsep_models::model::FittedModel;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -138,8 +137,8 @@ impl Count {
 }
 
 /// The severity of each cause of an answer.
-pub(in crate::diagnosis) fn severities<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn severities(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     answer: &Answer,
     options: &Options,
@@ -150,7 +149,7 @@ pub(in crate::diagnosis) fn severities<M: FittedModel>(
         .collect()
 }
 
-fn severity<M: FittedModel>(context: &Context<'_, M>, name: &Name, options: &Options) -> Severity {
+fn severity(context: &Context<'_>, name: &Name, options: &Options) -> Severity {
     let families = Family::beside(context, &name.members);
     let mut counts: Vec<(Family, Count)> = families
         .into_par_iter()
@@ -185,12 +184,7 @@ fn severity<M: FittedModel>(context: &Context<'_, M>, name: &Name, options: &Opt
 
 /// Draws rivals of a family until it is settled on which side of the limit they are. A family that can
 /// hardly make a gap of this size is no rival: none are counted.
-fn drawn<M: FittedModel>(
-    context: &Context<'_, M>,
-    name: &Name,
-    family: Family,
-    options: &Options,
-) -> Count {
+fn drawn(context: &Context<'_>, name: &Name, family: Family, options: &Options) -> Count {
     let mut count = Count::default();
     for batch in 0..options.severity.div_ceil(BATCH) {
         let most = BATCH.min(options.severity - count.drawn);

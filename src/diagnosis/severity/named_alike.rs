@@ -3,7 +3,7 @@
 
 use errsep_models::calibration_line::CalibrationLine;
 use errsep_models::calibration_line::simulate::{CalibrationSimulation, Disturbance, simulate};
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 
 use crate::diagnosis::attribution::confidence::possible;
 use crate::diagnosis::attribution::context::{Cause, Context};
@@ -30,11 +30,7 @@ fn line(disturbance: Disturbance, seed: u64) -> CalibrationLine {
 }
 
 /// For each rival whether it is named alike: all families scored, all effects that stand out refined.
-fn given_plainly<M: FittedModel>(
-    context: &Context<'_, M>,
-    name: &Name,
-    rivals: &Drawn,
-) -> Vec<bool> {
+fn given_plainly(context: &Context<'_>, name: &Name, rivals: &Drawn) -> Vec<bool> {
     let (left, _) = context.space.forward(rivals.readings.clone());
     let rows = rows_of(&context.dictionary, &context.space, left);
     let count = context.dictionary.families.len();
@@ -57,12 +53,7 @@ fn given_plainly<M: FittedModel>(
         .collect()
 }
 
-fn is_first<M: FittedModel>(
-    context: &Context<'_, M>,
-    name: &Name,
-    rivals: &Drawn,
-    rival: usize,
-) -> bool {
+fn is_first(context: &Context<'_>, name: &Name, rivals: &Drawn, rival: usize) -> bool {
     let readings = rivals.readings.column(rival).clone_owned();
     let first = context.remainder(&readings, &[]);
     let mut ranked: Vec<(f64, usize)> = (0..context.catalogue.len())
@@ -105,7 +96,7 @@ fn nothing_is_lost_by_the_order_of_the_score_stage() {
         Disturbance::Quadratic(6.0),
     );
     for (disturbance, seed) in [(drift, 2), (quadratic, 1)] {
-        let model = line(disturbance, seed);
+        let model = AnyModel::new(&line(disturbance, seed));
         let catalogue = model.effects();
         let readings = model.linearised();
         let law = estimate(&model, &readings);

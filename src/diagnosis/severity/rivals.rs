@@ -40,7 +40,7 @@ pub(in crate::diagnosis) enum Family {
 
 impl Family {
     /// All families but the effects of a group.
-    pub fn beside<M: FittedModel>(context: &Context<'_, M>, members: &[usize]) -> Vec<Self> {
+    pub fn beside(context: &Context<'_>, members: &[usize]) -> Vec<Self> {
         let others = (0..context.catalogue.len()).filter(|k| !members.contains(k));
         others
             .map(Self::Effect)
@@ -48,7 +48,7 @@ impl Family {
             .collect()
     }
 
-    pub fn name<M: FittedModel>(self, context: &Context<'_, M>) -> String {
+    pub fn name(self, context: &Context<'_>) -> String {
         match self {
             Self::Effect(k) => context.catalogue[k].name().to_owned(),
             Self::Position => "smooth in position".to_owned(),
@@ -58,7 +58,7 @@ impl Family {
     }
 
     /// The stream of random numbers that is its own, whatever else is in the catalogue.
-    fn stream<M: FittedModel>(self, context: &Context<'_, M>) -> u64 {
+    fn stream(self, context: &Context<'_>) -> u64 {
         let name = self.name(context);
         // FNV-1a.
         name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
@@ -77,8 +77,8 @@ pub(in crate::diagnosis) struct Drawn {
 
 impl Drawn {
     /// At most `most` rivals of a family, each of the visible size of the gap.
-    pub fn of<M: FittedModel>(
-        context: &Context<'_, M>,
+    pub fn of(
+        context: &Context<'_>,
         name: &Name,
         family: Family,
         (seed, batch): (u64, usize),
@@ -114,8 +114,8 @@ impl Drawn {
 }
 
 /// Gaps that an effect makes at sizes that it could have, without noise.
-fn effects<M: FittedModel>(
-    context: &Context<'_, M>,
+fn effects(
+    context: &Context<'_>,
     name: &Name,
     effect: usize,
     most: usize,
@@ -154,8 +154,8 @@ fn effects<M: FittedModel>(
 }
 
 /// Smooth gaps that are none of the effects of a group, without noise.
-fn smooth<M: FittedModel>(
-    context: &Context<'_, M>,
+fn smooth(
+    context: &Context<'_>,
     name: &Name,
     family: Family,
     most: usize,
@@ -200,12 +200,7 @@ fn amplitudes(entry: &Entry, random: &mut ChaCha8Rng) -> DVector<f64> {
 }
 
 /// Whether an effect could be of these sizes.
-fn could_be<M: FittedModel>(
-    context: &Context<'_, M>,
-    effect: usize,
-    entry: &Entry,
-    sizes: &DVector<f64>,
-) -> bool {
+fn could_be(context: &Context<'_>, effect: usize, entry: &Entry, sizes: &DVector<f64>) -> bool {
     let Meaning::Effect(shape) = &entry.meaning else {
         return false;
     };
@@ -214,7 +209,7 @@ fn could_be<M: FittedModel>(
 }
 
 /// Cosine of each smooth rival to the nearest member of the group.
-fn cosines<M: FittedModel>(context: &Context<'_, M>, name: &Name, left: DMatrix<f64>) -> Vec<f64> {
+fn cosines(context: &Context<'_>, name: &Name, left: DMatrix<f64>) -> Vec<f64> {
     let squares: Vec<f64> = left.column_iter().map(|c| c.norm_squared()).collect();
     let adjoint = seen(&context.dictionary, &context.space, left);
     let mut greatest = vec![0.0f64; BATCH];
@@ -241,7 +236,7 @@ struct Ground {
 }
 
 impl Ground {
-    fn of<M: FittedModel>(context: &Context<'_, M>, family: Family) -> Option<Self> {
+    fn of(context: &Context<'_>, family: Family) -> Option<Self> {
         let places = context.model.places();
         let values: Vec<f64> = match family {
             Family::Effect(_) => return None,
@@ -263,11 +258,7 @@ impl Ground {
     }
 
     /// A smooth function times a normal weight for each channel: zero where there is no range.
-    fn smooth<M: FittedModel>(
-        &self,
-        context: &Context<'_, M>,
-        random: &mut ChaCha8Rng,
-    ) -> DVector<f64> {
+    fn smooth(&self, context: &Context<'_>, random: &mut ChaCha8Rng) -> DVector<f64> {
         let n = self.values.len();
         let shortest = 2.0 * self.spacing;
         if !(self.range > shortest) {

@@ -4,7 +4,6 @@
 //! All rivals of a batch are scored at once; only those in which the name stands first go on to be
 //! refined and judged. State and noise stay those of the diagnosis, which makes both anew.
 
-use errsep_models::model::FittedModel;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -31,8 +30,8 @@ pub(in crate::diagnosis) struct Name {
 
 impl Name {
     /// The names of an answer.
-    pub fn all<M: FittedModel>(
-        context: &Context<'_, M>,
+    pub fn all(
+        context: &Context<'_>,
         readings: &DVector<f64>,
         answer: &Answer,
         false_alarm: f64,
@@ -61,7 +60,7 @@ impl Name {
     }
 
     /// For each rival whether it would have been given this name, and no other beside it.
-    pub fn given<M: FittedModel>(&self, context: &Context<'_, M>, rivals: &Drawn) -> Vec<bool> {
+    pub fn given(&self, context: &Context<'_>, rivals: &Drawn) -> Vec<bool> {
         let leading = self.leading(context, rivals);
         (0..rivals.count)
             .into_par_iter()
@@ -72,7 +71,7 @@ impl Name {
     /// The rivals in which a gap is detected and one of the group is the most surprising effect, or may
     /// become it by refining. Families are scored only as long as one of the batch may still be such: the
     /// group first, then what the rivals were drawn from, which mostly leads.
-    fn leading<M: FittedModel>(&self, context: &Context<'_, M>, rivals: &Drawn) -> Vec<bool> {
+    fn leading(&self, context: &Context<'_>, rivals: &Drawn) -> Vec<bool> {
         let (left, _) = context.space.forward(rivals.readings.clone());
         let mut scores = Scores::of(context, left);
         let members = self.members.iter().filter_map(|k| context.family_of(*k));
@@ -112,7 +111,7 @@ impl Name {
 
     /// Whether refining leaves one of the group first, nothing stands out beside it, and no other
     /// effect passes in its place. The others are searched only where one of the group passes.
-    fn is_found<M: FittedModel>(&self, context: &Context<'_, M>, readings: &DVector<f64>) -> bool {
+    fn is_found(&self, context: &Context<'_>, readings: &DVector<f64>) -> bool {
         let first = context.remainder(readings, &[]);
         let passes = |cause: &Cause| {
             let alone = std::slice::from_ref(cause);
@@ -162,7 +161,7 @@ struct Scores<'a> {
 }
 
 impl<'a> Scores<'a> {
-    fn of<M: FittedModel>(context: &'a Context<'_, M>, left: DMatrix<f64>) -> Self {
+    fn of(context: &'a Context<'_>, left: DMatrix<f64>) -> Self {
         let families = context.dictionary.families.len();
         Self {
             dictionary: &context.dictionary,
@@ -180,12 +179,12 @@ impl<'a> Scores<'a> {
     }
 }
 
-fn stands_out<M: FittedModel>(context: &Context<'_, M>, first: &Remainder, effect: usize) -> bool {
+fn stands_out(context: &Context<'_>, first: &Remainder, effect: usize) -> bool {
     context.p_value(first, effect) < EARNED
 }
 
 /// The effects that stand out most.
-fn ranked<M: FittedModel>(context: &Context<'_, M>, first: &Remainder) -> Vec<usize> {
+fn ranked(context: &Context<'_>, first: &Remainder) -> Vec<usize> {
     let mut ranked: Vec<(f64, usize)> = (0..context.catalogue.len())
         .filter(|effect| stands_out(context, first, *effect))
         .filter_map(|effect| {
@@ -199,8 +198,8 @@ fn ranked<M: FittedModel>(context: &Context<'_, M>, first: &Remainder) -> Vec<us
 }
 
 /// An effect refined, where its size is possible.
-fn refined<M: FittedModel>(
-    context: &Context<'_, M>,
+fn refined(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     first: &Remainder,
     effect: usize,

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use errsep_models::model::{FittedModel, Shape};
+use errsep_models::model::{AnyModel, Shape};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -60,8 +60,8 @@ pub(super) struct Accepted {
 }
 
 /// Everything that is fixed while laws are sought.
-pub(super) struct Bench<'a, M: FittedModel> {
-    pub model: &'a M,
+pub(super) struct Bench<'a> {
+    pub model: &'a AnyModel,
     pub law: NoiseLaw,
     pub grammar: Grammar,
     pub whole: View,
@@ -70,7 +70,7 @@ pub(super) struct Bench<'a, M: FittedModel> {
     ways: [Way; 2],
     smooths: Smooths,
     options: &'a Options,
-    context: OnceLock<Context<'a, M>>,
+    context: OnceLock<Context<'a>>,
 }
 
 /// Repeats that a law is chosen on, and those that it is accepted on.
@@ -88,9 +88,9 @@ struct Tried {
     missed: f64,
 }
 
-impl<'a, M: FittedModel> Bench<'a, M> {
+impl<'a> Bench<'a> {
     /// Nothing where there are no repeats to hold out, or no coordinate.
-    pub fn new(model: &'a M, law: NoiseLaw, options: &'a Options) -> Option<Self> {
+    pub fn new(model: &'a AnyModel, law: NoiseLaw, options: &'a Options) -> Option<Self> {
         let grammar = Grammar::new(model)?;
         let ways = halves(model, &law)?.map(|[chosen, held]| Way {
             lens: Lens::new(&grammar, &chosen),
@@ -124,7 +124,7 @@ impl<'a, M: FittedModel> Bench<'a, M> {
         self.ways[0].lens.forms()
     }
 
-    fn context(&self) -> &Context<'a, M> {
+    fn context(&self) -> &Context<'a> {
         self.context.get_or_init(|| {
             let (law, options) = (self.law.clone(), self.options);
             Context::new(self.model, &[], law, options.draws, options.seed)

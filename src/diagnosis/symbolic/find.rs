@@ -1,6 +1,6 @@
 //! A gap as a law, or the power with which one would have been found.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::DVector;
 use serde::Serialize;
 
@@ -90,13 +90,9 @@ impl Refusal {
     }
 }
 
-/// Seeks a law in what a model leaves of its readings, whatever the verdict on them; where there is none,
-/// `injections` laws of the same size are put into the noise to say how many would have been found.
-///
-/// # Errors
-/// There are no repeats.
-pub fn law<M: FittedModel>(
-    model: &M,
+/// See [`crate::diagnosis::law`].
+pub(in crate::diagnosis) fn law(
+    model: &AnyModel,
     options: &Options,
     injections: usize,
 ) -> Result<LawFound, NoRepeats> {
@@ -139,8 +135,8 @@ pub fn law<M: FittedModel>(
 
 /// The best law as it would be in white noise: what jumps or swings between traces passes for noise that
 /// shifts them, and hides itself, until it is taken out once.
-fn best_in_white<M: FittedModel>(
-    model: &M,
+fn best_in_white(
+    model: &AnyModel,
     law: &NoiseLaw,
     readings: &DVector<f64>,
     options: &Options,
@@ -150,13 +146,13 @@ fn best_in_white<M: FittedModel>(
     Bench::new(model, white, options)?.best(readings)
 }
 
-fn tried<M: FittedModel>(bench: &Bench<'_, M>) -> [usize; 2] {
+fn tried(bench: &Bench<'_>) -> [usize; 2] {
     let forms = bench.forms();
     [forms, forms * (forms + 1) / 2]
 }
 
-fn none<M: FittedModel>(
-    bench: &Bench<'_, M>,
+fn none(
+    bench: &Bench<'_>,
     readings: &DVector<f64>,
     why: Refusal,
     (options, injections): (&Options, usize),
@@ -170,7 +166,7 @@ fn none<M: FittedModel>(
     })
 }
 
-fn told<M: FittedModel>(bench: &Bench<'_, M>, accepted: &Accepted, model: &M) -> Option<LawFound> {
+fn told(bench: &Bench<'_>, accepted: &Accepted, model: &AnyModel) -> Option<LawFound> {
     let fitted = &accepted.fitted;
     let change = bench.change(&fitted.terms, &fitted.amplitudes);
     let rival = |(fitted, worse): &(_, f64)| LawRival {

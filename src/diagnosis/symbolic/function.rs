@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::AnyModel;
 
 use crate::diagnosis::catalogue::curve::Along;
 
@@ -32,7 +32,7 @@ pub(super) struct Coordinate {
 
 impl Coordinate {
     /// Nothing where it has too few different values.
-    pub fn new<M: FittedModel>(model: &M, along: Along) -> Option<Self> {
+    pub fn new(model: &AnyModel, along: Along) -> Option<Self> {
         let values = along.values(model);
         let mut levels = values.clone();
         levels.sort_by(f64::total_cmp);

@@ -1,6 +1,6 @@
 //! The grammar: functions of coordinates times patterns over channels and directions, one term or two.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::catalogue::curve::Along;
@@ -45,7 +45,7 @@ pub(super) struct Grammar {
 
 impl Grammar {
     /// Nothing where no coordinate has enough values.
-    pub fn new<M: FittedModel>(model: &M) -> Option<Self> {
+    pub fn new(model: &AnyModel) -> Option<Self> {
         let along = [Along::Position, Along::Time, Along::Reading];
         let coordinates: Vec<Coordinate> = along
             .into_iter()

@@ -34,12 +34,7 @@ pub struct Power {
 }
 
 /// The power at a visible size, squared, in units of the noise.
-pub(super) fn power<M: FittedModel>(
-    bench: &Bench<'_, M>,
-    square: f64,
-    draws: usize,
-    seed: u64,
-) -> Option<Power> {
+pub(super) fn power(bench: &Bench<'_>, square: f64, draws: usize, seed: u64) -> Option<Power> {
     let one = |k: usize| {
         let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0070_6f77);
         random.set_stream(k as u64 + 1);
@@ -73,11 +68,7 @@ pub(super) fn power<M: FittedModel>(
 }
 
 /// The change of the readings by a law drawn from the grammar, one term or two, of a visible size.
-fn drawn<M: FittedModel>(
-    bench: &Bench<'_, M>,
-    square: f64,
-    random: &mut ChaCha8Rng,
-) -> Option<DVector<f64>> {
+fn drawn(bench: &Bench<'_>, square: f64, random: &mut ChaCha8Rng) -> Option<DVector<f64>> {
     let count = if random.random::<bool>() { 1 } else { 2 };
     let mut change = DVector::zeros(bench.model.places().len());
     let mut terms: Vec<Term> = Vec::new();
@@ -94,10 +85,7 @@ fn drawn<M: FittedModel>(
 }
 
 /// A term with amplitudes of chance, and how long it is seen.
-fn term<M: FittedModel>(
-    bench: &Bench<'_, M>,
-    random: &mut ChaCha8Rng,
-) -> Option<(Term, DVector<f64>, f64)> {
+fn term(bench: &Bench<'_>, random: &mut ChaCha8Rng) -> Option<(Term, DVector<f64>, f64)> {
     let grammar = &bench.grammar;
     let kind = random.random_range(0..grammar.kinds.len());
     let patterns = bench.patterns_of(kind);

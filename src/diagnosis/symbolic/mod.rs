@@ -14,6 +14,7 @@ mod smooth;
 mod told;
 mod view;
 
-pub use find::{Law, LawFound, LawRival, NoLaw, NoRepeats, law};
+pub(super) use find::law;
+pub use find::{Law, LawFound, LawRival, NoLaw, NoRepeats};
 pub use injected::Power;
 pub use told::{LawParameter, LawTerm};

@@ -1,6 +1,6 @@
 //! Which readings a term changes, and with which sign: patterns over channels and directions.
 
-use errsep_models::model::{FittedModel, Place};
+use errsep_models::model::{AnyModel, FittedModel, Place};
 
 /// *Limit.* Channels of which every pair and every choice of signs is a pattern.
 const FEW_CHANNELS: usize = 4;
@@ -32,7 +32,7 @@ pub(super) fn block_of(place: &Place) -> usize {
 
 impl Pattern {
     /// All patterns of a model, the simplest first.
-    pub fn all<M: FittedModel>(model: &M) -> Vec<Self> {
+    pub fn all(model: &AnyModel) -> Vec<Self> {
         let backward = model.places().iter().any(|p| p.direction < 0.0);
         let forward = model.places().iter().any(|p| p.direction >= 0.0);
         let turns: &[Turn] = if backward && forward {
@@ -105,7 +105,7 @@ impl Pattern {
 
 /// Weights over the channels: all alike, one, the model's own combinations of equal weights, and of few channels
 /// every pair and every choice of signs. Of two that differ by their sign only the first stands.
-fn over_channels<M: FittedModel>(model: &M) -> Vec<Vec<i8>> {
+fn over_channels(model: &AnyModel) -> Vec<Vec<i8>> {
     let count = model.channel_names().len();
     let single = |k: usize| {
         (0..count)

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::DMatrix;
 use serde::Serialize;
 
@@ -184,11 +184,7 @@ fn term_text(grammar: &Grammar, term: Term, amplitudes: &[f64]) -> String {
 }
 
 /// A law as an effect of its own, without its name.
-pub(super) fn effect<M: FittedModel>(
-    grammar: &Grammar,
-    fitted: &Fitted,
-    model: &M,
-) -> Option<Tabulated> {
+pub(super) fn effect(grammar: &Grammar, fitted: &Fitted, model: &AnyModel) -> Option<Tabulated> {
     let shared = &grammar.patterns[fitted.terms.first()?.pattern].channels;
     let of = |t: &Term| &grammar.patterns[t.pattern];
     let alike = fitted.terms.iter().all(|t| of(t).channels == *shared);
@@ -216,7 +212,7 @@ pub(super) fn effect<M: FittedModel>(
 }
 
 /// The terms with their parameters, from what is seen of them in units of the noise.
-pub(super) fn terms<M: FittedModel>(bench: &Bench<'_, M>, fitted: &Fitted) -> Vec<LawTerm> {
+pub(super) fn terms(bench: &Bench<'_>, fitted: &Fitted) -> Vec<LawTerm> {
     let seen = bench.tangents(fitted);
     let lengths: Vec<f64> = seen.column_iter().map(|c| c.norm()).collect();
     let unit = DMatrix::from_fn(seen.nrows(), seen.ncols(), |i, j| seen[(i, j)] / lengths[j]);
@@ -330,7 +326,7 @@ fn shape(
 }
 
 /// A law in one line: its formula, and its channels where they are not all.
-pub(super) fn in_one_line<M: FittedModel>(grammar: &Grammar, fitted: &Fitted, model: &M) -> String {
+pub(super) fn in_one_line(grammar: &Grammar, fitted: &Fitted, model: &AnyModel) -> String {
     let names = model.channel_names();
     let lines = each(grammar, fitted)
         .into_iter()

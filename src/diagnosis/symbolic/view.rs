@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::detection::space::Space;
@@ -38,7 +38,7 @@ pub(super) struct Fitted {
 
 /// Every second repeat and the others, chosen on and held out, both ways; nothing where there are fewer than two.
 /// Neighbours are parted, so that a function of the time need not be continued far.
-pub(super) fn halves<M: FittedModel>(model: &M, law: &NoiseLaw) -> Option<[[View; 2]; 2]> {
+pub(super) fn halves(model: &AnyModel, law: &NoiseLaw) -> Option<[[View; 2]; 2]> {
     let places = model.places();
     let repeats: BTreeSet<u32> = places.iter().map(|p| p.repeat).collect();
     if repeats.len() < 2 {
@@ -62,7 +62,7 @@ pub(super) fn halves<M: FittedModel>(model: &M, law: &NoiseLaw) -> Option<[[View
 
 impl View {
     /// All readings of a model.
-    pub fn whole<M: FittedModel>(model: &M, law: &NoiseLaw) -> Self {
+    pub fn whole(model: &AnyModel, law: &NoiseLaw) -> Self {
         Self {
             rows: (0..model.places().len()).collect(),
             space: Space::expecting(model, law),

@@ -26,8 +26,8 @@ use crate::diagnosis::verdict::told::for_people;
 use crate::diagnosis::verdict::types::{Detail, Diagnosis, Kind, NoiseOut, Verdict};
 use crate::number::plain;
 
-pub(in crate::diagnosis) fn compose<M: FittedModel>(
-    examined: &Examined<'_, M>,
+pub(in crate::diagnosis) fn compose(
+    examined: &Examined<'_>,
     calm: &Calmed,
     options: &Options,
 ) -> Diagnosis {
@@ -178,11 +178,7 @@ fn elsewhere(candidates: &[Candidate]) -> Vec<String> {
     .collect()
 }
 
-fn notes<M: FittedModel>(
-    context: &Context<'_, M>,
-    clean: &DVector<f64>,
-    calm: &Calmed,
-) -> Vec<String> {
+fn notes(context: &Context<'_>, clean: &DVector<f64>, calm: &Calmed) -> Vec<String> {
     let mut notes = Vec::new();
     if calm.count > 0 {
         notes.push(format!(
@@ -209,7 +205,7 @@ fn notes<M: FittedModel>(
 }
 
 /// What the repeats say of a noise that is stated.
-fn stated<M: FittedModel>(context: &Context<'_, M>, clean: &DVector<f64>) -> String {
+fn stated(context: &Context<'_>, clean: &DVector<f64>) -> String {
     let told = "The noise is not measured but stated in the set-up.";
     let Some((seen, freedom)) = of_repeats(context.model, clean) else {
         return told.to_owned();
@@ -228,7 +224,7 @@ fn stated<M: FittedModel>(context: &Context<'_, M>, clean: &DVector<f64>) -> Str
 }
 
 /// What it means when neighbouring readings scatter otherwise than repeats do.
-fn disagreement<M: FittedModel>(context: &Context<'_, M>, clean: &DVector<f64>) -> Option<String> {
+fn disagreement(context: &Context<'_>, clean: &DVector<f64>) -> Option<String> {
     if context.law.source != NoiseSource::Repeats {
         return None;
     }

@@ -13,8 +13,8 @@ use crate::diagnosis::verdict::types::{Harm, Hidden};
 const EQUAL: f64 = 1.0 + 1e-6;
 
 /// What these readings would not have shown, for every effect that is not named.
-pub(in crate::diagnosis) fn hidden<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn hidden(
+    context: &Context<'_>,
     named: &[String],
     options: &Options,
 ) -> Vec<Hidden> {

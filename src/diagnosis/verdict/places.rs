@@ -9,8 +9,8 @@ use crate::diagnosis::levels::{EVERYWHERE, PLACE, chi_squared_of_two};
 use crate::diagnosis::verdict::types::Where;
 
 /// The strongest place on every axis, and the channels' shares.
-pub(in crate::diagnosis) fn places<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn places(
+    context: &Context<'_>,
     first: &Remainder,
     excess: f64,
 ) -> Vec<Where> {
@@ -35,8 +35,8 @@ pub(in crate::diagnosis) fn places<M: FittedModel>(
 
 /// An entry of the dictionary as a place, with the part of the gap that it explains. Where the same
 /// pattern explains as much nearly everywhere, the place is the pattern alone.
-pub(in crate::diagnosis) fn place_of<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn place_of(
+    context: &Context<'_>,
     remainder: &Remainder,
     entry: usize,
     excess: f64,
@@ -105,8 +105,8 @@ impl Reach {
 }
 
 /// The part of the gap in each channel.
-pub(in crate::diagnosis) fn channel_shares<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn channel_shares(
+    context: &Context<'_>,
     first: &Remainder,
     excess: f64,
 ) -> Vec<Where> {

@@ -12,8 +12,8 @@ use crate::diagnosis::verdict::places::{channel_shares, place_of};
 use crate::diagnosis::verdict::types::{Fingerprint, Nearest, Where};
 
 /// What can be said of a gap without naming it.
-pub(in crate::diagnosis) fn fingerprint<M: FittedModel>(
-    context: &Context<'_, M>,
+pub(in crate::diagnosis) fn fingerprint(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     first: &Remainder,
     excess: f64,
@@ -37,8 +37,8 @@ pub(in crate::diagnosis) fn fingerprint<M: FittedModel>(
 }
 
 /// The effect that explains most, and what stands against it.
-fn nearest<M: FittedModel>(
-    context: &Context<'_, M>,
+fn nearest(
+    context: &Context<'_>,
     readings: &DVector<f64>,
     first: &Remainder,
     excess: f64,
@@ -86,7 +86,7 @@ struct Energies {
 impl Energies {
     /// Shares of the whitened residual's square beyond its noise. Noise gives every mean of r
     /// readings the variance 1/r.
-    fn of<M: FittedModel>(context: &Context<'_, M>, residual: &DVector<f64>) -> Self {
+    fn of(context: &Context<'_>, residual: &DVector<f64>) -> Self {
         let mut cells: BTreeMap<usize, [Vec<f64>; 2]> = BTreeMap::new();
         for (place, e) in context.model.places().iter().zip(residual.iter()) {
             let side = usize::from(place.direction < 0.0);

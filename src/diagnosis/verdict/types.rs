@@ -1,6 +1,6 @@
 //! What the diagnosis says.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use serde::Serialize;
 
 use crate::diagnosis::attribution::reported::{Bias, Candidate};
@@ -152,8 +152,8 @@ pub struct Where {
 }
 
 impl Where {
-    pub(in crate::diagnosis) fn new<M: FittedModel>(
-        model: &M,
+    pub(in crate::diagnosis) fn new(
+        model: &AnyModel,
         item: &Item,
         share: f64,
         share_ci95: [f64; 2],

@@ -302,6 +302,14 @@ impl<M: FittedModel + 'static> Effect<AnyModel> for AnyEffect<M> {
     fn cycles(&self, model: &AnyModel, shape: &Shape) -> Vec<(usize, f64)> {
         self.0.cycles(model.known(), shape)
     }
+    fn changed(
+        &self,
+        model: &AnyModel,
+        shape: &Shape,
+        value: usize,
+    ) -> Option<(Vec<usize>, Column)> {
+        self.0.changed(model.known(), shape, value)
+    }
     fn allowed(&self, model: &AnyModel, shape: &Shape) -> bool {
         self.0.allowed(model.known(), shape)
     }

@@ -205,6 +205,12 @@ pub trait Effect<M>: Send + Sync {
         Vec::new()
     }
 
+    /// Where a value of a shape changes the readings of some traces alone, of an effect of one column: those
+    /// traces, and the column at each of their readings. A search by small steps then takes the others as they are.
+    fn changed(&self, _model: &M, _shape: &Shape, _value: usize) -> Option<(Vec<usize>, Column)> {
+        None
+    }
+
     /// Whether a shape is one that the search may go to.
     fn allowed(&self, _model: &M, _shape: &Shape) -> bool {
         true

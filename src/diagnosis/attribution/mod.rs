@@ -4,6 +4,7 @@
 pub(super) mod allowed;
 pub(super) mod attribute;
 pub(super) mod bias;
+mod by_traces;
 pub(super) mod candidates;
 pub(super) mod confidence;
 pub(super) mod context;

@@ -3,6 +3,7 @@
 use errsep_models::model::{AnyModel, Effect, Shape};
 use nalgebra::{DMatrix, DVector};
 
+use crate::diagnosis::attribution::by_traces::ByTraces;
 use crate::diagnosis::attribution::context::{Cause, Context, as_matrix, column, span};
 use crate::diagnosis::detection::dictionary::{inverse, is_positive, products, statistic};
 use crate::diagnosis::levels::{ALIKE, UNSEARCHED};
@@ -91,12 +92,14 @@ impl Context<'_> {
 }
 
 /// An effect as it is seen beside other causes at a state of the model.
-struct Seen<'s> {
-    context: &'s Context<'s>,
-    effect: &'s dyn Effect<AnyModel>,
-    state: &'s AnyModel,
-    adjoint: DVector<f64>,
-    directions: Vec<DVector<f64>>,
+pub(super) struct Seen<'s> {
+    pub context: &'s Context<'s>,
+    pub effect: &'s dyn Effect<AnyModel>,
+    pub state: &'s AnyModel,
+    /// What a column is multiplied with to get its score.
+    pub adjoint: DVector<f64>,
+    /// The same of the other causes' directions.
+    pub directions: Vec<DVector<f64>>,
 }
 
 impl<'s> Seen<'s> {
@@ -139,7 +142,8 @@ impl<'s> Seen<'s> {
     fn searched(&self, start: &Shape) -> (Shape, f64) {
         let mut shape = start.clone();
         if shape.free() > 0 {
-            let misfit = |values: &[f64]| self.misfit(start, values);
+            let mut by_traces = ByTraces::new(self, start);
+            let misfit = |values: &[f64]| self.misfit(start, values, by_traces.as_mut());
             shape.values = coordinate_search(&start.values, &start.steps, PRECISION, misfit).0;
         }
         self.settled(shape)
@@ -148,27 +152,30 @@ impl<'s> Seen<'s> {
     /// What small steps stop beside: the best around the cycles, searched on from there.
     fn come_back(&self, start: &Shape, cycles: &[(usize, f64)]) -> (Shape, f64) {
         let mut shape = start.clone();
-        let misfit = |values: &[f64]| self.misfit(start, values);
+        let mut by_traces = ByTraces::new(self, start);
+        let mut misfit = |values: &[f64]| self.misfit(start, values, by_traces.as_mut());
         for _ in 0..ROUNDS {
-            let (values, moved) = around(&shape.values, cycles, misfit);
+            let (values, moved) = around(&shape.values, cycles, &mut misfit);
             if !moved {
                 break;
             }
-            shape.values = coordinate_search(&values, &start.steps, PRECISION, misfit).0;
+            shape.values = coordinate_search(&values, &start.steps, PRECISION, &mut misfit).0;
         }
         self.settled(shape)
     }
 
     /// The statistic of other values of a shape, the greatest the least; infinite where they are not allowed.
-    fn misfit(&self, shape: &Shape, values: &[f64]) -> f64 {
+    fn misfit(&self, shape: &Shape, values: &[f64], near: Option<&mut ByTraces<'_, '_>>) -> f64 {
         let trial = Shape {
             values: values.to_vec(),
             ..shape.clone()
         };
-        if self.effect.allowed(self.state, &trial) {
-            -self.value(&trial).0
-        } else {
-            f64::INFINITY
+        if !self.effect.allowed(self.state, &trial) {
+            return f64::INFINITY;
+        }
+        match near {
+            Some(near) => -near.statistic(values),
+            None => -self.value(&trial).0,
         }
     }
 

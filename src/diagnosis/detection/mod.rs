@@ -6,6 +6,7 @@ pub(super) mod dictionary;
 pub(super) mod estimate;
 pub(super) mod fitted;
 pub(super) mod folding;
+pub(super) mod gram;
 pub(super) mod localise;
 pub(super) mod null;
 pub(super) mod scatter;

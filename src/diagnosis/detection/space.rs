@@ -24,20 +24,20 @@ const FEW: usize = 8;
 /// The whitened space of one set of readings under one model and one law of noise.
 #[derive(Debug, Clone)]
 pub struct Space {
-    readings: usize,
-    traces: Vec<Range<usize>>,
+    pub(super) readings: usize,
+    pub(super) traces: Vec<Range<usize>>,
     /// The trace of every reading.
-    trace_of: Vec<u32>,
+    pub(super) trace_of: Vec<u32>,
     /// L⁻¹ of each trace.
-    whitening: Vec<Arc<Whitening>>,
+    pub(super) whitening: Vec<Arc<Whitening>>,
     /// What makes the scatter that the model expects one with the noise.
-    scatter: Option<ScatterRoot>,
+    pub(super) scatter: Option<ScatterRoot>,
     /// Orthonormal patterns over the traces, traces × functions.
-    patterns: Option<DMatrix<f64>>,
+    pub(super) patterns: Option<DMatrix<f64>>,
     /// Directions inside the patterns that the model does not have, given back; orthonormal.
-    returned: DMatrix<f64>,
+    pub(super) returned: DMatrix<f64>,
     /// The rest of what the fit absorbs; orthonormal.
-    absorbed: DMatrix<f64>,
+    pub(super) absorbed: DMatrix<f64>,
     /// Number of directions the fit absorbs.
     pub rank: usize,
 }
@@ -195,6 +195,11 @@ impl Space {
         self.readings
     }
 
+    /// Whether the scatter that the model expects is in its units.
+    pub fn scatters(&self) -> bool {
+        self.scatter.is_some()
+    }
+
     /// Readings less what the fit absorbs.
     pub fn degrees_of_freedom(&self) -> usize {
         self.readings.saturating_sub(self.rank)
@@ -286,145 +291,6 @@ impl Space {
             }
         }
         columns
-    }
-
-    /// EᵀPE of sparse signatures without ever making P L⁻¹E: the cost is that of the traces in
-    /// which a signature is.
-    pub fn gram(&self, columns: &[Column]) -> Gram {
-        let parts: Vec<Part> = columns.iter().map(|c| self.part(c)).collect();
-        let gram = DMatrix::from_fn(parts.len(), parts.len(), |i, j| {
-            if j < i {
-                0.0
-            } else {
-                parts[i].product(&parts[j], self)
-            }
-        });
-        Gram {
-            whole: parts.iter().map(|p| p.square).sum(),
-            matrix: DMatrix::from_fn(parts.len(), parts.len(), |i, j| gram[(i.min(j), i.max(j))]),
-        }
-    }
-
-    fn part(&self, column: &Column) -> Part {
-        let mut whitened = DVector::zeros(self.readings);
-        let mut seen = vec![false; self.traces.len()];
-        for (&row, &value) in column.rows.iter().zip(&column.values) {
-            whitened[row] += value;
-            seen[self.trace_of[row] as usize] = true;
-        }
-        let mut touched: Vec<usize> = (0..seen.len()).filter(|t| seen[*t]).collect();
-        // Many signatures are one profile times a sign in each trace: such a profile is whitened
-        // once.
-        let mut model: Option<(usize, Vec<f64>)> = None;
-        for &t in &touched {
-            let trace = self.traces[t].clone();
-            let values = &whitened.as_slice()[trace.clone()];
-            let same = |sign: f64, raw: &[f64]| {
-                raw.len() == values.len() && raw.iter().zip(values).all(|(a, b)| *a == sign * b)
-            };
-            let known = model.as_ref().and_then(|(from, raw)| {
-                if !Arc::ptr_eq(&self.whitening[*from], &self.whitening[t]) {
-                    None
-                } else if same(1.0, raw) {
-                    Some((*from, 1.0))
-                } else {
-                    same(-1.0, raw).then_some((*from, -1.0))
-                }
-            });
-            if let Some((from, sign)) = known {
-                let from = self.traces[from].start;
-                for k in 0..trace.len() {
-                    whitened[trace.start + k] = sign * whitened[from + k];
-                }
-            } else {
-                model = Some((t, values.to_vec()));
-                self.whitening[t].whiten(&mut whitened.as_mut_slice()[trace]);
-            }
-        }
-        if let Some(root) = &self.scatter {
-            // It joins readings of different traces.
-            root.apply(whitened.as_mut_slice());
-            touched = (0..self.traces.len()).collect();
-        }
-        let sums = self.patterns.as_ref().map_or_else(
-            || DMatrix::zeros(0, 0),
-            |patterns| {
-                let length = self.traces.first().map_or(0, Range::len);
-                let mut sums = DMatrix::zeros(length, patterns.ncols());
-                for &t in &touched {
-                    let values = whitened.rows(self.traces[t].start, length);
-                    for k in 0..patterns.ncols() {
-                        if patterns[(t, k)] != 0.0 {
-                            sums.column_mut(k).axpy(patterns[(t, k)], &values, 1.0);
-                        }
-                    }
-                }
-                sums
-            },
-        );
-        let along = |basis: &DMatrix<f64>| {
-            DVector::from_iterator(
-                basis.ncols(),
-                basis.column_iter().map(|direction| {
-                    touched
-                        .iter()
-                        .map(|&t| {
-                            let trace = &self.traces[t];
-                            direction
-                                .rows(trace.start, trace.len())
-                                .dot(&whitened.rows(trace.start, trace.len()))
-                        })
-                        .sum()
-                }),
-            )
-        };
-        Part {
-            returned: along(&self.returned),
-            absorbed: along(&self.absorbed),
-            square: whitened.norm_squared(),
-            sums,
-            touched,
-            whitened,
-        }
-    }
-}
-
-/// EᵀPE of a signature and what goes with it.
-pub(in crate::diagnosis) struct Gram {
-    /// EᵀPE.
-    pub matrix: DMatrix<f64>,
-    /// Σ |L⁻¹E|².
-    pub whole: f64,
-}
-
-/// A whitened column and what the fit absorbs of it.
-struct Part {
-    whitened: DVector<f64>,
-    touched: Vec<usize>,
-    sums: DMatrix<f64>,
-    returned: DVector<f64>,
-    absorbed: DVector<f64>,
-    square: f64,
-}
-
-impl Part {
-    /// Eᵢᵀ L⁻ᵀ P L⁻¹ Eⱼ.
-    fn product(&self, other: &Self, space: &Space) -> f64 {
-        let whole: f64 = if std::ptr::eq(self, other) {
-            self.square
-        } else {
-            self.touched
-                .iter()
-                .map(|&t| {
-                    let (from, length) = (space.traces[t].start, space.traces[t].len());
-                    self.whitened
-                        .rows(from, length)
-                        .dot(&other.whitened.rows(from, length))
-                })
-                .sum()
-        };
-        whole - self.sums.dot(&other.sums) + self.returned.dot(&other.returned)
-            - self.absorbed.dot(&other.absorbed)
     }
 }
 

@@ -201,7 +201,7 @@ impl Effect<Linearised> for StickSlip {
         let Some(&slips) = shape.values.first() else {
             return Vec::new();
         };
-        let run = |place: &Place| 0.5 * place.direction * part_of_travel(model, place.x);
+        let run = |place: &Place| run(model, place);
         let change =
             |what: Anew, k: usize, place: &Place, lag: f64| what.change(model, k, place, lag);
         match self.kind(shape.variant) {
@@ -210,7 +210,7 @@ impl Effect<Linearised> for StickSlip {
                     return Vec::new();
                 };
                 let change = |k: usize, place: &Place| {
-                    let behind = -place.direction * (slips * run(place) + state).rem_euclid(1.0);
+                    let behind = -place.direction * part_of(slips * run(place) + state);
                     behind * model.reading_chord(k, behind * lag)
                 };
                 vec![if model.lies_beneath() {
@@ -236,12 +236,15 @@ impl Effect<Linearised> for StickSlip {
             Kind::Sawtooth(what, sign) => {
                 let own = passes(model);
                 let lag = shape.values.get(1 + own.len()).copied().unwrap_or(0.0);
+                let saw = Saw {
+                    what,
+                    sign,
+                    slips,
+                    lag,
+                };
                 let mut column = Column::default();
                 for (pass, state) in own.iter().zip(shape.values.iter().skip(1)) {
-                    let own = in_pass(model, pass, |k, place| {
-                        let part = (slips * run(place) + state).rem_euclid(1.0);
-                        sign * part * change(what, k, place, part * lag)
-                    });
+                    let own = saw.in_pass(model, pass, *state);
                     column.rows.extend(own.rows);
                     column.values.extend(own.values);
                 }
@@ -299,6 +302,29 @@ impl Effect<Linearised> for StickSlip {
         Some(settled)
     }
 
+    /// Where a pass begins changes its own readings.
+    fn changed(
+        &self,
+        model: &Linearised,
+        shape: &Shape,
+        value: usize,
+    ) -> Option<(Vec<usize>, Column)> {
+        let Kind::Sawtooth(what, sign) = self.kind(shape.variant) else {
+            return None;
+        };
+        let own = passes(model);
+        let pass = own.get(value.checked_sub(1)?)?;
+        let saw = Saw {
+            what,
+            sign,
+            slips: *shape.values.first()?,
+            lag: shape.values.get(1 + own.len()).copied().unwrap_or(0.0),
+        };
+        let column = saw.in_pass(model, pass, *shape.values.get(value)?);
+        let at = |range: &Range<usize>| model.traces().iter().position(|t| t == range);
+        Some((pass.iter().filter_map(at).collect(), column))
+    }
+
     fn allowed(&self, model: &Linearised, shape: &Shape) -> bool {
         let reach = 1.5..highest(model) + STRIDE;
         let aside = |state: &f64| (ASIDE..=0.5 - ASIDE).contains(&state.rem_euclid(0.5));
@@ -329,8 +355,7 @@ impl Effect<Linearised> for StickSlip {
         };
         let (first, last) = ends(model);
         model.between_positions(|k, place| {
-            let run = 0.5 * place.direction * part_of_travel(model, place.x);
-            let shift = -place.direction * lag * (slips * run + states[k]).rem_euclid(1.0);
+            let shift = -place.direction * lag * part_of(slips * run(model, place) + states[k]);
             let inside = (first..=last).contains(&(place.x + shift));
             [if inside && kind != Kind::Lag {
                 0.0
@@ -386,6 +411,34 @@ impl Effect<Linearised> for StickSlip {
     }
 }
 
+/// A sawtooth that begins anew in each pass.
+struct Saw {
+    what: Anew,
+    sign: f64,
+    slips: f64,
+    lag: f64,
+}
+
+impl Saw {
+    /// Its change of the readings of a pass that begins at a state.
+    fn in_pass(&self, model: &Linearised, pass: &[Range<usize>], state: f64) -> Column {
+        in_pass(model, pass, |k, place| {
+            let part = part_of(self.slips * run(model, place) + state);
+            self.sign * part * self.what.change(model, k, place, part * self.lag)
+        })
+    }
+}
+
+/// The way run at a place, from −½ to ½ of the travel forward and back again.
+fn run(model: &Linearised, place: &Place) -> f64 {
+    0.5 * place.direction * part_of_travel(model, place.x)
+}
+
+/// The part of a slip.
+fn part_of(slips: f64) -> f64 {
+    slips - slips.floor()
+}
+
 /// First and last position.
 fn ends(model: &Linearised) -> (f64, f64) {
     let positions = model.positions();
@@ -419,13 +472,14 @@ struct Pass {
 impl Pass {
     fn of(model: &Linearised, trace: &Range<usize>) -> Self {
         let place = &model.places()[trace.start];
-        let times = model.places()[trace.clone()].iter().map(|p| p.time);
+        // Read in one go along the travel: its ends are first and last.
+        let last = &model.places()[trace.end - 1];
         Self {
             position: model.seat(place).position,
             repeat: place.repeat,
             forward: place.direction > 0.0,
-            begins: times.clone().fold(f64::INFINITY, f64::min),
-            ends: times.fold(f64::NEG_INFINITY, f64::max),
+            begins: place.time.min(last.time),
+            ends: place.time.max(last.time),
         }
     }
 

@@ -1,5 +1,6 @@
 //! The reversal, staged and simultaneous, against known truth.
 
+mod any_model;
 mod designs;
 mod diagnosable;
 #[path = "../faulty_machine/mod.rs"]

@@ -134,3 +134,73 @@ impl Held {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use errsep_models::model::{AnyModel, FittedModel};
+    use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
+    use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use crate::diagnosis::attribution::context::Context;
+    use crate::diagnosis::detection::estimate::estimate;
+
+    /// *Limit*: some traces alone against all readings, to rounding of sums over a thousand of them, whichever
+    /// values move, one or several at a time, beside another cause.
+    #[test]
+    fn a_step_of_some_traces_is_that_of_all_readings() {
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let noise = SceneNoise {
+            white: 0.1,
+            correlated: 0.05,
+            length: 20.0,
+            shift: 0.05,
+        };
+        let scene = Scene::random(40, 3, 1e-5, 2.0, noise, &mut random);
+        let fitted = Linearised::new(&scene.measured(4), Assumptions::default()).unwrap();
+        let model = AnyModel::new(&fitted);
+        let catalogue = model.effects();
+        let readings = model.linearised();
+        let law = estimate(&model, &readings);
+        let context = Context::new(&model, &catalogue, law, 40, 1);
+        let place = |name: &str| catalogue.iter().position(|e| e.name() == name).unwrap();
+        let effect = place("stick-slip");
+        let drift = place("thermal-drift");
+        let beside = [context.cause(&model, drift, catalogue[drift].grid(&model)[3].clone())];
+        let seen = Seen::of(&context, &model, &readings, effect, &beside);
+        // What waves settle to is a sawtooth that begins anew in each pass.
+        let waves = catalogue[effect].grid(&model);
+        let waves = waves.iter().find(|shape| shape.variant > 0).unwrap();
+        let columns = catalogue[effect].columns(&model, waves).len();
+        let start = catalogue[effect]
+            .settled(waves, &vec![0.3; columns])
+            .unwrap();
+        let mut by_traces = ByTraces::new(&seen, &start).expect("passes of their own");
+        let mut values = start.values.clone();
+        for step in 0..60 {
+            for _ in 0..1 + step % 3 {
+                let k = random.random_range(0..values.len());
+                values[k] += if start.steps[k] == 0.0 {
+                    0.0
+                } else {
+                    random.random_range(-0.2..0.2)
+                };
+            }
+            let whole = Shape {
+                values: values.clone(),
+                ..start.clone()
+            };
+            let (expected, ..) = seen.value(&whole);
+            let found = by_traces.statistic(&values);
+            assert!(
+                (found - expected).abs() < 1e-9 * (1.0 + expected),
+                "{step}: {found} for {expected}"
+            );
+        }
+        let straight = Shape::only();
+        let jump = Seen::of(&context, &model, &readings, place("gain-mismatch"), &[]);
+        assert!(ByTraces::new(&jump, &straight).is_none());
+    }
+}

@@ -103,7 +103,7 @@ pub(super) struct Seen<'s> {
 }
 
 impl<'s> Seen<'s> {
-    fn of(
+    pub fn of(
         context: &'s Context<'s>,
         state: &'s AnyModel,
         readings: &DVector<f64>,
@@ -125,7 +125,7 @@ impl<'s> Seen<'s> {
     }
 
     /// Statistic, EᵀPE and score of a shape.
-    fn value(&self, shape: &Shape) -> (f64, DMatrix<f64>, DVector<f64>) {
+    pub fn value(&self, shape: &Shape) -> (f64, DMatrix<f64>, DVector<f64>) {
         let columns = self.effect.columns(self.state, shape);
         let mut gram = self.context.space.gram(&columns).matrix;
         for direction in &self.directions {

@@ -1,18 +1,20 @@
 //! The smallest circle around all points.
 
-use super::bisector::{Diagram, edges};
+use super::bisector::{Diagram, Kind};
 use super::contacts::{Extremes, Few};
 use super::points::Point;
 
-/// Centre and radius, in coordinates of magnitude one, from any start; nothing for fewer than two
-/// different points.
+/// Centre and radius, in coordinates of magnitude one, from two points far apart; nothing where they are
+/// the same.
 ///
 /// The smallest circle around a few points is at most that around all; the point that sticks out of it
 /// farthest joins the few until none does.
-pub(super) fn smallest_circumscribed(points: &[Point], start: Point) -> Option<(Point, f64)> {
-    let mut few = Few::about(points, start);
+pub(super) fn smallest_circumscribed(points: &[Point], apart: [Point; 2]) -> Option<(Point, f64)> {
+    let mut few = Few::of(apart);
+    let mut diagram = Diagram::of(few.points(), Kind::Farthest);
     loop {
-        let (square, centre) = edges(few.points(), Diagram::Farthest)
+        let (square, centre) = diagram
+            .edges()
             .iter()
             .map(|edge| (edge.square(edge.nearest()), edge.at(edge.nearest())))
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -22,5 +24,6 @@ pub(super) fn smallest_circumscribed(points: &[Point], start: Point) -> Option<(
         if found.outer() - square.sqrt() <= rounding || !few.add(found.farthest) {
             return Some((centre, found.outer()));
         }
+        diagram.add(found.farthest);
     }
 }

@@ -15,30 +15,10 @@ pub(super) struct Few {
 }
 
 impl Few {
-    /// For each of eight sectors about a centre the nearest and the farthest point; and the first point
-    /// with the one farthest from it, so that there are two also where one sector holds an exact arc.
-    pub(super) fn about(points: &[Point], centre: Point) -> Self {
-        let mut nearest: [Option<(f64, Point)>; 8] = [None; 8];
-        let mut farthest: [Option<(f64, Point)>; 8] = [None; 8];
-        for &p in points {
-            let q = p.minus(centre);
-            let sector = usize::from(q.x > 0.0)
-                + 2 * usize::from(q.y > 0.0)
-                + 4 * usize::from(q.x.abs() > q.y.abs());
-            let square = q.dot(q);
-            if nearest[sector].is_none_or(|(s, _)| square < s) {
-                nearest[sector] = Some((square, p));
-            }
-            if farthest[sector].is_none_or(|(s, _)| square > s) {
-                farthest[sector] = Some((square, p));
-            }
-        }
+    /// These, each once.
+    pub(super) fn of(points: impl IntoIterator<Item = Point>) -> Self {
         let mut few = Self::default();
-        if let Some(&first) = points.first() {
-            few.add(first);
-            few.add(Extremes::about(points, first).farthest);
-        }
-        for (_, p) in nearest.into_iter().chain(farthest).flatten() {
+        for p in points {
             few.add(p);
         }
         few
@@ -55,6 +35,57 @@ impl Few {
 
     pub(super) fn points(&self) -> &[Point] {
         &self.points
+    }
+}
+
+/// Points with which a search begins.
+#[derive(Debug, Clone)]
+pub(super) struct First {
+    /// The first point and the one farthest from it, so that there are two also where one sector holds an
+    /// exact arc.
+    pub(super) apart: [Point; 2],
+    /// For each of eight sectors about a centre the nearest point, where there is one, in order.
+    nearest: [Option<Point>; 8],
+    /// The farthest, the other way round.
+    farthest: [Option<Point>; 8],
+}
+
+impl First {
+    /// Of at least one point.
+    pub(super) fn about(points: &[Point], centre: Point) -> Self {
+        let mut nearest = [(f64::INFINITY, None); 8];
+        let mut farthest = [(f64::NEG_INFINITY, None); 8];
+        for &p in points {
+            let q = p.minus(centre);
+            let sector = usize::from(q.x > 0.0)
+                + 2 * usize::from(q.y > 0.0)
+                + 4 * usize::from(q.x.abs() > q.y.abs());
+            let square = q.dot(q);
+            if square < nearest[sector].0 {
+                nearest[sector] = (square, Some(p));
+            }
+            if square > farthest[sector].0 {
+                farthest[sector] = (square, Some(p));
+            }
+        }
+        nearest.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        farthest.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        let first = points.first().copied().unwrap_or_default();
+        Self {
+            apart: [first, Extremes::about(points, first).farthest],
+            nearest: nearest.map(|n| n.1),
+            farthest: farthest.map(|f| f.1),
+        }
+    }
+
+    /// The nearest of each sector and the two points apart.
+    pub(super) fn inner(&self) -> impl Iterator<Item = Point> {
+        self.nearest.into_iter().flatten().chain(self.apart)
+    }
+
+    /// The farthest of each sector and the two points apart.
+    pub(super) fn outer(&self) -> impl Iterator<Item = Point> {
+        self.farthest.into_iter().flatten().chain(self.apart)
     }
 }
 
@@ -81,6 +112,15 @@ impl Extremes {
         }
     }
 
+    /// The nearest of some points and the farthest of others, in coordinates of magnitude one.
+    pub(super) fn between(nearest: &[Point], farthest: &[Point], centre: Point) -> Self {
+        Self {
+            nearest: Self::about(nearest, centre).nearest,
+            farthest: Self::about(farthest, centre).farthest,
+            centre,
+        }
+    }
+
     fn by(points: &[Point], centre: Point, square: impl Fn(Point) -> f64) -> Self {
         let mut nearest = (f64::INFINITY, Point::default());
         let mut farthest = (f64::NEG_INFINITY, Point::default());
@@ -101,11 +141,13 @@ impl Extremes {
     }
 
     pub(super) fn inner(&self) -> f64 {
-        self.nearest.distance(self.centre)
+        let q = self.nearest.minus(self.centre);
+        q.dot(q).sqrt()
     }
 
     pub(super) fn outer(&self) -> f64 {
-        self.farthest.distance(self.centre)
+        let q = self.farthest.minus(self.centre);
+        q.dot(q).sqrt()
     }
 
     /// Outer less inner, (D² − d²)/(D + d) with D² − d² = (f − n)·(f + n − 2c), which keeps its digits

@@ -5,26 +5,27 @@
 //! only make it larger. Where it is held on all sides it is the one sought. Otherwise, as among points
 //! that are no ring at all, every triangle of the Delaunay triangulation is looked at.
 
-use super::bisector::{Diagram, Edge, edges};
-use super::contacts::{Extremes, Few, all_on_one_side};
+use super::bisector::{Diagram, Edge, Kind};
+use super::contacts::{Extremes, Few, First, all_on_one_side};
 use super::points::{Point, circumcentre};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
 /// Exchanges after which the points are taken for no ring.
 const MOST_EXCHANGES: usize = 40;
 
-/// Centre and radius in coordinates of magnitude one, from any start, or nothing where no three points
+/// Centre and radius in coordinates of magnitude one, from the first points of a search, or nothing where no three points
 /// surround an empty circle.
-pub(super) fn largest_inscribed(points: &[Point], start: Point) -> Option<(Point, f64)> {
-    by_exchange(points, start).or_else(|| by_triangles(points))
+pub(super) fn largest_inscribed(points: &[Point], first: &First) -> Option<(Point, f64)> {
+    by_exchange(points, first).or_else(|| by_triangles(points))
 }
 
 /// The largest empty circle centred in the hull, if it is held on all sides.
-fn by_exchange(points: &[Point], start: Point) -> Option<(Point, f64)> {
-    let mut few = Few::about(points, start);
+fn by_exchange(points: &[Point], first: &First) -> Option<(Point, f64)> {
+    let mut few = Few::of(first.inner());
+    let mut diagram = Diagram::of(few.points(), Kind::Nearest);
     let mut hull = Polygon::around(points)?;
     for _ in 0..MOST_EXCHANGES {
-        let (square, centre) = largest_of_few(few.points(), &hull)?;
+        let (square, centre) = largest_of_few(few.points(), &diagram, &hull)?;
         let found = Extremes::about(points, centre);
         let outside = all_on_one_side(points, centre);
         // What two evaluations of one radius differ by from rounding.
@@ -38,9 +39,12 @@ fn by_exchange(points: &[Point], start: Point) -> Option<(Point, f64)> {
                 if !few.add(found.nearest) {
                     return held(points, centre, found.inner()).then_some((centre, found.inner()));
                 }
+                diagram.add(found.nearest);
             }
             (Some(inwards), _) => {
-                few.add(found.nearest);
+                if few.add(found.nearest) {
+                    diagram.add(found.nearest);
+                }
                 let outwards = Point::new(-inwards.x, -inwards.y);
                 let border = points
                     .iter()
@@ -56,15 +60,15 @@ fn by_exchange(points: &[Point], start: Point) -> Option<(Point, f64)> {
 /// Centre and squared radius of the largest circle without one of a few points inside, its centre in
 /// the polygon. The squared distance from the nearest point is convex on each Voronoi cell, so that it
 /// is greatest at a corner of a cell, at the border's crossing with an edge, or at a corner of the border.
-fn largest_of_few(points: &[Point], hull: &Polygon) -> Option<(f64, Point)> {
+fn largest_of_few(points: &[Point], diagram: &Diagram, hull: &Polygon) -> Option<(f64, Point)> {
     let mut best: Option<(f64, Point)> = None;
     let mut offer = |square: f64, centre: Point| {
         if best.is_none_or(|(s, _)| square > s) {
             best = Some((square, centre));
         }
     };
-    for edge in edges(points, Diagram::Nearest) {
-        if let Some((low, high)) = hull.within(&edge) {
+    for edge in diagram.edges() {
+        if let Some((low, high)) = hull.within(edge) {
             offer(edge.square(low), edge.at(low));
             offer(edge.square(high), edge.at(high));
         }

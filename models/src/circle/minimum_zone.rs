@@ -3,9 +3,10 @@
 //! The separation of some of the points is at most that of all. So the exact optimum of a few points
 //! bounds the optimum of all from below, its centre gives a bound from above, and the points that
 //! are nearest and farthest there join the few until both bounds meet: then the optimum is proved.
+//! The farthest is sought among still fewer, the sites of a diagram, which bounds from below as well.
 
-use super::bisector::{Diagram, Edge, edges};
-use super::contacts::{Extremes, Few};
+use super::bisector::{Diagram, Edge, Kind};
+use super::contacts::{Extremes, Few, First};
 use super::points::{CircleError, FLAT, Point};
 
 /// Where the centre of a zone lies.
@@ -42,20 +43,32 @@ impl Place {
     }
 }
 
-/// The centre of the minimum zone of `points` in coordinates of magnitude one, from any start.
+/// The centre of the minimum zone of `points` in coordinates of magnitude one, from any start and the first
+/// points of a search.
 ///
 /// # Errors
 /// [`CircleError::StraighterThanAnyCircle`] where no ring is narrower than the narrowest strip.
-pub(super) fn minimum_zone_centre(points: &[Point], start: Point) -> Result<Point, CircleError> {
-    let mut few = Few::about(points, start);
+pub(super) fn minimum_zone_centre(
+    points: &[Point],
+    start: Point,
+    first: &First,
+) -> Result<Point, CircleError> {
+    let mut outer = Few::of(first.outer());
+    let mut few = Few::of(first.outer().chain(first.inner()));
+    let mut diagram = Diagram::of(outer.points(), Kind::Farthest);
     let mut best = (f64::INFINITY, Place::Centre(start));
-    while let Some((bound, place)) = zone_of_few(few.points()) {
+    let at_start = Extremes::about(points, start).width();
+    while let Some((bound, place)) = zone_of_few(few.points(), &diagram, at_start.min(best.0)) {
         let (nearest, farthest, width) = place.zone(points);
         if width < best.0 {
             best = (width, place);
         }
-        let new = few.add(nearest) | few.add(farthest);
-        if best.0 - bound <= ROUNDING || !new {
+        let new = outer.add(farthest);
+        if new {
+            diagram.add(farthest);
+            few.add(farthest);
+        }
+        if best.0 - bound <= ROUNDING || !(few.add(nearest) | new) {
             break;
         }
     }
@@ -68,79 +81,132 @@ pub(super) fn minimum_zone_centre(points: &[Point], start: Point) -> Result<Poin
 /// What two evaluations of one width, in coordinates of magnitude one, may differ by.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// The least width of a few points and where it is reached.
+/// The least width of a few points, the farthest of them sought among the sites of a diagram, and where it
+/// is reached.
 ///
 /// At a minimum two outer and two inner contacts alternate: the gradient of an outer distance is a
 /// unit vector, and the hulls of the outer and of the inner unit vectors must meet, which on a circle
 /// needs two chords that cross. Such a centre lies where an edge of the farthest-point Voronoi diagram
 /// crosses one of the nearest-point diagram, so that walking all edges of the first finds it, also
-/// where there are many local minima.
-fn zone_of_few(points: &[Point]) -> Option<(f64, Place)> {
-    let mut best: Option<(f64, Place)> = None;
-    let mut offer = |width: f64, place: Place| {
-        if best.is_none_or(|(w, _)| width < w) {
-            best = Some((width, place));
-        }
+/// where there are many local minima. As the few hold the sites, no width is negative, which one outer and
+/// one inner contact alone would need for a minimum.
+///
+/// `reached` is a width that some place reaches: wider ones need not be looked at.
+fn zone_of_few(points: &[Point], diagram: &Diagram, reached: f64) -> Option<(f64, Place)> {
+    let mut best = Best {
+        found: None,
+        reached,
     };
     let mut lines = Vec::with_capacity(points.len());
-    for edge in edges(points, Diagram::Farthest) {
-        walk(&edge, points, &mut lines, &mut offer);
+    let points = Points {
+        few: points,
+        sites: diagram.sites(),
+    };
+    for edge in diagram.edges() {
+        walk(edge, points, &mut lines, &mut best);
     }
-    best
+    best.found
 }
 
+/// A few points, and those of them among which the farthest is sought.
+#[derive(Debug, Clone, Copy)]
+struct Points<'a> {
+    few: &'a [Point],
+    sites: &'a [Point],
+}
+
+/// The narrowest zone so far.
+struct Best {
+    found: Option<(f64, Place)>,
+    reached: f64,
+}
+
+impl Best {
+    fn offer(&mut self, width: f64, place: Place) {
+        if self.found.is_none_or(|(w, _)| width < w) {
+            self.found = Some((width, place));
+            self.reached = self.reached.min(width);
+        }
+    }
+
+    /// Offers a place on an edge, unless the distance from one point there, given by its line, already
+    /// makes the zone too wide.
+    fn offer_at(&mut self, edge: &Edge, t: f64, line: (f64, f64), points: Points) {
+        let outer = edge.square(t);
+        let less = edge.square(0.0) - line.0 - line.1 * t;
+        let least = less / (outer.sqrt() + (outer - less).max(0.0).sqrt());
+        if least <= self.reached * (1.0 + MARGIN) + MARGIN {
+            let centre = edge.at(t);
+            let width = Extremes::between(points.few, points.sites, centre).width();
+            self.offer(width, Place::Centre(centre));
+        }
+    }
+}
+
+/// Far more than the rounding of a width, in coordinates of magnitude one.
+const MARGIN: f64 = 1e-9;
+
+/// Distance along an edge, in coordinates of magnitude one, from which rounding hides which of two parallel
+/// lines is the lower.
+const FAR: f64 = 10.0;
+
 /// Follows the nearest point along the bisector of an edge of the farthest-point diagram, the lower
-/// envelope of the lines α + βt, from one end of the world to the other, and offers every place of the
-/// edge where it changes, and its ends. To begin at the edge's end would be cheaper, but where that is
-/// far away rounding hides which of two parallel lines is the lower.
-fn walk(
-    edge: &Edge,
-    points: &[Point],
-    lines: &mut Vec<(f64, f64)>,
-    offer: &mut impl FnMut(f64, Place),
-) {
+/// envelope of the lines α + βt, and offers every place of the edge where it changes, and its ends. It
+/// begins at the edge's low end or, where that is far away, at the end of the world.
+fn walk(edge: &Edge, points: Points, lines: &mut Vec<(f64, f64)>, best: &mut Best) {
     lines.clear();
-    lines.extend(points.iter().map(|&p| edge.line(p)));
-    let mut offer_at = |t: f64| {
-        let centre = edge.at(t);
-        offer(
-            Extremes::about(points, centre).width(),
-            Place::Centre(centre),
-        );
+    lines.extend(points.few.iter().map(|&p| edge.line(p)));
+    let begin = if edge.low.abs() < FAR {
+        edge.low
+    } else {
+        f64::NEG_INFINITY
+    };
+    // The lowest there, of those that meet the one that falls most; at the end of the world the steepest.
+    let before = |a: (f64, f64), b: (f64, f64)| {
+        if begin.is_finite() {
+            let (at_a, at_b) = (a.0 + a.1 * begin, b.0 + b.1 * begin);
+            at_a < at_b || at_a == at_b && a.1 < b.1
+        } else {
+            a.1 > b.1 || a.1 == b.1 && a.0 < b.0
+        }
     };
     let first = lines
         .iter()
         .copied()
-        .min_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
+        .reduce(|least, line| if before(line, least) { line } else { least });
     let Some(first) = first else { return };
-    let (mut t, mut nearest) = (f64::NEG_INFINITY, first);
+    let (mut t, mut nearest) = (begin, first);
     // Each step goes to a line of lesser slope, so that there are at most as many as points.
     loop {
-        let next = lines
-            .iter()
-            .filter(|line| line.1 < nearest.1)
-            .map(|&line| (((line.0 - nearest.0) / (nearest.1 - line.1)).max(t), line))
-            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.1.total_cmp(&b.1.1)));
-        let Some((crossing, line)) = next else { break };
+        let (mut crossing, mut line) = (f64::INFINITY, nearest);
+        for &other in lines.iter().filter(|other| other.1 < nearest.1) {
+            let at = ((other.0 - nearest.0) / (nearest.1 - other.1)).max(t);
+            if at < crossing || at == crossing && other.1 < line.1 {
+                (crossing, line) = (at, other);
+            }
+        }
+        if line.1 == nearest.1 {
+            break;
+        }
         if crossing > edge.high {
             break;
         }
         if crossing >= edge.low {
-            offer_at(crossing);
+            best.offer_at(edge, crossing, line, points);
         }
         t = crossing;
         nearest = line;
     }
     for end in [edge.low, edge.high] {
         if end.is_finite() {
-            offer_at(end);
+            best.offer_at(edge, end, nearest, points);
         }
     }
     if edge.low == f64::NEG_INFINITY {
         let back = Point::new(-edge.along.x, -edge.along.y);
-        offer(0.5 * first.1, Place::Beyond(back));
+        best.offer(0.5 * first.1, Place::Beyond(back));
     }
     if edge.high == f64::INFINITY {
-        offer(-0.5 * nearest.1, Place::Beyond(edge.along));
+        best.offer(-0.5 * nearest.1, Place::Beyond(edge.along));
     }
 }

@@ -1,7 +1,7 @@
 //! Circularity: the radial separation of the points about a reference circle.
 
 use super::circumscribed::smallest_circumscribed;
-use super::contacts::all_on_one_side;
+use super::contacts::{First, all_on_one_side};
 use super::inscribed::largest_inscribed;
 use super::minimum_zone::minimum_zone_centre;
 use super::points::{Circle, CircleError, Frame, Point, check_points};
@@ -150,6 +150,7 @@ struct Search<'a> {
     frame: Frame,
     local: Vec<Point>,
     start: Point,
+    first: First,
     surrounded: bool,
 }
 
@@ -159,11 +160,13 @@ impl<'a> Search<'a> {
         let local: Vec<Point> = points.iter().map(|&p| frame.to_local(p)).collect();
         let centre = frame.to_local(centre);
         let near = centre.x.abs().max(centre.y.abs()) < FAR;
+        let start = if near { centre } else { Point::default() };
         Self {
             points,
             frame,
             surrounded: near && all_on_one_side(&local, centre).is_none(),
-            start: if near { centre } else { Point::default() },
+            start,
+            first: First::about(&local, start),
             local,
         }
     }
@@ -182,7 +185,7 @@ impl<'a> Search<'a> {
     }
 
     fn minimum_zone(&self) -> Result<Zone, CircleError> {
-        let centre = minimum_zone_centre(&self.local, self.start)?;
+        let centre = minimum_zone_centre(&self.local, self.start, &self.first)?;
         Ok(self.zone(Reference::MinimumZone, centre, None))
     }
 
@@ -191,13 +194,13 @@ impl<'a> Search<'a> {
             return Err(CircleError::NotSurrounded);
         }
         let (centre, radius) =
-            largest_inscribed(&self.local, self.start).ok_or(CircleError::NotSurrounded)?;
+            largest_inscribed(&self.local, &self.first).ok_or(CircleError::NotSurrounded)?;
         Ok(self.zone(Reference::MaximumInscribed, centre, Some(radius)))
     }
 
     fn minimum_circumscribed(&self) -> Result<Zone, CircleError> {
         let (centre, radius) =
-            smallest_circumscribed(&self.local, self.start).ok_or(CircleError::Collinear)?;
+            smallest_circumscribed(&self.local, self.first.apart).ok_or(CircleError::Collinear)?;
         Ok(self.zone(Reference::MinimumCircumscribed, centre, Some(radius)))
     }
 }
@@ -207,7 +210,12 @@ impl<'a> Search<'a> {
 const FAR: f64 = 1e6;
 
 fn zone_about(points: &[Point], reference: Reference, centre: Point, radius: Option<f64>) -> Zone {
-    let distances: Vec<f64> = points.iter().map(|p| p.distance(centre)).collect();
+    // Squares of the coordinates that are let through stay within the range of numbers.
+    let distance = |p: &Point| {
+        let q = p.minus(centre);
+        q.dot(q).sqrt()
+    };
+    let distances: Vec<f64> = points.iter().map(distance).collect();
     let (inner, outer) = distances
         .iter()
         .fold((f64::INFINITY, 0.0_f64), |(l, h), &d| (l.min(d), h.max(d)));

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use super::components::{Component, Location};
 use super::design::{Design, decompose, is_definition};
 use super::prediction::Parameter;
-use super::regression::OPEN;
+use super::solution::OPEN;
 use super::{DiagonalError, WorkZone};
 
 /// An error function that the readings determine at every position.
@@ -34,15 +34,16 @@ impl Answers {
     /// # Errors
     /// The singular values do not converge.
     pub fn of(zone: &WorkZone, design: &Design) -> Result<Self, DiagonalError> {
-        let split = decompose(&design.matrix, 0.0)?;
+        let matrix = design.dense();
+        let split = decompose(&matrix, 0.0)?;
         let unseen = |j: usize| split.null.row(j).norm();
         // Σ M v vᵀe / s², whose run means are zero already.
         let weights = |j: usize| {
-            let mut inside = DVector::zeros(design.matrix.ncols());
+            let mut inside = DVector::zeros(matrix.ncols());
             for (value, vector) in &split.determined {
                 inside.axpy(vector[j] / (value * value), vector, 1.0);
             }
-            &design.matrix * inside * design.scale[j]
+            &matrix * inside * design.scale[j]
         };
         let known = |parameter: Parameter| {
             let j = design.unknowns.index_of(parameter)?;
@@ -56,7 +57,7 @@ impl Answers {
             let mut found = Determined {
                 component,
                 positions: Vec::new(),
-                weights: DMatrix::zeros(zone.steps + 1, design.matrix.nrows()),
+                weights: DMatrix::zeros(zone.steps + 1, matrix.nrows()),
             };
             let mut any = false;
             for index in 0..=zone.steps {

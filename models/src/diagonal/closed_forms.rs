@@ -6,7 +6,7 @@ use super::diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
 use super::estimators::{ESTIMATORS, Estimator, Scale, cell};
 use super::readings::{DiagonalError, DiagonalReading, Edges, Motion, check};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// One estimator applied at every step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -72,7 +72,8 @@ fn apply(
         profile: vec![0.0],
         profile_gains: vec![0.0],
     };
-    let mut total: BTreeMap<usize, f64> = BTreeMap::new();
+    let mut total: HashMap<usize, f64> = HashMap::new();
+    let (mut sum, mut square) = (0.0, 0.0);
     for i in 0..zone.steps {
         let mut weights: BTreeMap<usize, f64> = BTreeMap::new();
         for (corners, pattern, sign) in estimator.terms {
@@ -84,14 +85,17 @@ fn apply(
             }
         }
         for (reading, w) in &weights {
-            *total.entry(*reading).or_default() += w;
+            let whole = total.entry(*reading).or_default();
+            square -= *whole * *whole;
+            *whole += w;
+            square += *whole * *whole;
         }
         let (value, gain) = evaluate(&weights, readings);
         form.steps.push(value);
         form.step_gains.push(gain);
-        let (sum, gain) = evaluate(&total, readings);
+        sum += value;
         form.profile.push(sum);
-        form.profile_gains.push(gain);
+        form.profile_gains.push(f64::max(square, 0.0).sqrt());
     }
     Some(form)
 }
@@ -148,12 +152,12 @@ pub fn totals(
     check(zone, readings)?;
     let mut runs: BTreeMap<_, (Option<f64>, Option<f64>)> = BTreeMap::new();
     for r in readings {
-        let stops = zone.stops(r.diagonal, Sequence::Together);
+        let (first, last) = zone.ends(r.diagonal);
         let ends = runs.entry((r.run(), r.travel)).or_default();
-        if stops.first() == Some(&r.at) {
+        if r.at == first {
             ends.0 = Some(r.value);
         }
-        if stops.last() == Some(&r.at) {
+        if r.at == last {
             ends.1 = Some(r.value);
         }
     }
@@ -214,7 +218,7 @@ pub fn totals(
 fn reversals(zone: &WorkZone, readings: &[DiagonalReading]) -> BTreeMap<Diagonal, f64> {
     let mut pairs: BTreeMap<_, [Option<f64>; 2]> = BTreeMap::new();
     for r in readings {
-        if zone.stops(r.diagonal, Sequence::Together).contains(&r.at) {
+        if zone.is_stop(r.diagonal, Sequence::Together, r.at) {
             let pair = pairs.entry((r.run(), r.at)).or_default();
             pair[usize::from(r.travel == Travel::Backward)] = Some(r.value);
         }

@@ -2,15 +2,17 @@
 
 use super::components::{Axis, Component, NodeKind};
 use super::diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
+use super::elimination::Elimination;
 use super::prediction::{Parameter, Unknowns, sensitivities};
 use super::readings::{DiagonalError, DiagonalReading, Run};
+use super::undetermined::Undetermined;
 use errsep_solvers::linear::limited;
 use nalgebra::{DMatrix, DVector};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::HashMap;
 
 /// Singular values below this share of the greatest count as zero: the entries carry some 1e-13 of
 /// rounding, the least effect that a grid of twenty steps can show is about 1e-4.
-const RANK_TOLERANCE: f64 = 1e-9;
+pub(super) const RANK_TOLERANCE: f64 = 1e-9;
 
 /// µm that a rotation of 1 rad makes at a lever of 1 mm.
 const UM_PER_RAD_MM: f64 = 1e3;
@@ -32,18 +34,22 @@ impl Function {
     }
 }
 
-/// A design: rows of readings freed from the zero of their run, columns scaled to µm.
+/// A design: what each reading sees, columns scaled to µm. Readings at the same stop of a set-up see the
+/// same, but for the zero of their run.
 #[derive(Debug, Clone)]
 pub(super) struct Design {
     pub(super) unknowns: Unknowns,
-    /// Readings × parameters, per scaled parameter; each run has mean zero in every column.
-    pub(super) matrix: DMatrix<f64>,
     /// A parameter is its scaled value times this: µm or rad.
     pub(super) scale: DVector<f64>,
     /// Runs, each of which costs one degree of freedom.
     pub(super) runs: Vec<Run>,
     /// Run of each reading.
     pub(super) run_of: Vec<usize>,
+    /// For each stop the places of the unknowns it sees, and the readings' derivatives by the scaled
+    /// unknowns.
+    pub(super) stops: Vec<Vec<(usize, f64)>>,
+    /// Stop of each reading.
+    pub(super) stop_of: Vec<usize>,
 }
 
 /// Whether a parameter is zero by definition of where the errors are counted from: functions at
@@ -65,12 +71,19 @@ impl Design {
         readings: &[DiagonalReading],
         keep: impl Fn(Parameter) -> bool,
     ) -> Self {
-        let mut known = BTreeMap::new();
-        for r in readings {
-            known
-                .entry((r.diagonal, r.target, r.at, r.travel))
-                .or_insert_with(|| sensitivities(zone, r.diagonal, r.target, r.at, r.travel));
-        }
+        let mut known = HashMap::new();
+        let mut seen = Vec::new();
+        let stop_of: Vec<usize> = readings
+            .iter()
+            .map(|r| {
+                *known
+                    .entry((r.diagonal, r.target, r.at, r.travel))
+                    .or_insert_with(|| {
+                        seen.push(sensitivities(zone, r.diagonal, r.target, r.at, r.travel));
+                        seen.len() - 1
+                    })
+            })
+            .collect();
         // An axis that stands still adds a constant rotation of the tool, which is mirror misalignment
         // under another name.
         let moves = |axis: Axis| {
@@ -81,18 +94,23 @@ impl Design {
         let moving = Axis::ALL.map(moves);
         // Without a way back the usual analysis, which takes no axis to depend on its sense of travel.
         let back = readings.iter().any(|r| r.travel == Travel::Backward);
-        let touched: BTreeSet<Parameter> = known
-            .values()
-            .flatten()
-            .map(|t| t.0)
-            .filter(|p| match p {
+        let wanted = |p: Parameter| {
+            let of_model = match p {
                 Parameter::Node(c, _) => moving[c.axis.index()],
                 Parameter::Reversal(..) => back,
                 Parameter::Squareness(_) | Parameter::Mirror(..) => true,
-            })
-            .filter(|&p| keep(p))
-            .collect();
-        let unknowns = Unknowns::of(touched);
+            };
+            of_model && keep(p)
+        };
+        let mut touched = vec![None; Parameter::count(zone.steps)];
+        for &(parameter, _) in seen.iter().flatten() {
+            touched[parameter.number(zone.steps)] = Some(parameter);
+        }
+        let unknowns = Unknowns::of(touched.into_iter().flatten().filter(|&p| wanted(p)));
+        let mut places = vec![None; Parameter::count(zone.steps)];
+        for (place, parameter) in unknowns.parameters.iter().enumerate() {
+            places[parameter.number(zone.steps)] = Some(place);
+        }
         let diagonal = zone.travel.iter().map(|t| t * t).sum::<f64>().sqrt();
         let scale = DVector::from_iterator(
             unknowns.parameters.len(),
@@ -108,31 +126,88 @@ impl Design {
             .iter()
             .map(|r| runs.partition_point(|run| *run < r.run()))
             .collect();
-        let mut matrix = DMatrix::zeros(readings.len(), unknowns.parameters.len());
-        for (row, r) in readings.iter().enumerate() {
-            for (parameter, value) in known
-                .get(&(r.diagonal, r.target, r.at, r.travel))
-                .into_iter()
-                .flatten()
-            {
-                if let Some(column) = unknowns.index_of(*parameter) {
-                    matrix[(row, column)] = value * scale[column];
-                }
-            }
-        }
-        let mut design = Self {
+        let stops = seen
+            .iter()
+            .map(|terms| {
+                terms
+                    .iter()
+                    .filter_map(|&(parameter, value)| {
+                        let place = places[parameter.number(zone.steps)]?;
+                        Some((place, value * scale[place]))
+                    })
+                    .collect()
+            })
+            .collect();
+        Self {
             unknowns,
-            matrix,
             scale,
             runs,
             run_of,
-        };
-        for column in 0..design.matrix.ncols() {
-            let mut values: DVector<f64> = design.matrix.column(column).into();
-            design.free_of_zero(&mut values);
-            design.matrix.set_column(column, &values);
+            stops,
+            stop_of,
         }
-        design
+    }
+
+    /// Readings × parameters, per scaled parameter, each run with mean zero in every column.
+    pub(super) fn dense(&self) -> DMatrix<f64> {
+        let mut matrix = DMatrix::zeros(self.stop_of.len(), self.unknowns.parameters.len());
+        for (row, &stop) in self.stop_of.iter().enumerate() {
+            for &(place, value) in &self.stops[stop] {
+                matrix[(row, place)] = value;
+            }
+        }
+        for column in 0..matrix.ncols() {
+            let mut values: DVector<f64> = matrix.column(column).into();
+            self.free_of_zero(&mut values);
+            matrix.set_column(column, &values);
+        }
+        matrix
+    }
+
+    /// Sensitivity of each reading to each of the unknowns it sees, per µm or rad.
+    pub(super) fn sensitivities(&self) -> Vec<Vec<(usize, f64)>> {
+        let unscaled = |terms: &Vec<(usize, f64)>| -> Vec<(usize, f64)> {
+            let terms = terms.iter();
+            terms.map(|&(j, a)| (j, a / self.scale[j])).collect()
+        };
+        let stops: Vec<_> = self.stops.iter().map(unscaled).collect();
+        self.stop_of
+            .iter()
+            .map(|&stop| stops[stop].clone())
+            .collect()
+    }
+
+    /// Mᵀr of residuals r whose runs have mean zero.
+    pub(super) fn gradient(&self, residuals: &DVector<f64>) -> DVector<f64> {
+        let mut sums = vec![0.0; self.stops.len()];
+        for (r, &stop) in residuals.iter().zip(&self.stop_of) {
+            sums[stop] += r;
+        }
+        let mut gradient = DVector::zeros(self.scale.len());
+        for (terms, sum) in self.stops.iter().zip(sums) {
+            for &(place, a) in terms {
+                gradient[place] += a * sum;
+            }
+        }
+        gradient
+    }
+
+    /// Observed less predicted, each run with mean zero, µm.
+    pub(super) fn residuals(&self, observed: &DVector<f64>, scaled: &DVector<f64>) -> DVector<f64> {
+        let predicted: Vec<f64> = self
+            .stops
+            .iter()
+            .map(|terms| terms.iter().map(|&(place, a)| a * scaled[place]).sum())
+            .collect();
+        let mut left = DVector::from_iterator(
+            observed.len(),
+            observed
+                .iter()
+                .zip(&self.stop_of)
+                .map(|(o, &stop)| o - predicted[stop]),
+        );
+        self.free_of_zero(&mut left);
+        left
     }
 
     /// Takes the mean of each run off: the unknown zero of the laser, eliminated.
@@ -197,6 +272,17 @@ pub(super) fn decompose(matrix: &DMatrix<f64>, floor: f64) -> Result<Decompositi
     Ok(Decomposition { determined, null })
 }
 
+/// What readings of a design leave open.
+///
+/// # Errors
+/// Singular values do not converge.
+pub(super) fn left_open(design: &Design, zone: &WorkZone) -> Result<Undetermined, DiagonalError> {
+    let blank = DVector::zeros(design.stop_of.len());
+    let triangle = Elimination::of(design, zone, &blank)?;
+    let border = decompose(&triangle.corner, triangle.floor)?;
+    triangle.undetermined(&border.null)
+}
+
 /// How much a set of runs can determine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Identifiability {
@@ -221,14 +307,15 @@ pub fn identifiability(
     runs: &[(Diagonal, Target, Sequence)],
 ) -> Result<Identifiability, DiagonalError> {
     let readings = blank_readings(zone, runs);
+    let blank = DVector::zeros(readings.len());
     let all = Design::of(zone, &readings, |_| true);
     let defined = Design::of(zone, &readings, |p| !is_definition(p, zone.steps));
     Ok(Identifiability {
         readings: readings.len() - all.runs.len(),
         parameters: all.unknowns.parameters.len(),
-        rank: decompose(&all.matrix, 0.0)?.determined.len(),
+        rank: Elimination::of(&all, zone, &blank)?.rank()?,
         defined_parameters: defined.unknowns.parameters.len(),
-        defined_rank: decompose(&defined.matrix, 0.0)?.determined.len(),
+        defined_rank: Elimination::of(&defined, zone, &blank)?.rank()?,
     })
 }
 

@@ -5,13 +5,10 @@ use super::components::{Axis, Component, Location, NodeKind};
 use super::design::{Function, nodes_of};
 use super::prediction::{Parameter, Unknowns};
 use super::readings::DiagonalError;
+use super::undetermined::{NOTHING, SparseRow, Undetermined, square};
 use errsep_solvers::linear::limited::symmetric_eigen;
-use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-
-/// Squared length below which part of an orthonormal null vector counts as none. Null vectors are
-/// known to about 1e-11; what a set-up really confounds shows with more than 1e-4.
-const NOTHING: f64 = 1e-12;
 
 /// How far the readings determine an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -86,19 +83,27 @@ struct Block {
 }
 
 impl Block {
-    /// Coordinates of the columns of `basis` within this block.
-    fn coordinates(&self, basis: &DMatrix<f64>) -> DMatrix<f64> {
-        let own = basis.select_rows(&self.rows);
-        let along = DMatrix::from_columns(std::slice::from_ref(&self.line));
+    /// Rows over the columns of the null space that span the coordinates within this block.
+    fn coordinates(&self, null: &Undetermined) -> Vec<SparseRow> {
+        let along = || self.rows.iter().copied().zip(self.line.iter().copied());
         match self.part {
-            Part::Whole => own,
-            Part::Slope | Part::Constant => along.tr_mul(&own),
-            Part::Shape | Part::Changes => &own - &along * along.tr_mul(&own),
+            Part::Whole => self
+                .rows
+                .iter()
+                .map(|&place| null.combined([(place, 1.0)]))
+                .collect(),
+            Part::Slope | Part::Constant => vec![null.combined(along())],
+            // What is no multiple of the line: each value less that of the last, by the line's ratio.
+            Part::Shape | Part::Changes => {
+                let Some((last, end)) = along().last() else {
+                    return Vec::new();
+                };
+                along()
+                    .filter(|&(place, _)| place != last)
+                    .map(|(place, height)| null.combined([(place, 1.0), (last, -height / end)]))
+                    .collect()
+            }
         }
-    }
-
-    fn moved_by(&self, basis: &DMatrix<f64>) -> bool {
-        self.coordinates(basis).norm_squared() > NOTHING
     }
 }
 
@@ -203,38 +208,17 @@ pub(super) fn open_shape(function: Function, nodes: &[(usize, usize)]) -> DVecto
     if length > 0.0 { shape / length } else { shape }
 }
 
-/// The part of a null basis that leaves a block alone.
-fn without(basis: &DMatrix<f64>, block: &Block) -> Result<DMatrix<f64>, DiagonalError> {
-    if basis.ncols() == 0 {
-        return Ok(basis.clone());
-    }
-    let part = block.coordinates(basis);
-    if part.norm_squared() <= NOTHING {
-        return Ok(basis.clone());
-    }
-    let eigen = eigen(part.transpose() * part)?;
-    let kept: Vec<DVector<f64>> = (0..basis.ncols())
-        .filter(|&i| eigen.eigenvalues[i] <= NOTHING)
-        .map(|i| basis * eigen.eigenvectors.column(i))
-        .collect();
-    Ok(if kept.is_empty() {
-        DMatrix::zeros(basis.nrows(), 0)
-    } else {
-        DMatrix::from_columns(&kept)
-    })
-}
-
-fn eigen(matrix: DMatrix<f64>) -> Result<SymmetricEigen<f64, Dyn>, DiagonalError> {
-    symmetric_eigen(matrix).ok_or_else(|| DiagonalError::Numerical {
+fn not_converged() -> DiagonalError {
+    DiagonalError::Numerical {
         reason: "the eigenvalues did not converge".to_owned(),
-    })
+    }
 }
 
 /// How far one function is determined, and an orthonormal basis (free nodes × lost) of the
 /// combinations of its own values that are not.
 pub(super) fn determination(
     unknowns: &Unknowns,
-    null: &DMatrix<f64>,
+    null: &Undetermined,
     function: Function,
 ) -> Result<(Determined, DMatrix<f64>), DiagonalError> {
     let nodes = nodes_of(unknowns, function);
@@ -242,12 +226,28 @@ pub(super) fn determination(
     if rows.is_empty() {
         return Ok((Determined::NotTouched, DMatrix::zeros(0, 0)));
     }
-    let own = null.select_rows(&rows);
-    let eigen = eigen(&own * own.transpose())?;
-    let lost: Vec<DVector<f64>> = (0..rows.len())
-        .filter(|&i| eigen.eigenvalues[i] > NOTHING)
-        .map(|i| eigen.eigenvectors.column(i).into_owned())
-        .collect();
+    // A function has one value at a position: what lies at that position alone leaves all of it open.
+    let mut lost = Vec::new();
+    let shared = null.shared();
+    let mut own = DMatrix::zeros(rows.len(), shared.len());
+    for (i, &place) in rows.iter().enumerate() {
+        let (alone, row) = null.split(place);
+        if alone > NOTHING {
+            lost.push(DVector::from_fn(rows.len(), |k, _| f64::from(k == i)));
+            continue;
+        }
+        for &(j, v) in row {
+            own[(i, j - shared.start)] = v;
+        }
+    }
+    if own.norm_squared() > NOTHING {
+        // Few combinations are shared: own v for the eigenvectors v of ownᵀ own.
+        let eigen = symmetric_eigen(own.tr_mul(&own)).ok_or_else(not_converged)?;
+        let open = (0..shared.len())
+            .filter(|&j| eigen.eigenvalues[j] > NOTHING)
+            .map(|j| (&own * eigen.eigenvectors.column(j)).normalize());
+        lost.extend(open);
+    }
     let determined = match &lost[..] {
         [] => Determined::Wholly,
         all if all.len() == rows.len() => Determined::Nothing,
@@ -267,41 +267,46 @@ pub(super) fn determination(
 }
 
 /// The ambiguities, each reduced to a least set, without repetition.
-pub(super) fn ambiguities(
-    unknowns: &Unknowns,
-    null: &DMatrix<f64>,
-) -> Result<Vec<Ambiguity>, DiagonalError> {
+pub(super) fn ambiguities(unknowns: &Unknowns, null: &Undetermined) -> Vec<Ambiguity> {
     let all = blocks(unknowns);
-    let mut order: Vec<usize> = (0..all.len()).collect();
+    let rows: Vec<Vec<SparseRow>> = all.iter().map(|b| b.coordinates(null)).collect();
+    let open = |b: usize| moved(&rows[b]);
+    let mut order: Vec<usize> = (0..all.len()).filter(|&b| open(b)).collect();
     order.sort_by_key(|&b| all[b].rank);
     let mut found: Vec<(Vec<usize>, Ambiguity)> = Vec::new();
     for &subject in order.iter().rev() {
         // Reversals say for themselves how far they are determined; they may take part here, where the
         // way back was not measured on every diagonal.
-        if matches!(all[subject].part, Part::Constant | Part::Changes)
-            || !all[subject].moved_by(null)
-        {
+        if matches!(all[subject].part, Part::Constant | Part::Changes) {
             continue;
         }
-        let mut basis = null.clone();
-        let mut members: Vec<usize> = (0..all.len()).collect();
+        let mut held = null.free();
+        let mut members = order.clone();
         for &candidate in &order {
             if candidate == subject {
                 continue;
             }
-            let reduced = without(&basis, &all[candidate])?;
-            if reduced.ncols() > 0 && all[subject].moved_by(&reduced) {
-                basis = reduced;
+            let before = held.len();
+            held.add(&rows[candidate]);
+            if held.leaves(&rows[subject]) {
                 members.retain(|&m| m != candidate);
+            } else {
+                held.truncate(before);
             }
         }
-        members.retain(|&m| all[m].moved_by(&basis));
+        members.retain(|&m| held.leaves(&rows[m]));
+        members.sort_unstable();
         if found.iter().all(|(known, _)| *known != members) {
             let ambiguity = describe(&members.iter().map(|&m| &all[m]).collect::<Vec<_>>());
             found.push((members, ambiguity));
         }
     }
-    Ok(found.into_iter().map(|f| f.1).collect())
+    found.into_iter().map(|f| f.1).collect()
+}
+
+/// Whether what the readings leave open moves one of these.
+fn moved(rows: &[SparseRow]) -> bool {
+    rows.iter().map(|row| square(row)).sum::<f64>() > NOTHING
 }
 
 fn describe(members: &[&Block]) -> Ambiguity {
@@ -343,31 +348,30 @@ fn list(items: &[&str]) -> String {
 }
 
 /// What each single further measurement would settle; those that settle nothing are left out.
-pub(super) fn remedies(
-    unknowns: &Unknowns,
-    null: &DMatrix<f64>,
-) -> Result<Vec<Remedy>, DiagonalError> {
+pub(super) fn remedies(unknowns: &Unknowns, null: &Undetermined) -> Vec<Remedy> {
     let all = blocks(unknowns);
+    let rows: Vec<Vec<SparseRow>> = all.iter().map(|b| b.coordinates(null)).collect();
+    let open: Vec<usize> = (0..all.len()).filter(|&b| moved(&rows[b])).collect();
     let mut remedies = Vec::new();
-    let measurable = all
-        .iter()
-        .filter(|b| b.rank == 0 || b.part == Part::Slope)
-        .filter(|b| b.moved_by(null));
-    for known in measurable {
-        let rest = without(null, known)?;
-        let settles: Vec<String> = all
+    for &known in &open {
+        if all[known].rank != 0 && all[known].part != Part::Slope {
+            continue;
+        }
+        let mut held = null.free();
+        held.add(&rows[known]);
+        let settles: Vec<String> = open
             .iter()
-            .filter(|b| b.moved_by(null) && !b.moved_by(&rest) && b.name != known.name)
-            .map(|b| b.name.clone())
+            .filter(|&&b| all[b].name != all[known].name && !held.leaves(&rows[b]))
+            .map(|&b| all[b].name.clone())
             .collect();
         if !settles.is_empty() {
             remedies.push(Remedy {
-                measure: known.name.clone(),
+                measure: all[known].name.clone(),
                 settles,
             });
         }
     }
-    Ok(remedies)
+    remedies
 }
 
 /// Gradient of the positioning slope of an axis in µm/mm by end points, in its free nodes.

@@ -91,10 +91,9 @@ impl DiagonalRuns {
                 && !matches!(p, Parameter::Node(c, _) | Parameter::Reversal(c, _)
                     if zero.contains(&c))
         });
-        let unknowns = design.matrix.ncols();
+        let unknowns = design.scale.len();
         let mut columns = design
-            .matrix
-            .clone()
+            .dense()
             .resize_horizontally(unknowns + traces.len(), 0.0);
         for (k, trace) in traces.iter().enumerate() {
             for row in trace.clone() {

@@ -23,6 +23,11 @@ pub enum Target {
     RetroReflector,
 }
 
+impl Target {
+    /// Both.
+    pub(super) const ALL: [Self; 2] = [Self::Mirror, Self::RetroReflector];
+}
+
 /// A diagonal of the work zone, named by its corners: A at the origin, B = +x, C = +x+y, D = +y, and
 /// E, F, G, H above them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -223,10 +228,49 @@ impl Sequence {
 }
 
 impl WorkZone {
+    /// The corners where a run begins and ends, as grid indices.
+    pub(super) fn ends(&self, diagonal: Diagonal) -> ([usize; 3], [usize; 3]) {
+        let signs = diagonal.signs();
+        (
+            signs.map(|s| if s < 0 { self.steps } else { 0 }),
+            signs.map(|s| if s > 0 { self.steps } else { 0 }),
+        )
+    }
+
+    /// Whether grid indices are those of a stop of a run: each axis has made as many steps along the diagonal
+    /// as the next in the sequence, or one of them one more than all after it.
+    pub fn is_stop(&self, diagonal: Diagonal, sequence: Sequence, at: [usize; 3]) -> bool {
+        let (signs, (first, _)) = (diagonal.signs(), self.ends(diagonal));
+        let inside = (0..3).all(|a| match signs[a] {
+            0 => at[a] == first[a],
+            _ => at[a] <= self.steps,
+        });
+        let order = match sequence {
+            Sequence::Together => &Axis::ALL[..],
+            _ => sequence.order(),
+        };
+        let mut made = order
+            .iter()
+            .map(|axis| axis.index())
+            .filter(|&a| signs[a] != 0)
+            .map(|a| at[a].abs_diff(first[a]));
+        let Some(head) = made.next() else {
+            return inside;
+        };
+        let spread = usize::from(sequence != Sequence::Together);
+        let mut before = head;
+        inside
+            && made.all(|steps| {
+                let falls = steps <= before && head <= steps + spread;
+                before = steps;
+                falls
+            })
+    }
+
     /// The stops of one run, as grid indices, the start included.
     pub fn stops(&self, diagonal: Diagonal, sequence: Sequence) -> Vec<[usize; 3]> {
         let signs = diagonal.signs();
-        let mut at: [usize; 3] = signs.map(|s| if s < 0 { self.steps } else { 0 });
+        let (mut at, _) = self.ends(diagonal);
         let mut stops = vec![at];
         let advance = |at: &mut [usize; 3], a: usize| match signs[a] {
             1 => at[a] += 1,
@@ -258,5 +302,32 @@ impl WorkZone {
     /// Length of one step of each axis, mm.
     pub fn step(&self) -> [f64; 3] {
         self.travel.map(|t| t / self.steps as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stops_are_known_by_their_indices() {
+        let zone = WorkZone {
+            travel: [600.0, 500.0, 400.0],
+            steps: 3,
+        };
+        for diagonal in Diagonal::ALL {
+            for sequence in Sequence::STEPS.into_iter().chain([Sequence::Together]) {
+                let stops = zone.stops(diagonal, sequence);
+                for place in 0..125 {
+                    let at = [place % 5, place / 5 % 5, place / 25];
+                    let known = zone.is_stop(diagonal, sequence, at);
+                    assert_eq!(
+                        known,
+                        stops.contains(&at),
+                        "{diagonal:?} {sequence:?} {at:?}"
+                    );
+                }
+            }
+        }
     }
 }

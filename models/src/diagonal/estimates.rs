@@ -5,7 +5,6 @@ use super::determination::{Ambiguity, Determined, Remedy};
 use super::diagonals::{Diagonal, Target};
 use super::prediction::Parameter;
 use crate::uncertainty::DegreesOfFreedom;
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// A positioning slope measured by other means.
@@ -112,8 +111,8 @@ pub struct StepDiagonalFit {
     pub degrees_of_freedom: usize,
     /// Reading less model, µm, in the order of the readings.
     pub residuals: Vec<f64>,
-    /// Sensitivity of each reading to each of `names`, per µm or rad, freed from the zero of its run.
-    pub jacobian: DMatrix<f64>,
-    /// The parameters of the columns.
+    /// For each reading the places in `names` of the parameters it depends on, and how, µm per µm or rad; the unknown zero of its run comes to that.
+    pub sensitivities: Vec<Vec<(usize, f64)>>,
+    /// The parameters.
     pub names: Vec<Parameter>,
 }

@@ -23,7 +23,7 @@ pub fn exact_reading(
 ) -> f64 {
     let n = diagonal.direction(zone);
     let laser = diagonal.start(zone);
-    let start = zone.stops(diagonal, super::Sequence::Together)[0];
+    let (start, _) = zone.ends(diagonal);
     let displacement = |index: [usize; 3], travel: Travel| {
         let (tool, orientation) = pose(zone, errors, index, diagonal.approach(travel));
         match target {

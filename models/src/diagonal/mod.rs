@@ -16,16 +16,24 @@ mod determination;
 mod diagnosable;
 mod diagonals;
 mod effects;
+mod elimination;
+#[cfg(test)]
+mod equal_to_dense;
 mod errors;
 mod estimates;
 mod estimators;
 mod geometry;
+mod groups;
+mod half_covariance;
 mod plan;
 mod prediction;
 mod quantities;
 mod readings;
 mod regression;
+mod runs;
 mod simulate;
+mod solution;
+mod undetermined;
 
 pub use closed_forms::{ClosedForm, DiagonalTotals, Total, TotalsEstimate, closed_forms, totals};
 pub use components::{Axis, Component, Location, NodeKind};

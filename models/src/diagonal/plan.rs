@@ -1,7 +1,7 @@
 //! Before measuring: what a choice of diagonals, targets and sequences will determine.
 
 use super::components::Component;
-use super::design::{Design, Function, blank_readings, decompose, is_definition};
+use super::design::{Design, Function, blank_readings, is_definition, left_open};
 use super::determination::{Determined, determination};
 use super::diagonals::{Diagonal, Sequence, Target, WorkZone};
 use super::readings::DiagonalError;
@@ -17,7 +17,7 @@ pub fn determined_by(
 ) -> Result<Vec<(Component, Determined)>, DiagonalError> {
     let readings = blank_readings(zone, runs);
     let design = Design::of(zone, &readings, |p| !is_definition(p, zone.steps));
-    let null = decompose(&design.matrix, 0.0)?.null;
+    let null = left_open(&design, zone)?;
     Component::all()
         .map(|c| {
             let function = Function::Error(c);

@@ -23,6 +23,29 @@ pub enum Parameter {
     Reversal(Component, usize),
 }
 
+impl Parameter {
+    /// How many there are on axes of so many steps.
+    pub(super) const fn count(steps: usize) -> usize {
+        2 * Component::COUNT * (steps + 1)
+            + Location::ALL.len()
+            + 2 * Target::ALL.len() * Diagonal::ALL.len()
+    }
+
+    /// A number of its own below [`Self::count`].
+    pub(super) const fn number(self, steps: usize) -> usize {
+        let functions = 2 * Component::COUNT * (steps + 1);
+        match self {
+            Self::Node(c, index) => c.index() * (steps + 1) + index,
+            Self::Reversal(c, index) => (Component::COUNT + c.index()) * (steps + 1) + index,
+            Self::Squareness(location) => functions + location as usize,
+            Self::Mirror(diagonal, target, direction) => {
+                let setup = diagonal as usize * Target::ALL.len() + target as usize;
+                functions + Location::ALL.len() + 2 * setup + direction
+            }
+        }
+    }
+}
+
 /// The unknowns that the readings touch, with their places in the parameter vector.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unknowns {
@@ -59,10 +82,10 @@ pub(super) fn sensitivities(
     travel: Travel,
 ) -> Vec<(Parameter, f64)> {
     let n = diagonal.direction(zone);
-    let start = zone.stops(diagonal, super::Sequence::Together)[0];
+    let (start, _) = zone.ends(diagonal);
     let (p3, p1) = (zone.position(at), zone.position(start));
     let offset = p1 - p3;
-    let mut terms: Vec<(Parameter, f64)> = Vec::new();
+    let mut terms: Vec<(Parameter, f64)> = Vec::with_capacity(4 * Component::COUNT + 5);
     let approach = |travel| diagonal.approach(travel).map(|s| 0.5 * f64::from(s));
     let (arrived, left) = (approach(travel), approach(Travel::Forward));
     for component in Component::all() {
@@ -79,10 +102,16 @@ pub(super) fn sensitivities(
         } else {
             (n[c], -n[c])
         };
+        let (turned, turned_there) = (arrived[a] * here, left[a] * there);
+        if at[a] == start[a] {
+            terms.push((Parameter::Node(component, at[a]), here + there));
+            terms.push((Parameter::Reversal(component, at[a]), turned + turned_there));
+            continue;
+        }
         terms.push((Parameter::Node(component, at[a]), here));
         terms.push((Parameter::Node(component, start[a]), there));
-        terms.push((Parameter::Reversal(component, at[a]), arrived[a] * here));
-        terms.push((Parameter::Reversal(component, start[a]), left[a] * there));
+        terms.push((Parameter::Reversal(component, at[a]), turned));
+        terms.push((Parameter::Reversal(component, start[a]), turned_there));
     }
     for location in Location::ALL {
         let moved = squareness_shift(location, p3) - squareness_shift(location, p1);
@@ -97,7 +126,9 @@ pub(super) fn sensitivities(
             UM_PER_RAD_MM * n.dot(&axis.cross(&offset)),
         ));
     }
-    merge(terms)
+    // What cancels leaves only rounding of levers of the size of the zone.
+    terms.retain(|t| t.1.abs() > 1e-9);
+    terms
 }
 
 /// From the slide's own origin to the tool: (0, y, z) for X, (0, 0, z) for Y, none for Z.
@@ -115,20 +146,6 @@ fn squareness_shift(location: Location, p: Vector3<f64>) -> Vector3<f64> {
         Location::XZ => Vector3::new(-p.z, 0.0, 0.0),
         Location::YZ => Vector3::new(0.0, -p.z, 0.0),
     }
-}
-
-fn merge(mut terms: Vec<(Parameter, f64)>) -> Vec<(Parameter, f64)> {
-    terms.sort_by_key(|t| t.0);
-    let mut merged: Vec<(Parameter, f64)> = Vec::with_capacity(terms.len());
-    for (parameter, value) in terms {
-        match merged.last_mut() {
-            Some(last) if last.0 == parameter => last.1 += value,
-            _ => merged.push((parameter, value)),
-        }
-    }
-    // What cancels leaves only rounding of levers of the size of the zone.
-    merged.retain(|t| t.1.abs() > 1e-9);
-    merged
 }
 
 /// The reading that the linear model predicts, µm.

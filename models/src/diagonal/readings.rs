@@ -3,7 +3,7 @@
 use super::components::Axis;
 use super::diagonals::{Diagonal, Sequence, Target, Travel, WorkZone};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use thiserror::Error;
 
 /// One reading of the laser.
@@ -199,16 +199,12 @@ pub fn check(zone: &WorkZone, readings: &[DiagonalReading]) -> Result<(), Diagon
             });
         }
     }
-    let mut seen = std::collections::BTreeSet::new();
-    let mut paths: BTreeMap<(Diagonal, Sequence), Vec<[usize; 3]>> = BTreeMap::new();
+    let mut seen = HashSet::with_capacity(readings.len());
     for (index, r) in readings.iter().enumerate() {
         if !r.value.is_finite() {
             return Err(DiagonalError::NotFinite { index });
         }
-        let stops = paths
-            .entry((r.diagonal, r.sequence))
-            .or_insert_with(|| zone.stops(r.diagonal, r.sequence));
-        if !stops.contains(&r.at) {
+        if !zone.is_stop(r.diagonal, r.sequence, r.at) {
             return Err(DiagonalError::OffPath {
                 index,
                 at: r.at,

@@ -78,7 +78,7 @@ impl BandTriangle {
     }
 
     /// Takes row i out and leaves zeros: its band after the diagonal, then its dense columns.
-    pub(crate) fn take_row(&mut self, i: usize) -> Vec<f64> {
+    pub fn take_row(&mut self, i: usize) -> Vec<f64> {
         let mut row = self.band(i)[1..].to_vec();
         row.extend_from_slice(self.tail_row(i));
         self.values[i * self.stride..(i + 1) * self.stride].fill(0.0);

@@ -95,7 +95,7 @@ impl Block {
             Part::Slope | Part::Constant => vec![null.combined(along())],
             // What is no multiple of the line: each value less that of the last, by the line's ratio.
             Part::Shape | Part::Changes => {
-                let Some((last, end)) = along().last() else {
+                let Some((last, end)) = along().next_back() else {
                     return Vec::new();
                 };
                 along()

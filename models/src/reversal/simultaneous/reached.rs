@@ -4,6 +4,9 @@ use errsep_solvers::structured::StructuredFit;
 
 use super::problem::Reversal;
 
+/// An unknown of an effect: its name, value and unit.
+pub type Unknown = (String, f64, &'static str);
+
 /// What a fit had come to when it stopped: no minimum, so nothing has an uncertainty, and no value is an
 /// answer. It shows which of them went astray.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,7 +16,7 @@ pub struct Reached {
     /// The thickness where it was fitted, mm.
     pub thickness_mm: Option<f64>,
     /// The effects by name, with the unknowns of each: name, value, unit.
-    pub effects: Vec<(&'static str, Vec<(String, f64, &'static str)>)>,
+    pub effects: Vec<(&'static str, Vec<Unknown>)>,
     /// Root mean square of reading less model, µm; `None` where the model has no value.
     pub residual_rms_um: Option<f64>,
     /// Iterations made in the last descent.

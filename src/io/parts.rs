@@ -27,7 +27,7 @@ pub fn read_parts(
     let mut places = None;
     let mut all: Vec<PartReading> = Vec::new();
     for file in files {
-        let own = if map.is_empty() && plates::is_plate(file) {
+        let own = if plates::is_plate(file, map) {
             if let Some(points) = points {
                 return Err(Message::bad_input("the points of this file are not needed")
                     .in_file(points)
@@ -36,7 +36,7 @@ pub fn read_parts(
                         file.display()
                     )));
             }
-            plates::read(file)?
+            plates::read(file, map)?
         } else {
             let Some(points) = points else {
                 // What cannot be read at all is told as that.

@@ -23,6 +23,7 @@ mod measured_reversals;
 mod parts_of_nistir;
 mod plan_of_designs;
 mod plates;
+mod plates_named;
 mod positioning;
 mod report;
 mod reversal;

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::command::{Folder, bad_input, run};
 
-const MACHINE: &str = "chain = \"FXYZ\"\n[part]\nalign = \"free\"\n";
+pub const MACHINE: &str = "chain = \"FXYZ\"\n[part]\nalign = \"free\"\n";
 
 /// A plate of 4 × 4 points, 60 mm apart: nominal and measured coordinates of one replicate, mm. Its axes are
 /// 40 parts in a million too long along x and not square by 20 µrad, the noise is made by a rule.
@@ -92,7 +92,7 @@ fn by_row(turn: f64, left_out: &str) -> String {
     text
 }
 
-fn answer(folder: &Folder, arguments: &[&str]) -> Value {
+pub fn answer(folder: &Folder, arguments: &[&str]) -> Value {
     let out = run(folder, &[arguments, &["--format", "json"]].concat());
     assert_eq!(out.status, 0, "{}", out.stderr);
     let mut answer: Value = serde_json::from_str(&out.stdout).unwrap();

@@ -62,7 +62,7 @@ pub(super) fn sought<M: FittedModel + 'static>(
         }),
         LawFound::Law(mut law) => {
             law.effect.name.clone_from(&name);
-            law.effect.seen = Some(seen(model, &args.data)?);
+            law.effect.seen = Some(seen(model, args)?);
             let mut text = in_words(model, &law);
             let mut answer = as_json(model, &law);
             if let Some((place, file)) = file {

@@ -38,7 +38,7 @@ pub(super) fn learnt<M: FittedModel + 'static>(
     bar.finish_and_clear();
     let mut learnt = found.map_err(|why| refused(&why, &args.data))?;
     learnt.effect.name.clone_from(&name);
-    learnt.effect.seen = Some(seen(model, &args.data)?);
+    learnt.effect.seen = Some(seen(model, args)?);
     let said = in_words(model, &learnt);
     let heading: Vec<String> = said.lines().map(str::to_owned).collect();
     file.write(written(&learnt.effect, model, &heading).as_bytes())?;
@@ -125,23 +125,28 @@ pub(super) fn named<M: FittedModel + 'static>(place: &Path, model: &M) -> Result
     .remedy("give the file another name, such as coolant.toml"))
 }
 
-/// Where an effect was seen.
+/// Where an effect was seen; of parts in several files their names and digests in turn.
 ///
 /// # Errors
 /// The file changed while it was read.
-pub(super) fn seen<M: FittedModel + 'static>(model: &M, data: &Path) -> Result<Seen, Message> {
-    let Read256::Digest(sha256) = digest_of(data) else {
-        return Err(Message::bad_input("the file changed while it was read")
-            .in_file(data)
-            .remedy("run the command again when nothing writes to the file"));
-    };
+pub(super) fn seen<M: FittedModel + 'static>(model: &M, args: &Args) -> Result<Seen, Message> {
+    let (mut files, mut digests) = (Vec::new(), Vec::new());
+    for file in args.files() {
+        let Read256::Digest(sha256) = digest_of(file) else {
+            return Err(Message::bad_input("the file changed while it was read")
+                .in_file(file)
+                .remedy("run the command again when nothing writes to the file"));
+        };
+        files.push(file.display().to_string());
+        digests.push(sha256);
+    }
     let channels: BTreeSet<usize> = model.places().iter().map(|p| p.channel).collect();
     let names = model.channel_names();
     let repeats: BTreeSet<u32> = model.places().iter().map(|p| p.repeat).collect();
     Ok(Seen {
         model: model.name().to_owned(),
-        file: data.display().to_string(),
-        sha256,
+        file: files.join(", "),
+        sha256: digests.join(" "),
         channels: channels
             .into_iter()
             .filter_map(|k| names.get(k).cloned())
@@ -238,9 +243,23 @@ pub(super) fn all_tested<M: FittedModel + 'static>(
     let (mut all, mut notes) = (Vec::new(), Vec::new());
     for effect in effects {
         let Some(seen) = &effect.seen else { continue };
-        if digest_of(&args.data) == Read256::Digest(seen.sha256.clone()) {
+        let known = |file: &&Path| match digest_of(file) {
+            Read256::Digest(own) => seen.sha256.split(' ').any(|before| before == own),
+            _ => false,
+        };
+        let again: Vec<String> = args
+            .files()
+            .filter(known)
+            .map(|file| file.display().to_string())
+            .collect();
+        if !again.is_empty() {
+            let readings = if again.len() == args.files().count() {
+                "these very readings".to_owned()
+            } else {
+                format!("some of these readings ({})", again.join(", "))
+            };
             notes.push(format!(
-                "`{}` was learnt from these very readings: that it explains them is no evidence.",
+                "`{}` was learnt from {readings}: that it explains them is no evidence.",
                 effect.name
             ));
             continue;

@@ -72,7 +72,7 @@ pub struct Args {
     #[arg(value_name = "DATA.csv")]
     data: PathBuf,
     /// Further parts, a file each.
-    #[arg(value_name = "PART.csv", conflicts_with_all = ["learn", "seal"])]
+    #[arg(value_name = "PART.csv")]
     more: Vec<PathBuf>,
     /// The set-up of the model's own command; for parts the model of the machine.
     #[arg(long, value_name = "SETUP.toml")]
@@ -138,6 +138,15 @@ pub struct Args {
     length: Option<f64>,
     #[command(flatten)]
     pub(super) common: CommonArgs,
+}
+
+impl Args {
+    /// The files of the readings.
+    fn files(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(&self.data)
+            .chain(&self.more)
+            .map(PathBuf::as_path)
+    }
 }
 
 /// Rivals of a family where the user states no number: 5 of them named alike are still below 5 %

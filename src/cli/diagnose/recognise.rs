@@ -133,8 +133,7 @@ pub(super) fn model(args: &Args) -> Result<&'static Model, Message> {
     if let [only] = by_setup[..] {
         return Ok(only);
     }
-    if let Some(model) = of_a_plate().filter(|_| !args.columns.are_given() && is_plate(&args.data))
-    {
+    if let Some(model) = of_a_plate().filter(|_| is_plate(&args.data, &args.columns.map())) {
         return Ok(model);
     }
     let table = TableReader::open_as(&args.data, &args.columns.map())?;

@@ -45,7 +45,7 @@ pub(super) struct Header {
 }
 
 /// Lines among which the names are sought.
-const MOST_LINES: usize = 500;
+pub(super) const MOST_LINES: usize = 500;
 
 const NOMINAL: &[&str] = &[
     "nominal",
@@ -140,14 +140,14 @@ impl Header {
             return false;
         }
         for (column, unit) in self.columns.iter_mut().zip(told) {
-            column.unit = unit.or(column.unit);
+            column.unit = column.unit.or(unit);
         }
         true
     }
 }
 
 /// A line such as `Units: mm`.
-fn unit_told(line: &str) -> Option<LengthUnit> {
+pub(super) fn unit_told(line: &str) -> Option<LengthUnit> {
     let words = words(line);
     let told = words.iter().any(|w| matches!(w.as_str(), "unit" | "units"));
     let unit = words.iter().find_map(|w| length_unit(w));
@@ -174,7 +174,7 @@ fn words(text: &str) -> Vec<String> {
 fn columns(line: &str, split: Split, above: &str) -> Option<Vec<Column>> {
     let fields = split.fields(line);
     let mut columns = if split == Split::Blank {
-        by_words(&fields)
+        by_words(&fields, 3, column)
     } else {
         fields
             .iter()
@@ -193,18 +193,23 @@ fn columns(line: &str, split: Split, above: &str) -> Option<Vec<Column>> {
     is_table(&columns).then_some(columns)
 }
 
-const OTHER: Column = Column {
+/// A column that is not read.
+pub(super) const OTHER: Column = Column {
     role: Role::Other,
     unit: None,
 };
 
-/// Names of one to three words between blanks: the most words that make a name.
-fn by_words(fields: &[Field]) -> Vec<Column> {
+/// Names of one to so many words between blanks: the most words that `known` makes a column of.
+pub(super) fn by_words(
+    fields: &[Field],
+    most: usize,
+    known: impl Fn(&str) -> Option<Column>,
+) -> Vec<Column> {
     let (mut columns, mut at) = (Vec::new(), 0);
     while at < fields.len() {
-        let longest = (1..=3.min(fields.len() - at)).rev().find_map(|count| {
+        let longest = (1..=most.min(fields.len() - at)).rev().find_map(|count| {
             let texts: Vec<&str> = fields[at..at + count].iter().map(|f| f.text).collect();
-            Some((count, column(&texts.join(" "))?))
+            Some((count, known(&texts.join(" "))?))
         });
         let (count, found) = longest.unwrap_or((1, OTHER));
         columns.push(found);
@@ -214,7 +219,7 @@ fn by_words(fields: &[Field]) -> Vec<Column> {
 }
 
 /// A name taken apart; `None` where it is none of those that are known.
-fn column(name: &str) -> Option<Column> {
+pub(super) fn column(name: &str) -> Option<Column> {
     let mut words = words(name);
     if name.trim() == "#" {
         words = vec!["#".to_owned()];
@@ -324,7 +329,7 @@ fn settle_bare(columns: &mut [Column], above: &str) -> Option<()> {
 }
 
 /// Whether there are nominal places and what was measured there, each role once.
-fn is_table(columns: &[Column]) -> bool {
+pub(super) fn is_table(columns: &[Column]) -> bool {
     let has = |role: Role| columns.iter().any(|c| c.role == role);
     let once = columns.iter().enumerate().all(|(k, c)| {
         c.role == Role::Other || columns[..k].iter().all(|before| before.role != c.role)

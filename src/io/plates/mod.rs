@@ -6,6 +6,7 @@
 
 mod fields;
 mod header;
+mod named;
 
 use std::collections::{BTreeMap, HashSet};
 use std::io::Read;
@@ -13,6 +14,7 @@ use std::path::Path;
 
 use errsep_models::machine::{Axis, PartReading, Position};
 
+use super::columns::ColumnMap;
 use super::message::{Message, Place};
 use super::parts::SAME_PLACE;
 use super::source::Source;
@@ -24,8 +26,11 @@ use header::{Column, Header, Kind, Role};
 const HEAD: u64 = 1 << 16;
 const LONGEST: u64 = 1 << 26;
 
-/// Whether a file is such a table.
-pub fn is_plate(path: &Path) -> bool {
+/// Whether a file is such a table: by the names of its columns, or by those that `map` gives them.
+pub fn is_plate(path: &Path, map: &ColumnMap) -> bool {
+    if !map.is_empty() {
+        return named::is_of_plate(map);
+    }
     read_text(path, HEAD).is_some_and(|text| {
         let lines: Vec<&str> = text.lines().collect();
         Header::find(&lines).is_some()
@@ -51,12 +56,12 @@ fn read_text(path: &Path, most: u64) -> Option<String> {
     )
 }
 
-/// Reads such a table. Readings without a column for the part are those of a part that is called as the
+/// Reads such a table, with the columns that `map` names where it names any. Readings without a column for the part are those of a part that is called as the
 /// file is, without its extension.
 ///
 /// # Errors
 /// A row that is none of the table, a coordinate measured twice, a point without a nominal coordinate.
-pub fn read(path: &Path) -> Result<Vec<PartReading>, Message> {
+pub fn read(path: &Path, map: &ColumnMap) -> Result<Vec<PartReading>, Message> {
     let whole = |what: &str, remedy: &str| Message::bad_input(what).in_file(path).remedy(remedy);
     let text = read_text(path, LONGEST).ok_or_else(|| {
         whole(
@@ -71,12 +76,7 @@ pub fn read(path: &Path) -> Result<Vec<PartReading>, Message> {
         ));
     }
     let lines: Vec<&str> = text.lines().collect();
-    let header = Header::find(&lines).ok_or_else(|| {
-        whole(
-            "no line names nominal and measured coordinates",
-            "name the columns in one line, such as: point, nominal x, nominal y, measured x, measured y",
-        )
-    })?;
+    let header = named::header(path, &lines, map)?;
     let mut table = Plate::new(path, header);
     let first = table.header.line + 1;
     for (k, line) in lines.iter().enumerate().skip(first) {

@@ -24,11 +24,17 @@ fn made<'py>(class: &Bound<'py, PyAny>, message: &Message) -> PyResult<Bound<'py
     let place = message.place();
     let whole = |n: usize| (n > 0).then_some(n);
     let line = place.and_then(|p| whole(p.line));
-    class.call1((
+    let exception = class.call1((
         message.what(),
         place.map(|p| p.file.to_string_lossy().into_owned()),
         line,
         line.and(place).map(|p| p.column.max(1)),
         message.remedy_words(),
-    ))
+    ))?;
+    if let Some(reached) = message.reached() {
+        let json = class.py().import("json")?;
+        let reached = json.call_method1("loads", (reached.to_string(),))?;
+        exception.setattr("partial", reached)?;
+    }
+    Ok(exception)
 }

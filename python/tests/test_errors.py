@@ -63,8 +63,29 @@ def test_what_is_refused_without_an_answer_has_none() -> None:
 def test_a_fit_that_does_not_converge_comes_with_how_far_it_got() -> None:
     with pytest.raises(errsep.NotConverged, match="grows") as caught:
         errsep.least_squares(lambda p: [np.exp(-p[0]), 0.0], {"a": 1.0})
-    fit = caught.value.result
+    fit = caught.value.partial
     assert fit.kind == "runs-away" and not fit.converged and fit.x[0] > 10
+    assert caught.value.result is fit
+
+
+def test_a_reversal_that_does_not_converge_comes_with_how_far_it_got() -> None:
+    # One pass without a drift: nothing bounds the time constant of one that is fitted.
+    data = errsep.simulate("reversal", positions=500, thickness=42.0, alpha=0, seed=0)["data"]
+    with pytest.raises(errsep.NotConverged, match="thermal-drift has no answer") as caught:
+        errsep.reversal(data, {"artefact": {"thickness": 42}}, simultaneous=True, with_=["thermal-drift"])
+    partial = caught.value.partial
+    assert caught.value.result is None
+    assert set(partial["tilts"]) == {"alpha", "beta", "gamma"}
+    assert all(tilt["unit"] == "rad" and abs(tilt["value"]) < 1 for tilt in partial["tilts"].values())
+    (drift,) = partial["effects"]
+    assert drift["effect"] == "thermal-drift"
+    assert all(isinstance(p["value"], float) and p["unit"] for p in drift["parameters"])
+    assert partial["residual"]["rms"] > 0 and partial["residual"]["unit"] == "um"
+    convergence = partial["convergence"]
+    assert convergence["converged"] is False and convergence["iterations"] > 0
+    assert convergence["reason"] in caught.value.what
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert again.partial == partial and str(again) == str(caught.value)
 
 
 def test_errors_go_through_a_pickle_and_a_copy() -> None:

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use miette::{Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan};
+use serde_json::Value;
 use thiserror::Error;
 
 use super::printable;
@@ -155,6 +156,7 @@ pub struct Message {
     shown: Option<Box<Shown>>,
     remedy: Option<String>,
     trouble: Trouble,
+    reached: Option<Box<Value>>,
 }
 
 impl Message {
@@ -166,6 +168,7 @@ impl Message {
             shown: None,
             remedy: None,
             trouble: Trouble::BadInput,
+            reached: None,
         }
     }
 
@@ -210,6 +213,18 @@ impl Message {
     pub fn remedy(mut self, remedy: impl Into<String>) -> Self {
         self.remedy = Some(told(&remedy.into()));
         self
+    }
+
+    /// Adds what a fit without a minimum had come to, for programs.
+    #[must_use]
+    pub fn reaching(mut self, reached: Value) -> Self {
+        self.reached = Some(Box::new(reached));
+        self
+    }
+
+    /// What a fit without a minimum had come to, if that is known.
+    pub fn reached(&self) -> Option<&Value> {
+        self.reached.as_deref()
     }
 
     /// Where the trouble is, if it has a place.

@@ -96,7 +96,7 @@ def least_squares(
     Raises
     ------
     NotConverged
-        No minimum was found; ``result`` of the exception holds how far the fit came.
+        No minimum was found; ``partial`` of the exception holds how far the fit came.
     InputError
         The problem makes no sense as it is stated.
 

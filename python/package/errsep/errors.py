@@ -85,4 +85,29 @@ class NotDetermined(Unsolved):
 
 
 class NotConverged(Unsolved):
-    """No minimum was found."""
+    """No minimum was found.
+
+    Attributes
+    ----------
+    partial : Fit, dict or None
+        What the fit had come to when it stopped, which shows what went astray and is no answer: of
+        `least_squares` the `Fit`, which is ``result`` as well; of a simultaneous reversal ``tilts``,
+        ``effects`` and ``residual`` as its answer has them, without uncertainties, and ``convergence``.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        file: str | None = None,
+        line: int | None = None,
+        column: int | None = None,
+        help: str | None = None,
+    ) -> None:
+        super().__init__(what, file, line, column, help)
+        self.partial: Any = None
+
+    def with_result(self, result: Any) -> NotConverged:
+        """The same exception with what there is all the same."""
+        super().with_result(result)
+        self.partial = result
+        return self

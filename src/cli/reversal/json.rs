@@ -1,5 +1,6 @@
 //! The answer for programs: schema `errsep.reversal/1`, documented in docs/json/reversal.md.
 
+use errsep_models::reversal::simultaneous::Reached;
 use errsep_models::reversal::staged::Value as Measured;
 use errsep_models::reversal::{Convention, NOT_SHOWN};
 use serde_json::{Map, Value, json};
@@ -73,6 +74,33 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
         "warnings": o.warnings,
         "not_shown": NOT_SHOWN.iter().map(|(name, _)| *name).collect::<Vec<_>>(),
     }))
+}
+
+/// What a fit that found no minimum had come to, in the terms of an answer: values without uncertainty.
+pub fn reached(reached: &Reached, ending: &str) -> Value {
+    let tilts = reached.tilts.iter().map(|(name, rad)| {
+        let key = name.replace('-', "_");
+        (key, json!({"value": rad, "unit": "rad"}))
+    });
+    let effects = reached.effects.iter().map(|(effect, unknowns)| {
+        let one = |(name, value, unit): &(String, f64, &str)| {
+            json!({"name": name, "value": value, "unit": unit})
+        };
+        let parameters: Vec<Value> = unknowns.iter().map(one).collect();
+        json!({"effect": effect, "parameters": parameters})
+    });
+    json!({
+        "method": "simultaneous",
+        "tilts": tilts.collect::<Map<_, _>>(),
+        "thickness": reached.thickness_mm.map(|mm| json!({"value": mm, "unit": "mm"})),
+        "effects": effects.collect::<Vec<_>>(),
+        "residual": {"rms": reached.residual_rms_um, "unit": "um"},
+        "convergence": {
+            "converged": false,
+            "reason": ending,
+            "iterations": reached.iterations,
+        },
+    })
 }
 
 /// An angle with its degrees of freedom and expanded uncertainty.

@@ -11,6 +11,7 @@ use errsep_models::reversal::{Channel, Contrast, Observations};
 use errsep_models::uncertainty::DegreesOfFreedom;
 
 use super::effects;
+use super::json;
 use super::noise;
 use super::outcome::{Angle, Closure, Convergence, Form, Outcome, Residual};
 use super::refusal::OTHER_UNITS;
@@ -46,6 +47,17 @@ pub fn solve(
 }
 
 fn refusal(why: &ReversalError, file: &Path, data: &ReversalData) -> Message {
+    let message = refused(why, file, data);
+    match why {
+        ReversalError::NotConverged { ending, reached }
+        | ReversalError::EffectsNotConverged {
+            ending, reached, ..
+        } => message.reaching(json::reached(reached, ending)),
+        _ => message,
+    }
+}
+
+fn refused(why: &ReversalError, file: &Path, data: &ReversalData) -> Message {
     if let Some(message) = effects::refusal(why) {
         return message.in_file(file);
     }

@@ -4,6 +4,7 @@ use errsep_solvers::{FitError, NoValue};
 use thiserror::Error;
 
 use super::knots::FEWEST_POSITIONS;
+use super::reached::Reached;
 use crate::basis::bspline::BreakError;
 
 /// Fewest readings beyond the unknowns from which the noise is told.
@@ -166,6 +167,8 @@ pub enum ReversalError {
         effects: String,
         /// How it ended, in words.
         ending: String,
+        /// Where it stood then.
+        reached: Box<Reached>,
     },
     /// Break points that carry no spline.
     #[error("knots: {0}")]
@@ -189,6 +192,8 @@ pub enum ReversalError {
     NotConverged {
         /// How it ended, in words.
         ending: String,
+        /// Where it stood then.
+        reached: Box<Reached>,
     },
 }
 

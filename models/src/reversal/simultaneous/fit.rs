@@ -6,7 +6,7 @@ use std::time::Instant;
 use errsep_solvers::linear::bordered::BorderedCovariance;
 use errsep_solvers::loss::Loss;
 use errsep_solvers::options::Options as Minimisation;
-use errsep_solvers::structured::{Parameters, fit_structured};
+use errsep_solvers::structured::{Parameters, StructuredFit, fit_structured};
 
 use super::closure;
 use super::descent::{approach, minimise};
@@ -17,6 +17,7 @@ use super::ground::{Begun, Ground};
 use super::knots::{self, FEWEST_POSITIONS};
 use super::options::{Noise, Options, Thickness};
 use super::problem::Reversal;
+use super::reached::Reached;
 use super::readings::ChannelReadings;
 use super::row_source::RowSource;
 use super::search::search;
@@ -127,7 +128,7 @@ fn assemble(
     let (options, channels) = (ground.options, ground.channels);
     let (result, by_channel) = (&settled.fit, &settled.residuals);
     let Some(covariance) = result.covariance() else {
-        return Err(not_converged(problem, result.ending.to_string()));
+        return Err(not_converged(problem, result));
     };
     let freedom = freedom_left(problem);
     let told = Told::white(problem, settled, sigmas, options.noise, options.loss);
@@ -171,14 +172,17 @@ fn assemble(
 }
 
 /// The fit has no answer, with the effects in it named.
-fn not_converged(problem: &Reversal, ending: String) -> ReversalError {
+pub(super) fn not_converged(problem: &Reversal, fit: &StructuredFit) -> ReversalError {
+    let ending = fit.ending.to_string();
+    let reached = Box::new(Reached::of(problem, fit));
     match &problem.joined {
-        None => ReversalError::NotConverged { ending },
+        None => ReversalError::NotConverged { ending, reached },
         Some(joined) => {
             let names: Vec<&str> = joined.members().iter().map(|m| m.name).collect();
             ReversalError::EffectsNotConverged {
                 effects: names.join(" and "),
                 ending,
+                reached,
             }
         }
     }

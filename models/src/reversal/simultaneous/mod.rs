@@ -27,6 +27,7 @@ mod pointer;
 mod predict;
 mod problem;
 mod profiles;
+mod reached;
 mod readings;
 mod robust;
 mod row_source;
@@ -52,6 +53,7 @@ pub use monte_carlo::{MonteCarlo, Spread, monte_carlo};
 pub use options::{Knots, Noise, Options, Thickness, With};
 pub use predict::{MOST_DENSE_READINGS, Prediction};
 pub use problem::Reversal;
+pub use reached::Reached;
 pub use readings::ChannelReadings;
 pub use seed::{lines, start, tilts};
 pub use solution::{

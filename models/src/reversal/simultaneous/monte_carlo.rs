@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::descent::minimise;
 use super::effects::times;
 use super::error::ReversalError;
+use super::fit::not_converged;
 use super::readings::ChannelReadings;
 use super::solution::{NoiseOrigin, Simultaneous};
 use crate::noise::Law;
@@ -96,9 +97,7 @@ pub fn monte_carlo(
             &Minimisation::structured(),
         )?;
         if !fit.converged() {
-            return Err(ReversalError::NotConverged {
-                ending: fit.ending.to_string(),
-            });
+            return Err(not_converged(&problem, &fit));
         }
         let mut trial = solution.clone();
         trial.cubics = problem.cubics(&fit.parameters);

@@ -3,6 +3,7 @@ the comparison is of equality and has no tolerance."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,21 @@ NISTIR = FIXTURES / "nistir6868"
 
 _SAME = {name: name for name in ("channel", "repeat", "direction", "time", "x", "reading")}
 _WORDS = ",".join(f"{name}={name}" for name in _SAME)
+
+
+def changed(seed: int, change: Callable[[float], float]) -> str:
+    """A calibration line whose readings are changed by a function of the load, which no effect explains."""
+    lines = []
+    for line in errsep.simulate("calibration-line", sets=6, seed=seed).summary().splitlines():
+        fields = line.split(",")
+        if line[0].isdigit():
+            fields[1] = repr(float(fields[1]) + change(float(fields[0])))
+        lines.append(",".join(fields))
+    return "\n".join(lines) + "\n"
+
+
+def swing(load: float) -> float:
+    return 0.02 * math.cos(2 * math.pi * load / 3.1 + 0.4)
 
 
 def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[str | Path]]]:
@@ -38,6 +54,8 @@ def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[st
     lines = readings.read_text().splitlines()
     planned_next.write_text("\n".join(line.rsplit(",", 1)[0] for line in lines if line[:1] != "#") + "\n")
     errsep.diagnose(readings, setup, severity=0, seal=sealed, next=planned_next)
+    lawful = tmp_path / "lawful.csv"
+    lawful.write_text(changed(1, swing))
     made_machine = {"stations": 5, "repeats": 3, "seed": 2}
     return {
         "reversal": (lambda: errsep.reversal(readings), ["reversal", readings]),
@@ -98,6 +116,10 @@ def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[st
             lambda: errsep.diagnose(readings, setup, columns=_SAME, severity=0),
             ["diagnose", readings, "--setup", setup, "--columns", _WORDS, "--severity", "0"],
         ),
+        "diagnose, law": (
+            lambda: errsep.diagnose(lawful, model="calibration-line", law=True),
+            ["diagnose", lawful, "--model", "calibration-line", "--law"],
+        ),
         "check": (lambda: errsep.check(sealed, readings), ["check", sealed, readings]),
         "plan": (lambda: errsep.plan(planned), ["plan", plan]),
         "simulate": (
@@ -138,6 +160,7 @@ def calls(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         "straightness",
         "diagnose",
         "diagnose, columns and severity",
+        "diagnose, law",
         "check",
         "plan",
         "simulate",
@@ -190,3 +213,34 @@ def test_the_report_is_that_of_the_command(readings: Path, tmp_path: Path) -> No
     page = (theirs / "report.html").read_text()
     assert told in page
     assert (ours / "report.html").read_text() == page.replace(told, "")
+
+
+def test_a_law_is_written_as_the_command_writes_it(
+    tmp_path: Path, command: Callable[..., dict[str, Any]]
+) -> None:
+    data = tmp_path / "monday.csv"
+    data.write_text(changed(1, swing))
+    for folder in ("ours", "theirs"):
+        (tmp_path / folder).mkdir()
+    ours, theirs = tmp_path / "ours/swing.toml", tmp_path / "theirs/swing.toml"
+    answer = plain(errsep.diagnose(data, model="calibration-line", law=ours).to_dict())
+    expected = command("diagnose", data, "--model", "calibration-line", "--law", theirs)
+    assert answer["law"].pop("file") == str(ours)
+    assert expected["law"].pop("file") == str(theirs)
+    assert answer == expected and answer["law"]["found"]
+    assert ours.read_bytes() == theirs.read_bytes()
+
+
+def test_a_law_that_is_not_there_cannot_be_written(tmp_path: Path) -> None:
+    def curve(load: float) -> float:
+        u = load / 10
+        return 0.02 * math.sin(math.sinh(2 * (u - 0.3))) * (1 + u) + 0.012 * math.cos(9 * u * u)
+
+    data = changed(3, curve)
+    told = errsep.diagnose(data, model="calibration-line", law=True)
+    assert told["law"]["found"] is False
+    with pytest.raises(errsep.NotDetermined, match="not determined: a law") as caught:
+        errsep.diagnose(data, model="calibration-line", law=tmp_path / "law.toml")
+    assert told["law"]["why"] in caught.value.what
+    assert caught.value.result["law"] == told["law"]
+    assert not (tmp_path / "law.toml").exists()

@@ -35,8 +35,14 @@ def _answer(call: Call, threads: int | None) -> Result:
     result = Result(call.words[0], answered)
     if result._answered.status == 0:
         return result
-    what = "; ".join(result.not_determined) or "the question"
+    what = _missing_law(result) or "; ".join(result.not_determined) or "the question"
     raise NotDetermined(f"not determined: {what}").with_result(result)
+
+
+def _missing_law(result: Result) -> str:
+    """Why there is no law where one was to be written."""
+    law = result.to_dict().get("law") or {}
+    return f"a law ({law['why']})" if law.get("found") is False else ""
 
 
 def reversal(
@@ -266,6 +272,7 @@ def diagnose(
     without: Sequence[str] = (),
     effects: Setup | None = None,
     learn: str | os.PathLike[str] | None = None,
+    law: bool | str | os.PathLike[str] = False,
     seal: str | os.PathLike[str] | None = None,
     next: Table | None = None,
     false_alarm: float | None = None,
@@ -293,6 +300,9 @@ def diagnose(
         More effects for the catalogue: a dictionary, TOML text or a path.
     learn
         A file into which what no effect explains is written as an effect of its own, for ``effects``.
+    law
+        ``True``: seek a law (a formula) in what no effect explains; a file: write it there too, for
+        ``effects``. Without a law to write that is `NotDetermined`, with the answer in its ``result``.
     seal, next
         A file into which is written what a further measurement will show, for `check`, and that
         measurement: its columns without the readings.
@@ -310,6 +320,7 @@ def diagnose(
     _setup(call, setup)
     call.options({"model": model, "columns": columns, "false_alarm": false_alarm, "prove": prove})
     call.options({"severity": severity, "learn": _path(learn), "seal": _path(seal)})
+    call.option("law", law if isinstance(law, bool) else _path(law))
     if next is not None:
         call.option("next", call.table(next, "plan"))
     if points is not None:

@@ -43,8 +43,8 @@ pub fn call(
 
 /// The program itself, its name the first of the arguments: returns its exit status.
 #[pyfunction]
-pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
-    without_the_lock(py, || errsep::cli::run(arguments))
+pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<u8> {
+    interruptible(py, None, move || errsep::cli::run(arguments))
 }
 
 /// The answer of a command.

@@ -62,7 +62,7 @@ impl Shared {
             verify,
             parquet,
         };
-        let opened = without_the_lock(py, || shared::Shared::open(&asked, inputs));
+        let opened = interruptible(py, None, move || shared::Shared::open(&asked, inputs))?;
         let opened = opened.map_err(|m| exception(py, &m))?;
         Ok(Self(Mutex::new(Some(opened))))
     }
@@ -80,7 +80,9 @@ impl Shared {
     /// Writes the page and lets the folder go; returns how many campaigns there are, how many were worked
     /// out now, and how many failed.
     fn finish(&self, py: Python<'_>) -> PyResult<(usize, usize, usize)> {
-        let counts = self.with(py, |batch| batch.take().map(shared::Shared::finish))?;
+        let batch = self.with(py, |batch| batch.take().map(Ok))?;
+        let counts = interruptible(py, None, move || batch.finish())?;
+        let counts = counts.map_err(|m| exception(py, &m))?;
         Ok((counts.campaigns, counts.worked_out, counts.failed))
     }
 

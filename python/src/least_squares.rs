@@ -17,6 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors::exception;
+use crate::interrupts::Interrupts;
 use crate::long::without_the_lock;
 use crate::stated::{Raised, Stated, Told, residuals_of};
 
@@ -60,6 +61,7 @@ pub fn least_squares<'py>(
     let stop = Arc::new(AtomicBool::new(false));
     let options = options(py, &asked, jacobian.is_some(), &stop)?;
     let at_start = residuals_of(py, &residuals, &start)?;
+    let interrupts = Arc::new(Interrupts::watch(py)?);
     let problem = Stated {
         names: asked.names.clone(),
         residuals,
@@ -67,11 +69,13 @@ pub fn least_squares<'py>(
         first: (start.clone(), at_start),
         raised: raised.clone(),
         stop: Arc::clone(&stop),
+        interrupts: Arc::clone(&interrupts),
     };
     let told = Told {
         callback,
         raised: raised.clone(),
         stop: Arc::clone(&stop),
+        interrupts,
     };
     let found = without_the_lock(py, || {
         let fit = fit_with(&problem, start, &options, |executor| {

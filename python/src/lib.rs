@@ -4,6 +4,7 @@
 mod answered;
 mod batch;
 mod errors;
+mod interrupts;
 mod least_squares;
 mod long;
 mod stated;

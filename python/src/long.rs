@@ -9,6 +9,8 @@ use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::marker::Ungil;
 use pyo3::prelude::*;
 
+use crate::interrupts::Interrupts;
+
 /// How often a waiting call looks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -21,7 +23,8 @@ pub fn without_the_lock<T: Ungil>(py: Python<'_>, work: impl FnOnce() -> T + Ung
 }
 
 /// Runs `work` in a thread of its own and waits for it without the lock. Ctrl-C ends the wait with
-/// `KeyboardInterrupt`; the thread then runs on to its end, which nobody waits for.
+/// `KeyboardInterrupt`, in whatever thread of Python the call was made; the work then runs on to its end, which
+/// nobody waits for.
 ///
 /// `threads` limits the threads that the work divides itself into; by default they are as many as the
 /// machine has cores.
@@ -31,6 +34,7 @@ pub fn interruptible<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
     let work = divided(threads, work)?;
+    let interrupts = Interrupts::watch(py)?;
     let (told, hear) = channel();
     let thread = Builder::new()
         .name("errsep".to_owned())
@@ -45,7 +49,7 @@ pub fn interruptible<T: Send + 'static>(
         });
         match heard {
             Ok(result) => return Ok(result),
-            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Timeout) => interrupts.look(py)?,
             Err(RecvTimeoutError::Disconnected) => {
                 let why = thread.join().err();
                 let words = why.as_ref().and_then(|why| {

@@ -13,6 +13,7 @@ use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
 
 use crate::errors::exception;
+use crate::interrupts::Interrupts;
 
 /// The first exception raised by a function of Python; no more of them are called after it.
 #[derive(Clone, Default)]
@@ -43,16 +44,19 @@ pub struct Stated {
     pub first: (DVector<f64>, DVector<f64>),
     pub raised: Raised,
     pub stop: Arc<AtomicBool>,
+    pub interrupts: Arc<Interrupts>,
 }
 
 impl Stated {
     /// What Python answers, unless it has raised an exception before.
+    /// Ctrl-C is looked for before each question.
     fn ask<T>(&self, question: impl FnOnce(Python<'_>) -> PyResult<T>) -> Result<T, NoValue> {
         let over = || NoValue::new("a function of Python raised an exception");
         if self.raised.is_there() {
             return Err(over());
         }
-        Python::attach(question).map_err(|error| {
+        let asked = Python::attach(|py| self.interrupts.look(py).and_then(|()| question(py)));
+        asked.map_err(|error| {
             self.raised.put(error);
             self.stop.store(true, Ordering::Relaxed);
             over()
@@ -128,12 +132,13 @@ pub struct Told {
     pub callback: Option<Py<PyAny>>,
     pub raised: Raised,
     pub stop: Arc<AtomicBool>,
+    pub interrupts: Arc<Interrupts>,
 }
 
 impl Told {
     fn tell(&self, state: &FitState) -> PyResult<()> {
         Python::attach(|py| {
-            py.check_signals()?;
+            self.interrupts.look(py)?;
             let (Some(callback), Some(parameters)) = (&self.callback, state.get_param()) else {
                 return Ok(());
             };

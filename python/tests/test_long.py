@@ -90,7 +90,10 @@ def interrupted(process: subprocess.Popen[str]) -> str:
     assert process.stdout is not None
     assert process.stdout.readline() == "at work\n"
     process.send_signal(signal.SIGINT)
-    out, error = process.communicate(timeout=PATIENCE)
+    try:
+        out, error = process.communicate(timeout=PATIENCE)
+    finally:
+        process.kill()
     assert process.returncode in (-signal.SIGINT, 128 + signal.SIGINT, 3), error
     return out + error
 
@@ -142,6 +145,118 @@ def test_ctrl_c_ends_a_fit(callback: str) -> None:
                 sys.exit(3)
     """
     interrupted(python(script))
+
+
+#: Where a call is made in a thread that Python tells of no signal, and what the main thread does meanwhile.
+IN_A_THREAD = """
+    import os, signal, sys, threading
+    import errsep
+
+    ended, over, other = [], threading.Event(), threading.Event()
+    def work():
+        try:
+            {call}
+        except KeyboardInterrupt:
+            ended.append("the call")
+        finally:
+            over.set()
+
+    threading.Thread(target=work, daemon=True).start()
+    try:
+        {wait}
+    except KeyboardInterrupt:
+        ended.append("the main thread")
+    over.wait()
+    print(sorted(ended), flush=True)
+    sys.exit(3)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals of this kind")
+@pytest.mark.parametrize("call", ["command", "fit"])
+def test_ctrl_c_ends_a_call_from_another_thread(call: str, tmp_path: Path) -> None:
+    pipe = tmp_path / "never"
+    os.mkfifo(pipe)
+    if call == "command":
+        call = "errsep.straightness(sys.argv[1])"
+        # Opens when the call reads, and never writes.
+        wait = 'end = os.open(sys.argv[1], os.O_WRONLY); print("at work", flush=True); over.wait()'
+    else:
+        # Fits without end.
+        call = "while True: errsep.least_squares(lambda p: [other.set() or p[0], 1.0], [1.0])"
+        wait = 'other.wait(); print("at work", flush=True); over.wait()'
+    told = interrupted(python(IN_A_THREAD.format(call=call, wait=wait), pipe))
+    assert told == "['the call', 'the main thread']\n"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals of this kind")
+def test_ctrl_c_ends_a_call_from_another_thread_of_asyncio(tmp_path: Path) -> None:
+    pipe = tmp_path / "never"
+    os.mkfifo(pipe)
+    script = """
+        import asyncio, os, sys, threading
+        import errsep
+
+        def say():
+            end = os.open(sys.argv[1], os.O_WRONLY)
+            print("at work", flush=True)
+            threading.Event().wait()
+
+        threading.Thread(target=say, daemon=True).start()
+        try:
+            asyncio.run(asyncio.to_thread(errsep.straightness, sys.argv[1]))
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+            sys.exit(3)
+    """
+    assert "interrupted" in interrupted(python(script, pipe))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals of this kind")
+def test_a_program_that_handles_ctrl_c_itself_keeps_its_calls(tmp_path: Path) -> None:
+    pipe = tmp_path / "later"
+    os.mkfifo(pipe)
+    script = IN_A_THREAD.format(
+        call='ended.append(str(errsep.straightness(sys.argv[1])["reference_lines"][2]["error"]["value"]))',
+        wait="""signal.signal(signal.SIGINT, lambda *_: other.set())
+        end = os.open(sys.argv[1], os.O_WRONLY)
+        print("at work", flush=True)
+        other.wait()
+        # Longer than a call waits before it looks.
+        over.wait(0.3)
+        os.write(end, b"x,deviation\\n0,0\\n1,2\\n2,0\\n")
+        os.close(end)""",
+    )
+    assert interrupted(python(script, pipe)) == "['2.0']\n"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals of this kind")
+@pytest.mark.parametrize("by", ["the command", "another program"])
+def test_ctrl_c_ends_the_program(by: str, tmp_path: Path) -> None:
+    pipe = tmp_path / "never"
+    os.mkfifo(pipe)
+    run = {
+        "the command": "errsep.__main__.main()",
+        "another program": "errsep._errsep.main(['errsep', *sys.argv[1:]])",
+    }[by]
+    script = f"""
+        import os, sys, threading
+        import errsep.__main__
+
+        def say():
+            end = os.open(sys.argv[2], os.O_WRONLY)
+            print("at work", flush=True)
+            threading.Event().wait()
+
+        threading.Thread(target=say, daemon=True).start()
+        try:
+            {run}
+        except KeyboardInterrupt:
+            os._exit(3)
+    """
+    process = python(script, "straightness", pipe)
+    interrupted(process)
+    assert process.returncode == (-signal.SIGINT if by == "the command" else 3)
 
 
 def test_one_thread_gives_the_same_answer_as_all() -> None:

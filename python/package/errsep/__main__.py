@@ -2,15 +2,22 @@
 
 import signal
 import sys
+import threading
 
 from . import _errsep
 
 
 def main() -> int:
     """Runs the program with the arguments of this process; returns its exit status."""
+    words = ["errsep", *sys.argv[1:]]
+    if threading.current_thread() is not threading.main_thread():
+        return _errsep.main(words)
     # Ctrl-C ends the program as it does anywhere else; Python's own handler would wait for its end.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    return _errsep.main(["errsep", *sys.argv[1:]])
+    before = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        return _errsep.main(words)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 if __name__ == "__main__":

@@ -48,12 +48,12 @@ pub(super) fn all(
         .map_err(|e| no_thread(&e))?;
     std::thread::scope(|scope| {
         for pool in &pools {
-            scope.spawn(|| {
+            let work = || {
                 while let Some((at, campaign, key)) =
                     waiting.get(next.fetch_add(1, Ordering::Relaxed))
                 {
                     let begin = Instant::now();
-                    let row = pool.install(|| one(campaign, key, inputs, held));
+                    let row = one(campaign, key, inputs, held);
                     let seconds = begin.elapsed().as_secs_f64();
                     bar.inc(1);
                     let mut outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner);
@@ -67,7 +67,8 @@ pub(super) fn all(
                         seconds,
                     });
                 }
-            });
+            };
+            scope.spawn(move || pool.install(work));
         }
     });
     let (_, ended) = outcome.into_inner().unwrap_or_else(PoisonError::into_inner);

@@ -18,6 +18,8 @@ pub(super) struct Blocks {
     lines: usize,
     end: u8,
     given: u64,
+    /// Bytes of the whole, where they are known.
+    length: Option<u64>,
     is_over: bool,
 }
 
@@ -25,6 +27,7 @@ impl Blocks {
     /// `head` is what was read of `source`; `end` is the byte after which a line begins.
     pub fn new(source: Source, head: Vec<u8>, end: u8) -> Self {
         Self {
+            length: source.length(),
             source,
             rest: head,
             lines: 0,
@@ -39,9 +42,17 @@ impl Blocks {
     /// # Errors
     /// The system's own.
     pub fn fill(&mut self, chunk: &mut Chunk) -> io::Result<bool> {
+        if self.is_over && self.rest.is_empty() {
+            chunk.length = 0;
+            return Ok(false);
+        }
         // The first chunk is what was read already, if a line ends in it.
         let is_first = self.given == 0 && self.rest.contains(&self.end);
-        let wanted = if is_first { self.rest.len() } else { CHUNK };
+        let wanted = if is_first {
+            self.rest.len()
+        } else {
+            self.chunk()
+        };
         let mut filled = self.rest.len();
         chunk
             .bytes
@@ -75,6 +86,14 @@ impl Blocks {
         Ok(cut > 0)
     }
 
+    /// Bytes of the next chunk: of a small file no more than are left, and one in which its end is met.
+    fn chunk(&self) -> usize {
+        let left = self.length.map(|whole| whole.saturating_sub(self.given));
+        left.map_or(CHUNK, |left| {
+            (left.min(CHUNK as u64) as usize + 1).min(CHUNK)
+        })
+    }
+
     /// Records the digest in this thread, if everything has been read.
     pub fn note_end(&mut self) {
         if self.is_over {
@@ -84,7 +103,37 @@ impl Blocks {
 
     /// How many times as long as what was given until now the whole is, where that is known.
     pub fn whole_to_given(&self) -> Option<f64> {
-        let length = self.source.length()?;
+        let length = self.length?;
         (self.given > 0).then(|| length as f64 / self.given as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Read, Write};
+
+    use super::*;
+
+    #[test]
+    fn chunks_are_no_longer_than_what_is_left_of_the_file() {
+        let text = "12345\n".repeat(10_000) + "the end";
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(text.as_bytes()).unwrap();
+        let mut source = Source::open(file.path()).unwrap();
+        let mut head = vec![0; 1000];
+        source.read_exact(&mut head).unwrap();
+        let mut blocks = Blocks::new(source, head, b'\n');
+        let mut given = Vec::new();
+        loop {
+            let mut chunk = Chunk::default();
+            if !blocks.fill(&mut chunk).unwrap() {
+                assert!(chunk.bytes.is_empty());
+                break;
+            }
+            let left = text.len() - given.len();
+            assert!(chunk.bytes.len() <= left + 1, "{left} bytes are left");
+            given.extend_from_slice(&chunk.bytes[..chunk.length]);
+        }
+        assert!(given == text.as_bytes());
     }
 }

@@ -18,10 +18,16 @@ const MOST_WORDS: usize = 6;
 /// the remedy.
 type Wrong = (Option<usize>, String, String);
 
-/// Whether the roles are those of a plate's table: one of them is a nominal coordinate.
+/// Whether the roles are those of a plate's table: nominal beside measured or deviation. (A `target` alone is
+/// that of a diagonal test.)
 pub(super) fn is_of_plate(map: &ColumnMap) -> bool {
-    let nominal = |entry: &Entry| matches!(role_of(&entry.role), Some(Role::Of(Kind::Nominal, _)));
-    map.entries().iter().any(nominal)
+    let kinds = || {
+        map.entries().iter().filter_map(|e| match role_of(&e.role) {
+            Some(Role::Of(kind, _)) => Some(kind),
+            _ => None,
+        })
+    };
+    kinds().any(|kind| kind == Kind::Nominal) && kinds().any(|kind| kind != Kind::Nominal)
 }
 
 /// What a role is called by: as a column would be named that is known by itself.

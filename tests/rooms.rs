@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// In the order in which they work; what is on one level may not know each other either.
-const ORDER: [&[&str]; 10] = [
+const ORDER: [&[&str]; 11] = [
     &["search", "options", "levels"],
     &["noise"],
     &["detection"],
@@ -14,6 +14,7 @@ const ORDER: [&[&str]; 10] = [
     &["diagnose"],
     &["joined", "agreement", "learning", "symbolic"],
     &["sealing"],
+    &["questions"],
 ];
 
 fn level(room: &str) -> Option<usize> {

@@ -28,7 +28,7 @@ pub struct Agreement {
     pub both: usize,
 }
 
-/// See [`crate::diagnosis::agreement`].
+/// `agreement` of a model of any kind.
 pub(super) fn agreement(model: &AnyModel, options: &Options, each: usize) -> Vec<Agreement> {
     let is_known = |name: &str| !options.without.iter().any(|out| out == name);
     let mut catalogue = model.effects();

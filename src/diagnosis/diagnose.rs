@@ -10,7 +10,7 @@ use crate::diagnosis::options::Options;
 use crate::diagnosis::verdict::compose::compose;
 use crate::diagnosis::verdict::types::Diagnosis;
 
-/// See [`crate::diagnosis::diagnose_with`].
+/// `diagnose_with` of a model of any kind.
 pub(super) fn diagnose_with(
     model: &AnyModel,
     catalogue: Vec<Box<dyn Effect<AnyModel>>>,

@@ -140,7 +140,7 @@ pub struct Joined {
     pub change: Vec<f64>,
 }
 
-/// See [`crate::diagnosis::joined`].
+/// `joined` of a model of any kind.
 pub(super) fn joined(
     model: &AnyModel,
     catalogue: Vec<Box<dyn Effect<AnyModel>>>,

@@ -80,7 +80,7 @@ impl NotLearnt {
     }
 }
 
-/// See [`crate::diagnosis::learn`].
+/// `learn` of a model of any kind.
 pub(in crate::diagnosis) fn learn(
     model: &AnyModel,
     options: &Options,

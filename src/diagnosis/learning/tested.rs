@@ -53,7 +53,7 @@ pub struct Tested {
     pub outside: f64,
 }
 
-/// See [`crate::diagnosis::tested`].
+/// `tested` of a model of any kind.
 pub(in crate::diagnosis) fn tested(
     model: &AnyModel,
     effect: &Tabulated,

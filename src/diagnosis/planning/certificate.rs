@@ -49,7 +49,7 @@ pub struct Diagnosability {
     pub harm_per_visible: Vec<(String, f64, String)>,
 }
 
-/// See [`crate::diagnosis::certificate`].
+/// `certificate` of a model of any kind.
 pub(in crate::diagnosis) fn certificate(
     model: &AnyModel,
     catalogue: &[Box<dyn Effect<AnyModel>>],

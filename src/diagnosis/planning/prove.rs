@@ -45,7 +45,7 @@ pub struct Trials {
     pub wrong: usize,
 }
 
-/// See [`crate::diagnosis::prove`].
+/// `prove` of a model of any kind.
 pub(in crate::diagnosis) fn prove(
     model: &AnyModel,
     catalogue: &[Box<dyn Effect<AnyModel>>],

@@ -62,7 +62,7 @@ pub enum NotSealed {
     Undetermined,
 }
 
-/// See [`crate::diagnosis::sealed`].
+/// `sealed` of a model of any kind.
 pub(in crate::diagnosis) fn sealed(
     model: &AnyModel,
     plan: &AnyModel,

@@ -21,7 +21,7 @@ const FAR: f64 = 2.575_829;
 /// *Limit.* A size that the measurement itself tells to less than so many standard deviations is not tested.
 const TOLD: f64 = 3.0;
 
-/// See [`crate::diagnosis::checked`].
+/// `checked` of a model of any kind.
 pub(in crate::diagnosis) fn checked(
     model: &AnyModel,
     catalogue: Vec<Box<dyn Effect<AnyModel>>>,

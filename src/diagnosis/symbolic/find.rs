@@ -90,7 +90,7 @@ impl Refusal {
     }
 }
 
-/// See [`crate::diagnosis::law`].
+/// `law` of a model of any kind.
 pub(in crate::diagnosis) fn law(
     model: &AnyModel,
     options: &Options,

@@ -20,6 +20,9 @@ impl AnyModel {
     }
 
     /// Effects of a model as effects of any.
+    ///
+    /// # Panics
+    /// Such an effect panics where it is asked about a model of another kind.
     pub fn effects_of<M: FittedModel + 'static>(
         effects: Vec<Box<dyn Effect<M>>>,
     ) -> Vec<Box<dyn Effect<Self>>> {

@@ -18,6 +18,7 @@ mod lateral_backlash;
 mod local_contamination;
 mod off_crest;
 mod oval_cone;
+mod passes;
 mod reversal_shift;
 mod stick_slip;
 mod taper;

@@ -199,8 +199,9 @@ fn strongest(
 }
 
 /// Refines each cause beside the others, and swaps it for any effect that explains more, itself
-/// begun elsewhere among them.
+/// begun elsewhere among them; not again where the others leave what they left before.
 fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause]) {
+    let mut tried: Vec<f64> = vec![f64::INFINITY; causes.len()];
     for _ in 0..POLISHED {
         let mut changed = false;
         for k in 0..causes.len() {
@@ -208,12 +209,17 @@ fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause]) 
             let start = finer(&causes[k].shape);
             let (refined, t) =
                 context.refine(context.model, readings, causes[k].effect, &start, &others);
-            let remainder = context.remainder(readings, &others);
-            let strongest = strongest(context, readings, &remainder, &others, t);
-            let swapped = strongest.map(|(c, _)| {
-                context.refine(context.model, readings, c.effect, &finer(&c.shape), &others)
+            let left = context.misfit(readings, &others);
+            let again = (left - tried[k]).abs() > NO_BETTER;
+            let swapped = again.then(|| {
+                tried[k] = left;
+                let remainder = context.remainder(readings, &others);
+                let strongest = strongest(context, readings, &remainder, &others, t);
+                strongest.map(|(c, _)| {
+                    context.refine(context.model, readings, c.effect, &finer(&c.shape), &others)
+                })
             });
-            match swapped {
+            match swapped.flatten() {
                 Some((other, other_t)) if other_t > t + BETTER => {
                     causes[k] = other;
                     changed = true;

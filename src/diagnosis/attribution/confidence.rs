@@ -191,7 +191,7 @@ fn alternatives(
                 near.then(|| context.refine_alone(context.model, readings, effect, &shape, &others))
             };
             let mut own = vec![Some(best[k].clone())];
-            own.extend(relatives.into_iter().map(other));
+            own.par_extend(relatives.into_par_iter().map(other));
             own
         } else {
             if context.p_value(&remainder, effect) > EARNED {
@@ -207,7 +207,7 @@ fn alternatives(
                 cause
             })]
         };
-        let judged = trials.into_iter().flatten().filter_map(|cause| {
+        let judged = trials.into_par_iter().flatten().filter_map(|cause| {
             if strength(&cause) < own - HOPELESS - HOPELESS_PART * own
                 || !possible(context, readings, &others, &cause)
             {

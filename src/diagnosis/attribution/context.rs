@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use rayon::prelude::*;
 
-use crate::diagnosis::attribution::doubt::{DRAWS, Doubt, NoiseOnce};
+use crate::diagnosis::attribution::doubt::{DRAWS, Doubt, Drawn};
 use crate::diagnosis::detection::dictionary::{
     Dictionary, Entry, Meaning, Places, statistic, surprise,
 };
@@ -28,8 +28,8 @@ pub(in crate::diagnosis) struct Context<'a> {
     pub space: Space,
     pub dictionary: Dictionary,
     pub null: Arc<NullLaw>,
-    /// Draws of the noise for the doubt about the state.
-    pub noise: NoiseOnce,
+    /// Draws for the doubt about the state.
+    pub drawn: Drawn,
 }
 
 /// A cause at a shape, with its whitened, projected signature.
@@ -86,7 +86,7 @@ impl<'a> Context<'a> {
             space,
             dictionary,
             null,
-            noise: NoiseOnce::new(),
+            drawn: Drawn::default(),
         }
     }
 
@@ -107,7 +107,7 @@ impl<'a> Context<'a> {
             space,
             dictionary,
             null: Arc::clone(&self.null),
-            noise: NoiseOnce::new(),
+            drawn: Drawn::default(),
         }
     }
 

@@ -9,9 +9,9 @@
 //! each eigenvector of B Bᵀ with eigenvalue λ a part λ/(1 + λ) of every product is taken away. The
 //! same draws give what the noise of the state adds to the uncertainty of the causes' sizes.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
-use errsep_models::model::{AnyModel, Column, FittedModel};
+use errsep_models::model::{AnyModel, Column, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -84,8 +84,20 @@ pub(in crate::diagnosis) struct NoiseDraws {
     away: Vec<Option<DMatrix<f64>>>,
 }
 
-/// Noise that is drawn once it is asked for.
-pub(in crate::diagnosis) type NoiseOnce = OnceLock<Arc<NoiseDraws>>;
+/// What is drawn at one state and law once it is asked for: the noise, and the states behind the sizes of the
+/// causes that were asked for last.
+#[derive(Default)]
+pub(in crate::diagnosis) struct Drawn {
+    noise: OnceLock<Arc<NoiseDraws>>,
+    states: Mutex<Option<KnownStates>>,
+}
+
+/// Readings and causes with the draws of the state behind their sizes.
+struct KnownStates {
+    readings: DVector<f64>,
+    causes: Vec<(usize, Shape)>,
+    draws: Option<Arc<StateDraws>>,
+}
 
 /// Draws of noise over readings that are free of causes.
 pub(in crate::diagnosis) struct StateDraws {
@@ -117,23 +129,46 @@ impl Context<'_> {
                 away,
             })
         };
-        if let Some(known) = self.noise.get() {
+        if let Some(known) = self.drawn.noise.get() {
             return Arc::clone(known);
         }
         // Not held locked meanwhile, as in `best`.
         let drawn = all();
-        let _ = self.noise.set(Arc::clone(&drawn));
+        let _ = self.drawn.noise.set(Arc::clone(&drawn));
         drawn
     }
 
     /// Draws of the state; nothing where the causes' change does not depend on it.
-    pub fn state_draws(&self, readings: &DVector<f64>, causes: &[Cause]) -> Option<StateDraws> {
-        let (moved, moved_as_read) = self.moved_states(readings, causes, DRAWS)?;
-        Some(StateDraws {
-            moved: self.space.forward(moved).0,
-            noise: self.noise_draws(),
-            moved_as_read,
-        })
+    pub fn state_draws(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+    ) -> Option<Arc<StateDraws>> {
+        let shapes: Vec<(usize, Shape)> =
+            causes.iter().map(|c| (c.effect, c.shape.clone())).collect();
+        if let Ok(known) = self.drawn.states.lock()
+            && let Some(known) = &*known
+            && known.causes == shapes
+            && known.readings == *readings
+        {
+            return known.draws.clone();
+        }
+        let moved = self.moved_states(readings, causes, DRAWS);
+        let draws = moved.map(|(moved, moved_as_read)| {
+            Arc::new(StateDraws {
+                moved: self.space.forward(moved).0,
+                noise: self.noise_draws(),
+                moved_as_read,
+            })
+        });
+        if let Ok(mut known) = self.drawn.states.lock() {
+            *known = Some(KnownStates {
+                readings: readings.clone(),
+                causes: shapes,
+                draws: draws.clone(),
+            });
+        }
+        draws
     }
 
     /// How the causes' change moves with the drawn states, as it stands in the readings, and the same with
@@ -147,19 +182,22 @@ impl Context<'_> {
         let (amplitudes, _) = self.amplitudes(readings, causes)?;
         let changes = self.changes(readings, causes)?;
         let noise = self.noise_draws();
-        let states = States {
+        let mut states = States {
             context: self,
             readings,
             causes,
             amplitudes: &amplitudes,
             changes: &changes,
             noise: &noise,
+            fixed: vec![None; causes.len()],
         };
         let fitted = self
             .model
             .refit_as_smooth(self.without(readings, causes, &changes));
-        let base = states.change_at((&fitted, &fitted)).column_sum();
+        let apart = states.change_at((&fitted, &fitted));
         let base_as_read = states.change_at((&fitted, &fitted.as_read())).column_sum();
+        states.hold(&apart);
+        let base = apart.column_sum();
         let rounds = states.rounds(&base)?;
         let all: Vec<[DVector<f64>; 2]> = (0..draws)
             .into_par_iter()
@@ -265,14 +303,32 @@ struct States<'s> {
     amplitudes: &'s DVector<f64>,
     changes: &'s DMatrix<f64>,
     noise: &'s NoiseDraws,
+    /// The change of each cause that does not depend on the state.
+    fixed: Vec<Option<DVector<f64>>>,
 }
 
 impl States<'_> {
+    /// Holds the causes that change the same at a drawn state as at the fitted one, `apart`.
+    fn hold(&mut self, apart: &DMatrix<f64>) {
+        let (_, state) = self.fitted(0, &self.noisy(0), self.changes);
+        let drawn = self.change_at((&state, &state));
+        let read = self.change_at((&state, &state.as_read()));
+        for (k, own) in apart.column_iter().enumerate() {
+            let still = drawn.column(k) == own && read.column(k) == own;
+            self.fixed[k] = still.then(|| own.clone_owned());
+        }
+    }
+
     /// What each cause changes at a state, and at the state as read, readings × causes.
     fn change_at(&self, states: (&AnyModel, &AnyModel)) -> DMatrix<f64> {
         let mut changed = DMatrix::zeros(self.readings.len(), self.causes.len());
         let mut at = 0;
         for (k, mut changed) in changed.column_iter_mut().enumerate() {
+            if let Some(fixed) = &self.fixed[k] {
+                changed.copy_from(fixed);
+                at += self.causes[k].columns.len();
+                continue;
+            }
             let columns = self
                 .context
                 .columns_at(k, states, self.causes, self.changes);

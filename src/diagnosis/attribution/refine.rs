@@ -2,6 +2,7 @@
 
 use errsep_models::model::{AnyModel, Effect, Shape};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use crate::diagnosis::attribution::by_traces::ByTraces;
 use crate::diagnosis::attribution::context::{Cause, Context, as_matrix, column, span};
@@ -32,8 +33,9 @@ impl Context<'_> {
             let columns = self.catalogue[effect].amplitudes_at(shape).len();
             (t - (columns + shape.free()) as f64 * log_readings, columns)
         };
-        let relatives = self.catalogue[effect].relatives(state, &shape).into_iter();
+        let relatives = self.catalogue[effect].relatives(state, &shape);
         let mut relatives: Vec<(f64, usize, Shape)> = relatives
+            .into_par_iter()
             .map(|other| {
                 let (here, columns) = weighed(&other, seen.value(&other).0);
                 (here, columns, other)

@@ -6,14 +6,19 @@
 //! signature depends on nothing. Noise also moves the state at which signatures are taken: that is
 //! drawn. What the state leaves open, W of one standard deviation each, adds G W (G W)ᵀ.
 
+use std::sync::Arc;
+
 use errsep_models::model::{Estimate, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::diagnosis::attribution::context::{Cause, Context, stack};
+use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::attribution::doubt::{ROUNDS, StateDraws};
 
 /// What the noise of the state may take away of a variance, at most: it is known from draws.
 const LEAST: f64 = -0.5;
+
+/// Part of the change by a step of an amplitude that a further round may leave out of its derivative.
+const AT_REST: f64 = 1e-3;
 
 /// Amplitudes and shapes of causes fitted together.
 pub(in crate::diagnosis) struct Sizes {
@@ -26,7 +31,7 @@ pub(in crate::diagnosis) struct Sizes {
     /// What the parameters are: those that readings determine at all.
     pub parameters: Vec<Unknown>,
     /// Draws of the state, where signatures depend on it.
-    pub draws: Option<StateDraws>,
+    pub draws: Option<Arc<StateDraws>>,
 }
 
 /// One parameter of several causes.
@@ -80,10 +85,12 @@ impl Sizes {
             };
             let at = first_amplitude(causes, cause) + k;
             let step = 0.5 * plain.covariance[(parameter, parameter)].sqrt();
+            let own = &causes[cause].columns[k].values;
+            let length = step * own.iter().map(|v| v * v).sum::<f64>().sqrt();
             let predicted = |sign: f64| {
                 let mut moved = plain.amplitudes.clone();
                 moved[at] += sign * step;
-                predicted(context, readings, causes, &moved)
+                predicted(context, readings, causes, &moved, length)
             };
             let slope = (predicted(1.0) - predicted(-1.0)) / (2.0 * step);
             if slope.iter().all(|v| v.is_finite()) {
@@ -201,32 +208,41 @@ pub(in crate::diagnosis) fn beside(cause: &Cause, parameter: usize) -> Option<(S
 }
 
 /// The whitened, projected change by causes of given amplitudes, at the state that is left without
-/// them.
+/// them: in as many rounds as move it by no more than a part of `step`.
 fn predicted(
     context: &Context<'_>,
     readings: &DVector<f64>,
     causes: &[Cause],
     amplitudes: &DVector<f64>,
+    step: f64,
 ) -> DVector<f64> {
     let mut changes = context.changes_at(causes, amplitudes);
-    let mut moved: Vec<Cause> = Vec::new();
     for _ in 0..ROUNDS {
         let clean = context.without(readings, causes, &changes);
         let state = context.model.refit_as_smooth(clean);
         let mut at = 0;
-        moved.clear();
+        let mut next = DMatrix::zeros(changes.nrows(), causes.len());
         for (k, cause) in causes.iter().enumerate() {
             let own = &amplitudes.as_slice()[at..at + cause.columns.len()];
             at += own.len();
-            let shape = context.catalogue[cause.effect]
-                .settled(&cause.shape, own)
-                .unwrap_or_else(|| cause.shape.clone());
+            let effect = &context.catalogue[cause.effect];
+            let shape = effect.settled(&cause.shape, own);
+            let shape = shape.as_ref().unwrap_or(&cause.shape);
             let state = context.seen_by(k, &state, causes, &changes);
-            moved.push(context.cause(&state, cause.effect, shape));
+            let columns = effect.columns(&state, shape);
+            for (column, amplitude) in columns.iter().zip(own) {
+                for (&row, value) in column.rows.iter().zip(&column.values) {
+                    next[(row, k)] += amplitude * value;
+                }
+            }
         }
-        changes = context.changes_at(&moved, amplitudes);
+        let moved = (&next - &changes).norm();
+        changes = next;
+        if moved <= AT_REST * step {
+            break;
+        }
     }
-    stack(&moved, readings.len()) * amplitudes
+    context.space.forward_vector(&changes.column_sum())
 }
 
 /// A covariance with what the noise of the state adds to it.

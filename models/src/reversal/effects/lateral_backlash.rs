@@ -163,8 +163,22 @@ impl Effect<Linearised> for LateralBacklash {
             let of = |axis: &usize| [with(*axis, &|_, _| 1.0), with(*axis, &gone)];
             return axes.flat_map(of).collect();
         }
-        axes.flat_map(|axis| (0..terms(shape)).map(|k| (*axis, k)))
-            .map(|(axis, k)| with(axis, &|part, _| term(shape.variant % KINDS, k, part)))
+        // A term once a position: many readings are at each.
+        let positions = model.positions();
+        let kind = shape.variant % KINDS;
+        let along: Vec<Vec<f64>> = (0..terms(shape))
+            .map(|k| {
+                let at = |x: &f64| term(kind, k, part_of_travel(model, *x));
+                positions.iter().map(at).collect()
+            })
+            .collect();
+        axes.flat_map(|axis| along.iter().map(|along| (*axis, along)))
+            .map(|(axis, along)| {
+                Column::from_places(model.places(), |_, place| {
+                    let sign = model.seat(place).phi[axis] * place.direction;
+                    0.5 * sign * along[place.cell % positions.len()]
+                })
+            })
             .collect()
     }
 

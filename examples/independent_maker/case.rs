@@ -103,7 +103,7 @@ pub fn made(order: &Order) -> Case {
             name: source.name,
             what: recipe.what,
             visible: shows(recipe, size),
-            size: recipe.size.map(|(factor, unit)| (factor * size, unit)),
+            size: recipe.size.as_ref().map(|(of, unit)| (of(size), *unit)),
         });
     }
     let schedule = order.design.of(&shared, &mut chance);

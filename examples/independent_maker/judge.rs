@@ -137,9 +137,9 @@ pub fn gap_right(said: &Said, case: &Case) -> bool {
     (said.gap / case.gap - 1.0).abs() <= 0.15
 }
 
-/// Whether the size is within two standard uncertainties, where the answer states one in the same sense;
+/// How far the size is off in standard uncertainties, where the answer states one in the same sense;
 /// signs are a convention and left aside.
-pub fn size_right(said: &Said, case: &Case) -> Option<bool> {
+pub fn size_off(said: &Said, case: &Case) -> Option<f64> {
     let truth = case.truths.first()?;
     let (size, unit) = truth.size?;
     let unit_of = |unit: &str| unit.replace("um", "µm").replace("μm", "µm");
@@ -148,5 +148,5 @@ pub fn size_right(said: &Said, case: &Case) -> Option<bool> {
         .sizes
         .iter()
         .find(|(effect, _, _, told)| effect == truth.name && same(told))?;
-    Some((value.abs() - size.abs()).abs() <= 2.0 * std)
+    Some((value.abs() - size.abs()) / std)
 }

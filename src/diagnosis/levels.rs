@@ -64,7 +64,7 @@ pub(in crate::diagnosis) const INVISIBLE: f64 = 1e-4;
 
 /// *Tuned.* Probability at which a cause must stand out beside the others, and an effect to be tried.
 pub(in crate::diagnosis) const EARNED: f64 = 0.002;
-/// *Tuned*: three causes imitate freely what none of them is. A set of one, two, three causes whose
+/// *Tuned*: three causes imitate freely what none of them is. A set of one, two, three or more causes whose
 /// remainder is less probable than this is not adequate.
 pub(in crate::diagnosis) const ADEQUATE: [f64; 3] = [0.001, 0.001, 0.01];
 /// *Limit.* Standard deviations of chi-squared beyond which no doubt about the state excuses a remainder.
@@ -79,6 +79,12 @@ pub(in crate::diagnosis) const SLACK: f64 = 0.1;
 pub(in crate::diagnosis) const HOPELESS: f64 = 80.0;
 /// See [`HOPELESS`].
 pub(in crate::diagnosis) const HOPELESS_PART: f64 = 0.1;
+/// *Limit.* The same part where no cause is adequate: an effect that bends the state may explain half of what
+/// another seems to, until the state is fitted without it.
+pub(in crate::diagnosis) const BENT: f64 = 0.5;
+/// *Quantile*: odds at which one explanation outweighs another. Of two that are d standard deviations apart the
+/// right one is outweighed with the probability Φ(−d/2 − ln(odds)/d), at most 0.12 %.
+pub(in crate::diagnosis) const ODDS: f64 = 100.0;
 /// *Tuned* on withheld effects: part of the strongest cause's change, squared, that a further one must
 /// reach. What is less may be the remainder of a cause taken for another whose signature is off by a
 /// seventh of its size.
@@ -106,7 +112,12 @@ pub(in crate::diagnosis) const PAIRS: usize = 3;
 /// See [`PAIRS`].
 pub(in crate::diagnosis) const PAIR_REACH: f64 = 1.3;
 /// *Limit.* Effects in one verdict.
-pub(in crate::diagnosis) const MOST_CAUSES: usize = 3;
+pub(in crate::diagnosis) const MOST_CAUSES: usize = 6;
+/// *Limit.* As many are sought before all pairs are tried.
+pub(in crate::diagnosis) const FREELY: usize = 3;
+/// *Tuned.* Where more than this part of what was left beyond the noise is left by a further cause, no more are
+/// sought: of six equal causes the first takes a sixth away, what imitates a cause a tenth at most.
+pub(in crate::diagnosis) const STALLED: f64 = 0.85;
 /// *Limit.* Effects of greatest score that are refined to find the strongest, and rounds of refining each
 /// cause beside the others.
 pub(in crate::diagnosis) const REFINED: usize = 5;

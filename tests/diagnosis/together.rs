@@ -152,3 +152,45 @@ fn a_small_cause_beside_a_strong_one_is_partial() {
             .all(|name| beside.partial.contains(&(*name).to_owned()))
     );
 }
+
+/// As many as five effects of which none outweighs the others are named together, the strong ones first sought
+/// at a state that the rest bend.
+#[test]
+fn five_effects_of_like_size_are_all_named() {
+    let noise = SceneNoise {
+        white: 0.1,
+        ..SceneNoise::default()
+    };
+    let mut scene = Scene::random(100, 4, 1e-4, 2.0, noise, &mut ChaCha8Rng::seed_from_u64(2));
+    scene.effects.extend([
+        Injection::Taper(3e-6),
+        Injection::ThermalDrift {
+            drift: 2.0,
+            constant: 700.0,
+            alike: false,
+        },
+        Injection::ZeroJump {
+            jump: 1.0,
+            channel: Channel::C2A,
+            time: 700.0,
+        },
+        Injection::LocalContamination {
+            height: 2.0,
+            channel: Channel::C1B,
+            repeat: None,
+            position: 90.0,
+            width: 8.0,
+        },
+        Injection::AxisBacklash(2.0),
+    ]);
+    let mut said = diagnosed(&scene.measured(2), &[]).verdict.effects;
+    said.sort();
+    let all = [
+        "axis-backlash",
+        "local-contamination",
+        "taper",
+        "thermal-drift",
+        "zero-jump",
+    ];
+    assert_eq!(said, all);
+}

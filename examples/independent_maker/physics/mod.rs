@@ -44,8 +44,8 @@ pub struct Recipe {
     /// Where the search for a size begins, and the greatest that is possible.
     pub start: f64,
     pub most: f64,
-    /// Factor to, and unit of, the size that a catalogue may state in the same sense.
-    pub size: Option<(f64, &'static str)>,
+    /// The size, and its unit, that a catalogue may state in the same sense.
+    pub size: Option<(Box<dyn Fn(f64) -> f64 + Send + Sync>, &'static str)>,
 }
 
 impl Recipe {
@@ -63,8 +63,16 @@ impl Recipe {
         }
     }
 
-    fn sized(mut self, factor: f64, unit: &'static str) -> Self {
-        self.size = Some((factor, unit));
+    fn sized(self, factor: f64, unit: &'static str) -> Self {
+        self.sized_by(move |size| factor * size, unit)
+    }
+
+    fn sized_by(
+        mut self,
+        of: impl Fn(f64) -> f64 + Send + Sync + 'static,
+        unit: &'static str,
+    ) -> Self {
+        self.size = Some((Box::new(of), unit));
         self
     }
 }

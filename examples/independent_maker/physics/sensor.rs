@@ -20,7 +20,11 @@ pub fn gain(which: usize, chance: &mut Chance, _: &Facts) -> Recipe {
             r * (1.0 + sign * s * parts[m.indicator])
         })]
     })
-    .sized(1.0, "1")
+    // Of the gains only their ratio shows: their difference counts in parts of their mean.
+    .sized_by(
+        move |s| s / (1.0 + sign * s * (parts[0] + parts[1]) / 2.0),
+        "1",
+    )
 }
 
 /// A curve about the indicator's zero, of either or both.

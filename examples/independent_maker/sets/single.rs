@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{LAWS, ended, known, prepared};
 use crate::arguments::Arguments;
 use crate::case::Order;
-use crate::judge::{OUTCOMES, Outcome, gap_right, outcome, size_right};
+use crate::judge::{OUTCOMES, Outcome, gap_right, outcome, size_off};
 use crate::physics::{SOURCES, Source};
 use crate::product::{apart, ask};
 use crate::table::{print, rate};
@@ -119,7 +119,16 @@ fn one(
         seconds: judged.map_or(0.0, |said| said.seconds),
     };
     if row.outcome == Outcome::Alone {
-        row.size = judged.and_then(|said| size_right(said, &case));
+        let off = judged.and_then(|said| size_off(said, &case));
+        row.size = off.map(|off| off.abs() <= 2.0);
+        if let Some(off) = off.filter(|off| off.abs() > 2.0) {
+            println!(
+                "--only {}/{which} --seed {seed} --cases 1: {}, {}: its size is off by {off:+.1} u",
+                source.name,
+                truth.what,
+                law.name(),
+            );
+        }
     }
     let mut separation = String::new();
     if arguments.certificate && class == Class::Listed && row.outcome != Outcome::Alone {

@@ -1,7 +1,8 @@
 //! Which effects: the search.
 //!
 //! One cause is tried first, then two, then three; each further one must earn its place beside the
-//! others (`confidence.rs`). If no step forward succeeds, all pairs are tried.
+//! others (`confidence.rs`). If no step forward succeeds, all pairs are tried, and then up to six causes as
+//! long as those found stand together.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -9,8 +10,8 @@ use rayon::prelude::*;
 use crate::diagnosis::attribution::confidence::{Answer, confidence_set, possible, without};
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder, finer};
 use crate::diagnosis::levels::{
-    BETTER, EARNED, HOPELESS, IN_REACH, MOST_CAUSES, NO_BETTER, PAIR_REACH, PAIRS, POLISHED,
-    REFINED,
+    BETTER, EARNED, FAR, FREELY, HOPELESS, IN_REACH, MOST_CAUSES, NO_BETTER, PAIR_REACH, PAIRS,
+    POLISHED, REFINED, STALLED,
 };
 
 /// Seeks the causes of what stands out in readings; `begun` are those without which noise and state were had.
@@ -32,48 +33,124 @@ pub(in crate::diagnosis) fn attribute(
             }
         }
     }
-    let mut causes: Vec<Cause> = Vec::new();
-    let mut partial: Option<Answer> = None;
-    for size in 1..=MOST_CAUSES {
-        let here = partial.as_ref().map_or(first, |answer| &answer.remainder);
-        let next = match size {
-            1 => strongest_alone.clone(),
-            _ => strongest(context, readings, here, &causes, 0.0),
-        };
-        let Some((next, _)) = next else {
-            break;
-        };
-        causes.push(next);
-        if size > 1 {
-            polish(context, readings, &mut causes);
+    let mut search = Search {
+        context,
+        readings,
+        first,
+        partial: None,
+        stalled: false,
+    };
+    search
+        .forward(strongest_alone, 1..=FREELY)
+        .or_else(|| search.by_pairs())
+        .or_else(|| search.forward(None, FREELY + 1..=MOST_CAUSES))
+        .or(search.partial)
+}
+
+/// A search with the best that it has come to.
+struct Search<'s> {
+    context: &'s Context<'s>,
+    readings: &'s DVector<f64>,
+    first: &'s Remainder,
+    partial: Option<Answer>,
+    /// Whether the last cause left most of what was there.
+    stalled: bool,
+}
+
+impl Search<'_> {
+    /// One cause more at a time, until what is left is adequate. Where much is left a third and more are
+    /// sought only as long as the last took a good part away: what only imitates is not built upon.
+    fn forward(
+        &mut self,
+        strongest_alone: Option<(Cause, f64)>,
+        sizes: std::ops::RangeInclusive<usize>,
+    ) -> Option<Answer> {
+        let (context, readings) = (self.context, self.readings);
+        let mut alone = strongest_alone;
+        for size in sizes {
+            let partial = self.partial.as_ref();
+            let mut causes = partial.map_or_else(Vec::new, |answer| answer.causes.clone());
+            if causes.len() + 1 != size || self.stalled {
+                break;
+            }
+            let here = partial.map_or(self.first, |answer| &answer.remainder);
+            let next = match size {
+                1 => alone.take(),
+                _ => strongest(context, readings, here, &causes, 0.0),
+            };
+            let Some((next, _)) = next else {
+                break;
+            };
+            causes.push(next);
+            if size > 1 {
+                polish(context, readings, &mut causes);
+            }
+            let answer = confidence_set(context, readings, &causes);
+            if answer.complete {
+                return Some(answer);
+            }
+            if let Some(fewer) = self.spared(&answer) {
+                return Some(fewer);
+            }
+            // Causes that have come to coincide cannot be fitted together: those before stand.
+            if context.amplitudes(readings, &answer.causes).is_none() {
+                break;
+            }
+            let before = partial.map(|before| self.excess(before));
+            let left = self.excess(&answer);
+            self.partial = Some(answer);
+            let far = FAR * (2.0 * context.space.degrees_of_freedom() as f64).sqrt();
+            self.stalled = left > far && before.is_some_and(|before| left > STALLED * before);
         }
-        let answer = confidence_set(context, readings, &causes);
-        if answer.complete {
-            return Some(answer);
-        }
-        // Causes that have come to coincide cannot be fitted together: those before stand.
-        if context.amplitudes(readings, &answer.causes).is_none() {
-            break;
-        }
-        causes.clone_from(&answer.causes);
-        partial = Some(answer);
+        None
     }
-    let judged = partial.as_ref().map_or(f64::INFINITY, |answer| {
-        answer.remainder.residual.norm_squared()
-    });
-    let least = judged + HOPELESS;
-    pairs(context, readings, first)
-        .into_iter()
-        .filter(|causes| {
-            let known = partial.as_ref().is_some_and(|a| same(&a.causes, causes));
-            !known || context.misfit(readings, causes) < judged - NO_BETTER
-        })
-        .filter(|causes| {
-            context.misfit(readings, &context.relinearised(readings, causes, least)) < least
-        })
-        .map(|causes| confidence_set(context, readings, &causes))
-        .find(|answer| answer.complete)
-        .or(partial)
+
+    /// What is left beyond the noise.
+    fn excess(&self, answer: &Answer) -> f64 {
+        answer.remainder.square - self.context.space.degrees_of_freedom() as f64
+    }
+
+    /// Pairs of which neither need stand out alone.
+    fn by_pairs(&self) -> Option<Answer> {
+        let (context, readings) = (self.context, self.readings);
+        let partial = self.partial.as_ref();
+        let judged = partial.map_or(f64::INFINITY, |answer| {
+            answer.remainder.residual.norm_squared()
+        });
+        let least = judged + HOPELESS;
+        pairs(context, readings, self.first)
+            .into_iter()
+            .filter(|causes| {
+                let known = partial.is_some_and(|a| same(&a.causes, causes));
+                !known || context.misfit(readings, causes) < judged - NO_BETTER
+            })
+            .filter(|causes| {
+                context.misfit(readings, &context.relinearised(readings, causes, least)) < least
+            })
+            .find_map(|causes| {
+                let answer = confidence_set(context, readings, &causes);
+                if answer.complete {
+                    return Some(answer);
+                }
+                self.spared(&answer)
+            })
+    }
+
+    /// The answer of one cause alone, where two leave nothing but do not stand together: beside the other one
+    /// may have been found that alone was hidden by what it does to the state.
+    fn spared(&self, answer: &Answer) -> Option<Answer> {
+        let (context, readings) = (self.context, self.readings);
+        if answer.causes.len() != 2 || !context.adequate(&answer.causes, &answer.remainder) {
+            return None;
+        }
+        let judged = self.partial.as_ref();
+        let most = answer.remainder.residual.norm_squared() + HOPELESS;
+        (0..answer.causes.len())
+            .map(|k| without(&answer.causes, k))
+            .filter(|fewer| !judged.is_some_and(|judged| same(&judged.causes, fewer)))
+            .map(|fewer| confidence_set(context, readings, &fewer))
+            .find(|fewer| fewer.complete && fewer.remainder.residual.norm_squared() < most)
+    }
 }
 
 /// The causes without which noise and state cannot be had: by strength, each refitted, no others
@@ -85,7 +162,7 @@ pub(in crate::diagnosis) fn roughly(
 ) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     let mut left: Option<Remainder> = None;
-    for _ in 0..MOST_CAUSES {
+    for _ in 0..FREELY {
         let here = left.as_ref().unwrap_or(first);
         let Some((next, _)) = strongest(context, readings, here, &causes, 0.0) else {
             break;
@@ -159,7 +236,7 @@ fn same(one: &[Cause], other: &[Cause]) -> bool {
     one.len() == other.len() && one.iter().all(holds)
 }
 
-/// The refined effect with the greatest statistic beside the causes, and that statistic. `known`: one that
+/// The refined effect of greatest evidence beside the causes, and its statistic. `known`: one that
 /// another cause has there already.
 fn strongest(
     context: &Context<'_>,
@@ -195,7 +272,12 @@ fn strongest(
             context.come_back(context.model, readings, found, causes)
         })
         .filter(|(cause, _)| possible(context, readings, causes, cause))
-        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .max_by(|a, b| paid(context, a).total_cmp(&paid(context, b)))
+}
+
+/// A statistic less what the unknowns cost it: twice Schwarz's evidence.
+fn paid(context: &Context<'_>, (cause, t): &(Cause, f64)) -> f64 {
+    t - cause.unknowns() as f64 * (context.space.readings() as f64).ln()
 }
 
 /// Refines each cause beside the others, and swaps it for any effect that explains more, itself
@@ -207,26 +289,26 @@ fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause]) 
         for k in 0..causes.len() {
             let others = without(causes, k);
             let start = finer(&causes[k].shape);
-            let (refined, t) =
+            let refined =
                 context.refine(context.model, readings, causes[k].effect, &start, &others);
             let left = context.misfit(readings, &others);
             let again = (left - tried[k]).abs() > NO_BETTER;
             let swapped = again.then(|| {
                 tried[k] = left;
                 let remainder = context.remainder(readings, &others);
-                let strongest = strongest(context, readings, &remainder, &others, t);
+                let strongest = strongest(context, readings, &remainder, &others, refined.1);
                 strongest.map(|(c, _)| {
                     context.refine(context.model, readings, c.effect, &finer(&c.shape), &others)
                 })
             });
             match swapped.flatten() {
-                Some((other, other_t)) if other_t > t + BETTER => {
-                    causes[k] = other;
+                Some(other) if paid(context, &other) > paid(context, &refined) + BETTER => {
+                    causes[k] = other.0;
                     changed = true;
                 }
                 _ => {
-                    changed |= refined.shape.values != causes[k].shape.values;
-                    causes[k] = refined;
+                    changed |= refined.0.shape.values != causes[k].shape.values;
+                    causes[k] = refined.0;
                 }
             }
         }

@@ -14,8 +14,8 @@ use crate::diagnosis::attribution::shrink::held_out_square;
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::detection::space::{Space, orthonormal};
 use crate::diagnosis::levels::{
-    EARNED, EQUAL_EVIDENCE, HELD, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, OUTDONE, STANDS,
-    WEIGHTY, chi_squared_of_two, chi_squared_quantile,
+    BENT, EARNED, EQUAL_EVIDENCE, HELD, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, ODDS, OUTDONE,
+    STANDS, WEIGHTY, chi_squared_of_two, chi_squared_quantile,
 };
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
 
@@ -60,7 +60,13 @@ pub(in crate::diagnosis) fn confidence_set(
     let mut remainder = context.judged(readings, &best);
     let mut groups = Vec::new();
     for k in 0..causes.len() {
-        let members = alternatives(context, readings, &best, k);
+        let mut members = alternatives(context, readings, &best, k, HOPELESS_PART);
+        if members.is_empty() && causes.len() == 1 {
+            // What bends the state most is seen least at that state.
+            let least = context.misfit(readings, &best);
+            members = alternatives(context, readings, &best, k, BENT);
+            members.retain(|m| m.left.residual.norm_squared() < least);
+        }
         let mut group: Vec<Alternative> = members
             .iter()
             .map(|m| Alternative {
@@ -90,7 +96,11 @@ pub(in crate::diagnosis) fn confidence_set(
 }
 
 /// Whether each of some causes is needed beside the others, is no other effect at its limit, and has a size.
-fn stand_together(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) -> bool {
+pub(in crate::diagnosis) fn stand_together(
+    context: &Context<'_>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> bool {
     let needed = causes.len() == 1
         || weighty(context, readings, causes)
             && (0..causes.len()).all(|k| {
@@ -161,12 +171,14 @@ fn predicts(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) ->
     (0..causes.len()).all(|k| square(&without(causes, k)).is_none_or(|s| s > with))
 }
 
-/// The effects that are adequate in the place of cause `k`, the best fit first.
+/// The effects that are adequate in the place of cause `k`, the best fit first; those are tried that explain
+/// less than it by no more than a part of what it does.
 fn alternatives(
     context: &Context<'_>,
     readings: &DVector<f64>,
     best: &[Cause],
     k: usize,
+    part: f64,
 ) -> Vec<Member> {
     let others = without(best, k);
     let remainder = context.remainder(readings, &others);
@@ -176,6 +188,7 @@ fn alternatives(
         remainder.residual.norm_squared() - context.misfit(readings, &all)
     };
     let own = strength(&best[k]);
+    let reach = HOPELESS + part * own;
     let least = context.misfit(readings, best) + HOPELESS + HOPELESS_PART * own;
     let best_of = |effect: usize| -> Option<Member> {
         if others.iter().any(|c| c.effect == effect) {
@@ -208,9 +221,7 @@ fn alternatives(
             })]
         };
         let judged = trials.into_par_iter().flatten().filter_map(|cause| {
-            if strength(&cause) < own - HOPELESS - HOPELESS_PART * own
-                || !possible(context, readings, &others, &cause)
-            {
+            if strength(&cause) < own - reach || !possible(context, readings, &others, &cause) {
                 return None;
             }
             let known = cause.shape == best[k].shape && effect == best[k].effect;
@@ -222,7 +233,7 @@ fn alternatives(
                 context.relinearised(readings, &trial, least)
             };
             let left = context.judged(readings, &trial);
-            let misfit = left.residual.norm_squared();
+            let misfit = left.square;
             let passes = context.adequate(&trial, &left)
                 && is_beyond_limit(context, readings, &trial, k)
                 && Sizes::fitted(context, readings, &trial)
@@ -241,6 +252,7 @@ fn alternatives(
     let mut members: Vec<Member> = effects.filter_map(best_of).collect();
     drop_outdone(context, &mut members, k);
     drop_holders(context, &mut members, k);
+    drop_unlikely(context, &mut members, k);
     let least = members
         .iter()
         .map(|m| m.misfit)
@@ -303,6 +315,32 @@ fn drop_holders(context: &Context<'_>, members: &mut Vec<Member>, k: usize) {
         let left = &projected - &basis * basis.tr_mul(&projected);
         left.norm_squared() > HELD * own_length
     });
+}
+
+/// Drops what is outweighed by the member of greatest evidence.
+fn drop_unlikely(context: &Context<'_>, members: &mut Vec<Member>, k: usize) {
+    let known = |m: &Member| (m.evidence, m.causes[k].unknowns(), m.misfit);
+    let leader = members.iter().map(known);
+    let Some((_, unknowns, misfit)) = leader.max_by(|a, b| a.0.total_cmp(&b.0)) else {
+        return;
+    };
+    members.retain(|m| {
+        let own = (m.misfit, m.causes[k].unknowns());
+        !outweighed(context, own, (misfit, unknowns))
+    });
+}
+
+/// Whether of two explanations, each by what it leaves and its unknowns, the first is outweighed by the
+/// second: the odds are those of their likelihoods, in which further unknowns of the second count against
+/// it (Schwarz's approximation), those of the first not.
+pub(in crate::diagnosis) fn outweighed(
+    context: &Context<'_>,
+    first: (f64, usize),
+    second: (f64, usize),
+) -> bool {
+    let further = second.1.saturating_sub(first.1) as f64;
+    let log_readings = (context.space.readings() as f64).ln();
+    first.0 - second.0 - further * log_readings > 2.0 * ODDS.ln()
 }
 
 /// Brings the greatest evidence of each group to its front and makes it the cause, where these causes

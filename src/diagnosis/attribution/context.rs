@@ -51,6 +51,8 @@ impl Cause {
 /// What remains beside some causes.
 pub(in crate::diagnosis) struct Remainder {
     pub residual: DVector<f64>,
+    /// Its square, as far as it is trusted.
+    pub square: f64,
     /// The residual as it is trusted, then the directions that are not looked along, as signatures see
     /// them.
     seen: Vec<Sums<f64, WIDTH>>,
@@ -253,6 +255,7 @@ impl<'a> Context<'a> {
                 .sums(adjoint.columns(from, width).as_view())
         });
         Remainder {
+            square: residual.dot(&spans[0]),
             residual,
             seen: seen.collect(),
             directions,

@@ -5,7 +5,7 @@ use errsep_models::calibration_line::CalibrationLine;
 use errsep_models::calibration_line::simulate::{CalibrationSimulation, Disturbance, simulate};
 use errsep_models::model::{AnyModel, FittedModel};
 
-use crate::diagnosis::attribution::confidence::possible;
+use crate::diagnosis::attribution::confidence::{outweighed, possible};
 use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::attribution::doubt::FEW_DRAWS;
 use crate::diagnosis::attribution::examined::examined;
@@ -70,18 +70,26 @@ fn is_first(context: &Context<'_>, name: &Name, rivals: &Drawn, rival: usize) ->
             possible(context, &readings, &[], &cause).then_some((cause, t))
         })
         .collect();
-    let passes = |cause: &Cause| {
+    let passed = |cause: &Cause| {
         let alone = std::slice::from_ref(cause);
-        context.adequate(alone, &context.judged_by(&readings, alone, FEW_DRAWS))
+        let left = context.judged_by(&readings, alone, FEW_DRAWS);
+        let passes = context.adequate(alone, &left);
+        passes.then(|| (left.square, cause.unknowns()))
     };
     let of_group = |cause: &Cause| name.members.contains(&cause.effect);
-    let others: Vec<bool> = refined
+    let others: Vec<(f64, usize)> = refined
         .iter()
         .filter(|(cause, _)| !of_group(cause))
-        .map(|(cause, _)| passes(cause))
+        .filter_map(|(cause, _)| passed(cause))
         .collect();
     let best = refined.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    best.is_some_and(|(cause, _)| of_group(cause) && passes(cause)) && !others.contains(&true)
+    let Some(own) = best
+        .filter(|(cause, _)| of_group(cause))
+        .and_then(|(cause, _)| passed(cause))
+    else {
+        return false;
+    };
+    others.iter().all(|other| outweighed(context, *other, own))
 }
 
 /// A drift near the limit of detection, of which smooth errors are often named alike, and a bend, of which

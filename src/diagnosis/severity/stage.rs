@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::diagnosis::attribution::confidence::{Answer, possible};
+use crate::diagnosis::attribution::confidence::{Answer, outweighed, possible};
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
 use crate::diagnosis::attribution::doubt::FEW_DRAWS;
 use crate::diagnosis::detection::dictionary::Dictionary;
@@ -113,9 +113,12 @@ impl Name {
     /// effect passes in its place. The others are searched only where one of the group passes.
     fn is_found(&self, context: &Context<'_>, readings: &DVector<f64>) -> bool {
         let first = context.remainder(readings, &[]);
-        let passes = |cause: &Cause| {
+        // What one leaves, and its unknowns, where it passes.
+        let passed = |cause: &Cause| {
             let alone = std::slice::from_ref(cause);
-            context.adequate(alone, &context.judged_by(readings, alone, FEW_DRAWS))
+            let left = context.judged_by(readings, alone, FEW_DRAWS);
+            let passes = context.adequate(alone, &left);
+            passes.then(|| (left.square, cause.unknowns()))
         };
         let refined = |effect: usize| refined(context, readings, &first, effect);
         let mut group: Vec<(usize, Cause, f64)> = self
@@ -133,9 +136,9 @@ impl Name {
         let Some((effect, cause, most)) = best else {
             return false;
         };
-        if !passes(cause) || !is_tried(*effect) {
+        let Some(own) = passed(cause).filter(|_| is_tried(*effect)) else {
             return false;
-        }
+        };
         let ranked = ranked(context, &first);
         let mut others = Vec::new();
         for effect in ranked.into_iter().filter(|k| !self.members.contains(k)) {
@@ -145,7 +148,8 @@ impl Name {
                 None => {}
             }
         }
-        !others.iter().any(passes)
+        let stands = |other: &Cause| passed(other).is_some_and(|o| !outweighed(context, o, own));
+        !others.iter().any(stands)
     }
 }
 

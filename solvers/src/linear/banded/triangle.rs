@@ -101,7 +101,7 @@ impl BandTriangle {
     }
 
     /// X ← R⁻¹X for X of n rows of `columns` values, row-major. Unknowns with a zero diagonal get zero.
-    pub fn solve_rows(&self, rows: &mut [f64], columns: usize) {
+    pub(crate) fn solve_rows(&self, rows: &mut [f64], columns: usize) {
         if columns > 0 {
             solve_rows(self, rows, columns);
         }

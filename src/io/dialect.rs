@@ -118,7 +118,9 @@ impl Dialect {
         if head.starts_with(b"\xFF\xFE") || head.starts_with(b"\xFE\xFF") {
             return Err(NotATable::Utf16);
         }
-        if let Some(offset) = head.iter().position(|&b| is_binary(b)) {
+        // First without early ends, so that many bytes are looked at together.
+        let is_odd = head.iter().fold(false, |found, b| found | is_binary(*b));
+        if is_odd && let Some(offset) = head.iter().position(|&b| is_binary(b)) {
             return Err(NotATable::Binary {
                 offset,
                 byte: head[offset],
@@ -181,7 +183,12 @@ impl Dialect {
 
 /// A control character that no text file holds.
 pub(super) const fn is_binary(byte: u8) -> bool {
-    byte < b' ' && !matches!(byte, b'\t' | b'\n' | b'\r' | 0x0C | 0x1A)
+    (byte < b' ')
+        & (byte != b'\t')
+        & (byte != b'\n')
+        & (byte != b'\r')
+        & (byte != 0x0C)
+        & (byte != 0x1A)
 }
 
 /// Blank lines and comments.

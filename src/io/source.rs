@@ -120,7 +120,12 @@ pub fn digest_of(path: &Path) -> Read256 {
 
 /// SHA-256 in hexadecimal digits.
 pub fn hexadecimal(hash: Sha256) -> String {
-    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+    let digits = |byte: &u8| [byte >> 4, byte & 15];
+    let digest = hash.finalize();
+    let digits = digest.iter().flat_map(digits);
+    digits
+        .filter_map(|digit| char::from_digit(u32::from(digit), 16))
+        .collect()
 }
 
 /// A file, a pipe or standard input, being read.

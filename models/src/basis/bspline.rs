@@ -91,6 +91,14 @@ impl CubicBSpline {
         after.clamp(1, self.cells.len()) - 1
     }
 
+    /// The same, sought first in the cell of a position nearby.
+    pub fn cell_near(&self, x: f64, near: usize) -> usize {
+        match self.breaks.get(near..near + 2) {
+            Some([left, right]) if *left <= x && x < *right => near,
+            _ => self.cell_of(x),
+        }
+    }
+
     /// Left end and width of a cell, mm.
     pub fn cell(&self, k: usize) -> (f64, f64) {
         (self.breaks[k], self.breaks[k + 1] - self.breaks[k])

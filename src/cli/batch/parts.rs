@@ -186,12 +186,15 @@ impl Part {
         }
         bar.inc((self.campaigns.len() - waiting.len()) as u64);
         let mut seconds = Vec::new();
+        let mut longest = 0;
         work::all(&waiting, (inputs, &held), how.jobs, bar, |worked| {
             let failed = |e: std::io::Error| unwritable(&journal, &e);
             // A line that a kill has cut off ends before this one.
-            let mut line = vec![b'\n'];
+            let mut line = Vec::with_capacity(longest);
+            line.push(b'\n');
             serde_json::to_writer(&mut line, &worked.row).map_err(|e| failed(e.into()))?;
             line.push(b'\n');
+            longest = longest.max(line.len());
             kept.write_all(&line).map_err(failed)?;
             let line = String::from_utf8(line).map_err(|e| failed(std::io::Error::other(e)))?;
             seconds.push((worked.row.id.clone(), worked.seconds));

@@ -12,7 +12,7 @@ use crate::io::Message;
 use crate::io::reversal::ReversalData;
 
 pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
-    Ok(json!({
+    let mut answer = json!({
         "schema": "errsep.reversal/1",
         "method": o.method,
         "convention": match o.convention {
@@ -29,21 +29,9 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
         "covariance": o.covariances.as_ref().map(|c| {
             json!({"names": c.names, "units": c.units, "matrix": c.matrix})
         }),
-        "closure": match &o.closure {
-            Some(c) => json!({
-                "slope": match c.slope {
-                    Some(slope) => angle(o, "closure slope", slope)?,
-                    None => Value::Null,
-                },
-                "rms": {"value": c.rms, "unit": "um"},
-                "expected_rms": {"value": c.expected_rms, "unit": "um"},
-                "x": c.x,
-                "profile": c.profile,
-            }),
-            None => Value::Null,
-        },
-        "forms": forms(o),
-        "form_combinations": form_combinations(o),
+        "closure": null,
+        "forms": null,
+        "form_combinations": null,
         "straightness": straightness(o),
         "residual": {
             "rms": o.residual_rms,
@@ -73,7 +61,12 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
         })).collect::<Vec<_>>(),
         "warnings": o.warnings,
         "not_shown": NOT_SHOWN.iter().map(|(name, _)| *name).collect::<Vec<_>>(),
-    }))
+    });
+    // The long lists are put in place afterwards: the macro copies what it is given.
+    answer["closure"] = closure(o)?;
+    answer["forms"] = forms(o);
+    answer["form_combinations"] = form_combinations(o);
+    Ok(answer)
 }
 
 /// What a fit that found no minimum had come to, in the terms of an answer: values without uncertainty.
@@ -148,7 +141,23 @@ fn contrasts(o: &Outcome) -> Result<Vec<Value>, Message> {
         .collect()
 }
 
-fn forms(o: &Outcome) -> Map<String, Value> {
+fn closure(o: &Outcome) -> Result<Value, Message> {
+    let Some(c) = &o.closure else {
+        return Ok(Value::Null);
+    };
+    Ok(json!({
+        "slope": match c.slope {
+            Some(slope) => angle(o, "closure slope", slope)?,
+            None => Value::Null,
+        },
+        "rms": {"value": c.rms, "unit": "um"},
+        "expected_rms": {"value": c.expected_rms, "unit": "um"},
+        "x": c.x,
+        "profile": c.profile,
+    }))
+}
+
+fn forms(o: &Outcome) -> Value {
     let mut forms = Map::new();
     forms.insert("x".to_owned(), json!(o.x));
     for name in errsep_models::reversal::staged::FORMS {
@@ -162,10 +171,10 @@ fn forms(o: &Outcome) -> Map<String, Value> {
             found.map_or(Value::Null, |f| json!(f.std)),
         );
     }
-    forms
+    Value::Object(forms)
 }
 
-fn form_combinations(o: &Outcome) -> Vec<Value> {
+fn form_combinations(o: &Outcome) -> Value {
     let together = o.forms.iter().filter(|f| !f.is_single);
     together
         .map(|f| json!({"name": f.name, "values": f.values, "std": f.std, "unit": "um"}))

@@ -228,6 +228,9 @@ pub(super) fn find_columns(table: &TableReader) -> Result<Columns, Message> {
     })
 }
 
+/// Rows for which there is room at first.
+const ROWS: usize = 2048;
+
 /// What is read from some rows that follow each other.
 #[derive(Default)]
 struct Part {
@@ -241,6 +244,10 @@ struct Part {
 
 impl Part {
     fn add(&mut self, row: Row<'_>, columns: &Columns) -> Result<(), Message> {
+        if self.rows == 0 {
+            self.readings.reserve(ROWS);
+            self.lines.reserve(ROWS);
+        }
         self.rows += 1;
         read_row(row, columns, self)?;
         let line = u32::try_from(row.line()).unwrap_or(u32::MAX);

@@ -14,6 +14,9 @@ use crate::io::message::Message;
 /// A longer line is not that of a table, in bytes.
 pub(super) const LONGEST_LINE: usize = 1 << 20;
 
+/// Bytes of a field, as few as there are in most tables of readings.
+const FIELD: usize = 8;
+
 /// Whole lines of a file.
 #[derive(Default)]
 pub(super) struct Chunk {
@@ -40,6 +43,7 @@ impl Chunk {
             self.room = seams;
             return;
         }
+        seams.reserve(bytes.len() / FIELD);
         mark(bytes, dialect.delimiter.byte(), &mut seams);
         if bytes.last().is_some_and(|b| *b != b'\n') {
             seams.push(bytes.len() as u32);

@@ -34,7 +34,7 @@ use sheet::Sheet;
 use trouble::{cannot_read, not_a_table};
 
 /// What is read ahead to detect the dialect, in bytes.
-const HEAD: u64 = 1 << 16;
+const HEAD: usize = 1 << 16;
 
 /// A table being read, row by row.
 pub struct TableReader {
@@ -57,6 +57,30 @@ struct Text {
     walk: Walk,
 }
 
+/// The beginning of a file: all of it, if it is shorter than [`HEAD`].
+fn read_head(file: &mut Source) -> std::io::Result<Vec<u8>> {
+    let length = file.length().map_or(HEAD as u64, |n| n.saturating_add(1));
+    let mut head = vec![0; length.min(HEAD as u64) as usize];
+    let mut filled = 0;
+    loop {
+        if filled == HEAD {
+            return Ok(head);
+        }
+        if filled == head.len() {
+            head.resize(HEAD, 0);
+        }
+        match file.read(&mut head[filled..]) {
+            Ok(0) => {
+                head.truncate(filled);
+                return Ok(head);
+            }
+            Ok(n) => filled += n,
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+}
+
 impl TableReader {
     /// Opens a table, detects its dialect and reads the names of its columns.
     ///
@@ -71,12 +95,8 @@ impl TableReader {
         }
         let unreadable = |e: std::io::Error| cannot_read(path, &e);
         let mut file = Source::open(path).map_err(unreadable)?;
-        let mut head = Vec::new();
-        (&mut file)
-            .take(HEAD)
-            .read_to_end(&mut head)
-            .map_err(unreadable)?;
-        let whole = (head.len() as u64) < HEAD;
+        let mut head = read_head(&mut file).map_err(unreadable)?;
+        let whole = head.len() < HEAD;
         let dialect = Dialect::detect(&head, whole).map_err(|no| not_a_table(path, no))?;
         if dialect.byte_order_mark {
             head.drain(..BYTE_ORDER_MARK.len());

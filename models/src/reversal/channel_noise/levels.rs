@@ -162,6 +162,7 @@ fn differences(
     found: &mut Vec<f64>,
 ) {
     let inner = count.saturating_sub(2);
+    found.reserve(inner.min(MOST));
     for i in (0..inner).step_by(inner.div_ceil(MOST).max(1)) {
         let (left, middle, right) = (x(i), x(i + 1), x(i + 2));
         let share = if right > left {

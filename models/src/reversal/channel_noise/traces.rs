@@ -127,20 +127,20 @@ fn group(c: usize, x: &[f64], traces: &[Trace], own: Vec<usize>) -> Group {
     let x_of = |t: usize| (0..traces[t].len()).map(move |k| x[traces[t].row(k)]);
     let edges = shared_positions(longest, own.iter().flat_map(|t| x_of(*t)))
         .unwrap_or_else(|| even_edges(x, longest));
-    let last = edges.len().saturating_sub(1);
-    let cell_of = |x: f64| {
-        edges
-            .partition_point(|e| *e <= x)
-            .saturating_sub(1)
-            .min(last)
+    // The last edge at or below a position; positions grow along a trace.
+    let cell_of = |x: f64, before: usize| {
+        let beyond = edges[before..].iter().skip(1).position(|e| *e > x);
+        beyond.map_or(edges.len().saturating_sub(1), |more| before + more)
     };
     let mut sums = vec![(0.0, 0.0); edges.len()];
     let on_cells: Vec<CellTrace> = own
         .iter()
         .map(|t| {
-            let mut cells: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
+            let most = edges.len().min(traces[*t].len());
+            let mut cells: Vec<(usize, std::ops::Range<usize>)> = Vec::with_capacity(most);
+            let mut cell = 0;
             for (k, x) in x_of(*t).enumerate() {
-                let cell = cell_of(x);
+                cell = cell_of(x, cell);
                 sums[cell].0 += x;
                 sums[cell].1 += 1.0;
                 match cells.last_mut() {

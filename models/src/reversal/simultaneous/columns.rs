@@ -62,7 +62,7 @@ impl Reversal<'_> {
             push(column, slope, -self.xi[form][side + k]);
         }
         let mut next = 4 * forms;
-        for (j, sign) in unknowns.slope_signs(channel).into_iter().enumerate() {
+        for (j, sign) in unknowns.slope_signs(channel).enumerate() {
             push(next, j, sign);
         }
         next += 1;

@@ -13,7 +13,7 @@ use super::descent::{approach, minimise};
 use super::effects::{CATALOGUE, Setting, times};
 use super::error::ReversalError;
 use super::fitted_knots::FittedKnots;
-use super::ground::{Begun, Ground};
+use super::ground::{Begun, Breaks, Ground};
 use super::knots::{self, FEWEST_POSITIONS};
 use super::options::{Noise, Options, Thickness};
 use super::problem::Reversal;
@@ -78,7 +78,11 @@ fn solve(
     effects: Option<&Begun>,
 ) -> Result<Simultaneous, ReversalError> {
     let (options, channels) = (ground.options, ground.channels);
-    let (breaks, table) = ground.breaks(effects)?;
+    let Breaks {
+        points: breaks,
+        table,
+        linear,
+    } = ground.breaks(effects)?;
     let readings = ground.observations.readings.len();
     let unknowns = ground.unknowns(breaks.len() + 2, effects);
     enough(
@@ -91,7 +95,7 @@ fn solve(
     let start = match problem.unknowns.thickness_index() {
         Some(index) => start_of_thickness(&mut problem, index, start, &options.minimisation)?,
         None => head_start(&problem, &start, &options.minimisation)
-            .or_else(|| ground.linear_start(&problem, &start))
+            .or_else(|| ground.linear_start(&problem, &start, linear))
             .unwrap_or(start),
     };
     let start = approach(&problem, start, &options.minimisation)?;
@@ -383,11 +387,11 @@ fn head_start(
     if problem.joined.is_some() {
         return None;
     }
-    let thin = problem.thinned(HEAD_START_READINGS);
-    let count = |channels: &[ChannelReadings]| channels.iter().map(|c| c.len()).sum::<usize>();
-    if HEAD_START_GAIN * count(&thin) > count(problem.channels) {
+    let readings: usize = problem.channels.iter().map(ChannelReadings::len).sum();
+    if HEAD_START_GAIN * problem.thinned_count(HEAD_START_READINGS) > readings {
         return None;
     }
+    let thin = problem.thinned(HEAD_START_READINGS);
     let fit = fit_structured(&problem.over(&thin), start.clone(), options).ok()?;
     fit.converged().then_some(fit.parameters)
 }

@@ -6,6 +6,7 @@
 //! B the basis at the positions: the linear constraint that ties z to the coefficients. Readings do
 //! not count in it, so that a tilt means the same with and without one of them.
 
+use errsep_solvers::by_processor;
 use errsep_solvers::linear::bordered::Constraints;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
@@ -102,26 +103,22 @@ pub fn constraints_at(
     }
 }
 
+/// Positions that are worth handing to another core.
+const PLACES_A_CORE: usize = 4096;
+
 /// The two rows of G⁻¹XᵀW B for growing positions.
 pub fn line_of_spline(basis: &CubicBSpline, places: &[f64], axis: Axis) -> [Vec<f64>; 2] {
     let starts = starts(places, basis.breaks());
-    // Moments Σ w tᵖ, Σ w ξ tᵖ and Σ w ξ² of the positions of each cell of the spline.
-    let moments: Vec<[f64; 9]> = (0..basis.cell_count())
+    let cells = basis.cell_count();
+    let cells_a_core = PLACES_A_CORE * cells / places.len().max(1);
+    let moments: Vec<Moments> = (0..cells)
         .into_par_iter()
+        .with_min_len(cells_a_core.max(1))
         .map(|k| {
-            let mut moment = [0.0; 9];
+            let mut sums = [0.0; 5];
             let (left, width) = basis.cell(k);
-            for i in starts[k]..starts[k + 1] {
-                let (w, x) = (cell_width(places, i), places[i]);
-                let (t, xi) = ((x - left) / width, axis.xi(x));
-                let powers = [1.0, t, t * t, t * t * t];
-                for (p, power) in powers.into_iter().enumerate() {
-                    moment[p] += w * power;
-                    moment[4 + p] += w * xi * power;
-                }
-                moment[8] += w * xi * xi;
-            }
-            moment
+            gather(&mut sums, places, starts[k], starts[k + 1], left, width);
+            Moments::new(&sums, [axis.xi(left), width / axis.scale])
         })
         .collect();
     let mut rows = [
@@ -131,12 +128,13 @@ pub fn line_of_spline(basis: &CubicBSpline, places: &[f64], axis: Axis) -> [Vec<
     for (k, moment) in moments.iter().enumerate() {
         for (l, polynomial) in basis.polynomials(k).iter().enumerate() {
             for p in 0..4 {
-                rows[0][k + l] += polynomial[p] * moment[p];
-                rows[1][k + l] += polynomial[p] * moment[4 + p];
+                rows[0][k + l] += polynomial[p] * moment.ones[p];
+                rows[1][k + l] += polynomial[p] * moment.xi[p];
             }
         }
     }
-    let [n, s1, s2] = [0, 4, 8].map(|p| moments.iter().map(|moment| moment[p]).sum::<f64>());
+    let sum = |of: fn(&Moments) -> f64| moments.iter().map(of).sum::<f64>();
+    let (n, s1, s2) = (sum(|m| m.ones[0]), sum(|m| m.xi[0]), sum(|m| m.xi_squares));
     let determinant = n * s2 - s1 * s1;
     let inverse = Matrix2::new(s2, -s1, -s1, n) / determinant;
     for k in 0..basis.coefficient_count() {
@@ -144,4 +142,99 @@ pub fn line_of_spline(basis: &CubicBSpline, places: &[f64], axis: Axis) -> [Vec<
         (rows[0][k], rows[1][k]) = (z.x, z.y);
     }
     rows
+}
+
+/// Moments of the positions of a cell: Σ w tᵖ, Σ w ξ tᵖ and Σ w ξ².
+struct Moments {
+    ones: [f64; 4],
+    xi: [f64; 4],
+    xi_squares: f64,
+}
+
+impl Moments {
+    /// From Σ w tᵖ, p ≤ 4, where ξ = a + b t.
+    fn new(sums: &[f64; 5], [a, b]: [f64; 2]) -> Self {
+        let xi = |p: usize| a * sums[p] + b * sums[p + 1];
+        Self {
+            ones: [0, 1, 2, 3].map(|p| sums[p]),
+            xi: [0, 1, 2, 3].map(xi),
+            xi_squares: a * xi(0) + b * xi(1),
+        }
+    }
+}
+
+/// Positions taken together.
+const LANES: usize = 4;
+
+by_processor! {
+    /// Adds w tᵖ, p ≤ 4, of the positions from..to, t = (x − left)/width.
+    fn gather(
+        sums: &mut [f64; 5],
+        places: &[f64],
+        from: usize,
+        to: usize,
+        left: f64,
+        width: f64,
+    ) from gather_generic
+}
+
+#[inline(always)]
+fn gather_generic<const FMA: bool>(
+    sums: &mut [f64; 5],
+    places: &[f64],
+    from: usize,
+    to: usize,
+    left: f64,
+    width: f64,
+) {
+    let per_width = 1.0 / width;
+    let mut lanes = [[0.0; LANES]; 5];
+    let ends = [0, places.len().saturating_sub(1)];
+    for k in ends.into_iter().take(places.len()) {
+        if from <= k && k < to {
+            let widths = [cell_width(places, k), 0.0, 0.0, 0.0];
+            add_powers(&mut lanes, &[places[k]; LANES], &widths, left, per_width);
+        }
+    }
+    let (from, to) = (from.max(1), to.min(ends[1]));
+    if from < to {
+        let (before, own, after) = (
+            places[from - 1..to - 1].as_chunks::<LANES>(),
+            places[from..to].as_chunks::<LANES>(),
+            places[from + 1..to + 1].as_chunks::<LANES>(),
+        );
+        for ((before, x), after) in before.0.iter().zip(own.0).zip(after.0) {
+            let mut widths = [0.0; LANES];
+            for l in 0..LANES {
+                widths[l] = 0.5 * (after[l] - before[l]);
+            }
+            add_powers(&mut lanes, x, &widths, left, per_width);
+        }
+        let (mut x, mut widths) = ([left; LANES], [0.0; LANES]);
+        for (l, ((before, own), after)) in before.1.iter().zip(own.1).zip(after.1).enumerate() {
+            (x[l], widths[l]) = (*own, 0.5 * (after - before));
+        }
+        add_powers(&mut lanes, &x, &widths, left, per_width);
+    }
+    for (sum, lanes) in sums.iter_mut().zip(lanes) {
+        *sum += (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]);
+    }
+}
+
+#[inline(always)]
+fn add_powers(
+    sums: &mut [[f64; LANES]; 5],
+    x: &[f64; LANES],
+    widths: &[f64; LANES],
+    left: f64,
+    per_width: f64,
+) {
+    for l in 0..LANES {
+        let t = (x[l] - left) * per_width;
+        let mut power = widths[l];
+        for sum in sums.iter_mut() {
+            sum[l] += power;
+            power *= t;
+        }
+    }
 }

@@ -6,7 +6,7 @@ use super::effects::JoinedEffect;
 use super::error::{FEWEST_FREE, ReversalError};
 use super::gauge::Axis;
 use super::joined::Joined;
-use super::knots::{self, Choice, FEWEST_POSITIONS, KnotTrial};
+use super::knots::{self, Choice, FEWEST_POSITIONS, KnotTrial, LinearStep};
 use super::options::{Knots, Noise, Options, Thickness};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
@@ -31,6 +31,15 @@ pub struct Ground<'a> {
     pub thickness_free: bool,
     /// First weights, 1/σ by channel.
     pub weights: Vec<f64>,
+}
+
+/// Where the forms break.
+pub struct Breaks {
+    /// The break points, mm.
+    pub points: Vec<f64>,
+    /// The ladder, where they were chosen, and what it found on them.
+    pub table: Vec<KnotTrial>,
+    pub linear: Option<LinearStep>,
 }
 
 /// Effects with the values from which the fit begins.
@@ -127,32 +136,39 @@ impl<'a> Ground<'a> {
         knots::most_cells(self.channels, &unknowns, self.fewest_free())
     }
 
-    /// The break points that the options ask for, and the ladder where they are chosen: beside the
-    /// effects, which fine knots would take up otherwise.
+    /// The break points that the options ask for; where they are chosen, beside the effects, which fine knots would take up otherwise.
     ///
     /// # Errors
     /// [`ReversalError`] where the readings do not carry them.
-    pub fn breaks(
-        &self,
-        effects: Option<&Begun<'a>>,
-    ) -> Result<(Vec<f64>, Vec<KnotTrial>), ReversalError> {
+    pub fn breaks(&self, effects: Option<&Begun<'a>>) -> Result<Breaks, ReversalError> {
         let choice = self.choice(effects);
         let most = self.most_cells(effects);
         let of = |coefficients: usize| self.unknowns(coefficients, effects);
-        match &self.options.knots {
-            Knots::At(breaks) => Ok((breaks.clone(), Vec::new())),
-            Knots::Cells(asked) if *asked > most && most > 0 => Err(ReversalError::TooManyKnots {
-                asked: *asked,
-                most,
-            }),
-            // Not even one cell is carried: what is missing is told when the unknowns are counted.
-            Knots::Cells(_) if most == 0 => Ok((choice.breaks(&of(4), 1)?, Vec::new())),
-            Knots::Cells(cells) => Ok((choice.breaks(&of(cells + 3), *cells)?, Vec::new())),
-            Knots::Chosen => {
-                let (cells, table) = choice.choose(of)?;
-                Ok((choice.breaks(&of(cells + 3), cells)?, table))
+        let points = match &self.options.knots {
+            Knots::At(breaks) => breaks.clone(),
+            Knots::Cells(asked) if *asked > most && most > 0 => {
+                return Err(ReversalError::TooManyKnots {
+                    asked: *asked,
+                    most,
+                });
             }
-        }
+            // Not even one cell is carried: what is missing is told when the unknowns are counted.
+            Knots::Cells(_) if most == 0 => choice.breaks(&of(4), 1)?,
+            Knots::Cells(cells) => choice.breaks(&of(cells + 3), *cells)?,
+            Knots::Chosen => {
+                let chosen = choice.choose(of)?;
+                return Ok(Breaks {
+                    points: choice.breaks(&of(chosen.cells + 3), chosen.cells)?,
+                    table: chosen.table,
+                    linear: chosen.linear,
+                });
+            }
+        };
+        Ok(Breaks {
+            points,
+            table: Vec::new(),
+            linear: None,
+        })
     }
 
     /// So many equal cells.
@@ -207,8 +223,13 @@ impl<'a> Ground<'a> {
 impl Ground<'_> {
     /// Where the linear model at the start of a problem has its least squares, by normal equations: what a
     /// first pass over the readings would lead to, for a fraction of it. `None` with effects, at tilts that
-    /// let the probes wander, or where the normal equations do not tell.
-    pub fn linear_start(&self, problem: &Reversal, start: &Parameters) -> Option<Parameters> {
+    /// let the probes wander, or where the normal equations do not tell. `known` is that of the ladder.
+    pub fn linear_start(
+        &self,
+        problem: &Reversal,
+        start: &Parameters,
+        known: Option<LinearStep>,
+    ) -> Option<Parameters> {
         let unknowns = &problem.unknowns;
         if problem.joined.is_some() || unknowns.thickness {
             return None;
@@ -222,9 +243,19 @@ impl Ground<'_> {
         if begin.iter().any(|(tilt, _)| tilt.abs() > SMALL_TILT) {
             return None;
         }
-        let place = (self.axis, self.thickness_mm);
-        let rungs = Rungs::new(self.channels, begin.into_iter(), &problem.weights, place)?;
-        let (band, border) = rungs.step(unknowns, &problem.bases)?;
+        // The ladder begins at the lines.
+        let known = known
+            .filter(|k| k.bases == problem.bases && self.options.start_tilts_rad.is_none())
+            .map(|known| known.step);
+        let (band, border) = match known {
+            Some(step) => step,
+            None => {
+                let place = (self.axis, self.thickness_mm);
+                Rungs::new(self.channels, begin.into_iter(), &problem.weights, place)?
+                    .solve(unknowns, &problem.bases)?
+                    .step()
+            }
+        };
         let there = start.stepped(&band, &border);
         let finite = there
             .band

@@ -102,7 +102,8 @@ impl Choice<'_> {
     pub fn breaks(&self, unknowns: &Unknowns, cells: usize) -> Result<Vec<f64>, ReversalError> {
         let (low, high) = gauge::range(self.channels);
         let even = CubicBSpline::uniform(low, high, cells.max(1))?;
-        let mut breaks = vec![low];
+        let mut breaks = Vec::with_capacity(even.breaks().len() + 1);
+        breaks.push(low);
         let mut seen = vec![false; self.channels.len()];
         let mut at = vec![0; self.channels.len()];
         for right in &even.breaks()[1..] {
@@ -159,41 +160,54 @@ impl Choice<'_> {
         Ok(bases)
     }
 
-    /// Goes up the ladder; the table and the best number of cells. Without effects the rungs come from
-    /// normal equations, and from orthogonal factorisations where rounding could decide.
-    pub fn choose(
-        &self,
-        unknowns_of: impl Fn(usize) -> Unknowns,
-    ) -> Result<(usize, Vec<KnotTrial>), ReversalError> {
-        if let Some(climbed) = self.by_moments(&unknowns_of)? {
-            return Ok(climbed);
+    /// Goes up the ladder. Without effects the rungs come from normal equations, and from orthogonal
+    /// factorisations where rounding could decide.
+    pub fn choose(&self, unknowns_of: impl Fn(usize) -> Unknowns) -> Result<Chosen, ReversalError> {
+        if let Some(chosen) = self.by_moments(&unknowns_of)? {
+            return Ok(chosen);
         }
         let squares = |unknowns, bases| {
             let squares = self.by_factors(unknowns, bases)?;
-            Ok(squares.map(|left| Squares {
-                left,
-                rounding: 0.0,
+            Ok(squares.map(|left| {
+                let rounding = 0.0;
+                (Squares { left, rounding }, ())
             }))
         };
-        Ok(self.climb(&unknowns_of, squares)?.chosen())
+        let climbed = self.climb(&unknowns_of, squares)?;
+        Ok(Chosen {
+            cells: climbed.cells(),
+            table: climbed.table,
+            linear: None,
+        })
     }
 
     /// The ladder by normal equations; `None` where they do not tell.
     fn by_moments(
         &self,
         unknowns_of: &impl Fn(usize) -> Unknowns,
-    ) -> Result<Option<(usize, Vec<KnotTrial>)>, ReversalError> {
+    ) -> Result<Option<Chosen>, ReversalError> {
         let Some(rungs) = self.rungs(unknowns_of) else {
             return Ok(None);
         };
         let mut told = true;
         let squares = |unknowns: Unknowns, bases: Vec<CubicBSpline>| {
-            let squares = rungs.squares(&unknowns, &bases);
-            told &= squares.is_some();
-            Ok(squares)
+            let linear = rungs.solve(&unknowns, &bases);
+            let found = linear.and_then(|linear| Some((rungs.squares(&linear)?, (linear, bases))));
+            told &= found.is_some();
+            Ok(found)
         };
         let climbed = self.climb(unknowns_of, squares)?;
-        Ok((told && climbed.clear).then(|| climbed.chosen()))
+        if !(told && climbed.clear) {
+            return Ok(None);
+        }
+        Ok(Some(Chosen {
+            cells: climbed.cells(),
+            table: climbed.table,
+            linear: climbed.found.map(|(linear, bases)| LinearStep {
+                step: linear.step(),
+                bases,
+            }),
+        }))
     }
 
     /// The readings gathered for normal equations; `None` with effects, which know single readings.
@@ -212,11 +226,14 @@ impl Choice<'_> {
     }
 
     /// Goes up the ladder with the sums of squares that `squares` finds.
-    fn climb(
+    fn climb<T>(
         &self,
         unknowns_of: &impl Fn(usize) -> Unknowns,
-        mut squares: impl FnMut(Unknowns, Vec<CubicBSpline>) -> Result<Option<Squares>, ReversalError>,
-    ) -> Result<Climbed, ReversalError> {
+        mut squares: impl FnMut(
+            Unknowns,
+            Vec<CubicBSpline>,
+        ) -> Result<Option<(Squares, T)>, ReversalError>,
+    ) -> Result<Climbed<T>, ReversalError> {
         let readings: usize = self.channels.iter().map(ChannelReadings::len).sum();
         let most = positions(self.channels) / POSITIONS_A_CELL;
         let mut climbed = Climbed::default();
@@ -232,14 +249,11 @@ impl Choice<'_> {
                 break;
             }
             let bases = self.bases(&unknowns, &breaks)?;
-            let Some(squares) = squares(unknowns, bases)? else {
+            let Some((squares, found)) = squares(unknowns, bases)? else {
                 break;
             };
-            climbed.add(
-                trial(cells, readings, count, squares.left),
-                readings,
-                squares,
-            );
+            let trial = trial(cells, readings, count, squares.left);
+            climbed.add(trial, readings, squares, found);
             if climbed.table.len() > climbed.best + PATIENCE {
                 break;
             }
@@ -279,49 +293,70 @@ impl Choice<'_> {
     }
 }
 
+/// What the ladder says.
+pub struct Chosen {
+    /// The best number of cells.
+    pub cells: usize,
+    /// Its rungs.
+    pub table: Vec<KnotTrial>,
+    /// The linear fit of the best of them, where normal equations tell.
+    pub linear: Option<LinearStep>,
+}
+
+/// The steps of band and border from where a fit begins to the minimum of its linear model.
+pub struct LinearStep {
+    pub step: (Vec<f64>, Vec<f64>),
+    /// On these bases.
+    pub bases: Vec<CubicBSpline>,
+}
+
 /// The rungs that were tried.
 #[derive(Debug)]
-struct Climbed {
+struct Climbed<T> {
     table: Vec<KnotTrial>,
     /// The place of the best.
     best: usize,
+    /// What was found there beside its squares.
+    found: Option<T>,
     /// By how much the criterion of the best may be off.
     doubt: f64,
     /// Whether rounding has decided nothing.
     clear: bool,
 }
 
-impl Default for Climbed {
+impl<T> Default for Climbed<T> {
     fn default() -> Self {
         Self {
             table: Vec::new(),
             best: 0,
+            found: None,
             doubt: 0.0,
             clear: true,
         }
     }
 }
 
-impl Climbed {
-    fn add(&mut self, trial: KnotTrial, readings: usize, squares: Squares) {
+impl<T> Climbed<T> {
+    fn add(&mut self, trial: KnotTrial, readings: usize, squares: Squares, found: T) {
         // m ln RSS moves by m δ/RSS.
         let doubt = readings as f64 * squares.rounding / squares.left;
         let last = self.table.len();
-        if last == 0 {
-            self.doubt = doubt;
-        } else {
-            let ahead = self.table[self.best].aicc - trial.aicc;
-            self.clear &= squares.rounding <= 0.0 || ahead.abs() > doubt + self.doubt;
-            if ahead > 0.0 {
-                (self.best, self.doubt) = (last, doubt);
+        let is_best = match self.table.get(self.best) {
+            None => true,
+            Some(best) => {
+                let ahead = best.aicc - trial.aicc;
+                self.clear &= squares.rounding <= 0.0 || ahead.abs() > doubt + self.doubt;
+                ahead > 0.0
             }
+        };
+        if is_best {
+            (self.best, self.doubt, self.found) = (last, doubt, Some(found));
         }
         self.table.push(trial);
     }
 
-    fn chosen(self) -> (usize, Vec<KnotTrial>) {
-        let cells = self.table.get(self.best).map_or(1, |t| t.cells);
-        (cells, self.table)
+    fn cells(&self) -> usize {
+        self.table.get(self.best).map_or(1, |t| t.cells)
     }
 }
 
@@ -444,7 +479,8 @@ mod tests {
             let of = |coefficients: usize| ground.unknowns(coefficients, None);
             let rungs = choice.rungs(&of).unwrap();
             let exact = |unknowns: Unknowns, bases: Vec<CubicBSpline>| {
-                let own = rungs.squares(&unknowns, &bases);
+                let own = rungs.solve(&unknowns, &bases);
+                let own = own.and_then(|linear| rungs.squares(&linear));
                 let left = choice.by_factors(unknowns, bases)?;
                 if let (Some(own), Some(left)) = (own, left) {
                     compared += 1;
@@ -456,19 +492,19 @@ mod tests {
                         own.rounding
                     );
                 }
-                Ok(left.map(|left| Squares {
-                    left,
-                    rounding: 0.0,
+                Ok(left.map(|left| {
+                    let rounding = 0.0;
+                    (Squares { left, rounding }, ())
                 }))
             };
-            let (exact_cells, exact_table) = choice.climb(&of, exact).unwrap().chosen();
-            if let Some((cells, table)) = choice.by_moments(&of).unwrap() {
+            let exact = choice.climb(&of, exact).unwrap();
+            if let Some(Chosen { cells, table, .. }) = choice.by_moments(&of).unwrap() {
                 by_moments += 1;
-                assert_eq!(cells, exact_cells, "campaign {seed}");
+                assert_eq!(cells, exact.cells(), "campaign {seed}");
                 let counts = |table: &[KnotTrial]| -> Vec<_> {
                     table.iter().map(|t| (t.cells, t.unknowns)).collect()
                 };
-                assert_eq!(counts(&table), counts(&exact_table), "campaign {seed}");
+                assert_eq!(counts(&table), counts(&exact.table), "campaign {seed}");
             }
         }
         // Truncation: three of a hundred may be left to the orthogonal factors.

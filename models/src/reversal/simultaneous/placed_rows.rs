@@ -21,7 +21,7 @@ impl Placed {
         let spot = &self.channels[channel].spots[row];
         let name = problem.channels[channel].channel;
         let mut border = vec![0.0; unknowns.border_count()];
-        for (j, sign) in unknowns.slope_signs(channel).into_iter().enumerate() {
+        for (j, sign) in unknowns.slope_signs(channel).enumerate() {
             border[j] = sign * spot.scale * spot.turn;
         }
         border[unknowns.offset(channel)] = spot.scale;

@@ -55,7 +55,7 @@ impl Simultaneous {
         let across = u * sin + (attitude.half_mm + height) * cos;
         let mut border = vec![0.0; self.unknowns.border_count()];
         let turn = UM_PER_MM * (x + (sin + slope * cos) * across * q);
-        for (j, sign) in self.unknowns.slope_signs(c).into_iter().enumerate() {
+        for (j, sign) in self.unknowns.slope_signs(c).enumerate() {
             border[j] = sign * turn;
         }
         border[self.unknowns.offset(c)] = 1.0;

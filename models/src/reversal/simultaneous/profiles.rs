@@ -19,6 +19,8 @@ type Terms = (Vec<(usize, f64)>, Vec<(usize, f64)>);
 #[derive(Default)]
 struct Room {
     terms: Terms,
+    /// The cell of the last position in each form.
+    cells: Vec<usize>,
     /// Their weights alone.
     weights: Vec<f64>,
     /// The unknowns of the last position, band and border.
@@ -34,16 +36,16 @@ impl Simultaneous {
         self.determined_forms()
             .into_iter()
             .map(|(name, weights)| {
-                let spread: Vec<(f64, f64)> = x
+                let at: Vec<[f64; 3]> = x
                     .par_iter()
-                    .map_init(Room::default, |room, x| self.form_std(&weights, *x, room))
+                    .map_init(Room::default, |room, x| self.form_at(&weights, *x, room))
                     .collect();
                 Profile {
                     name,
                     x: x.to_vec(),
-                    values: x.iter().map(|x| self.form_value(&weights, *x)).collect(),
-                    std: spread.iter().map(|s| s.0).collect(),
-                    degrees_of_freedom: spread.iter().fold(f64::INFINITY, |m, s| m.min(s.1)),
+                    values: at.iter().map(|a| a[0]).collect(),
+                    std: at.iter().map(|a| a[1]).collect(),
+                    degrees_of_freedom: at.iter().fold(f64::INFINITY, |m, a| m.min(a[2])),
                 }
             })
             .collect()
@@ -99,15 +101,27 @@ impl Simultaneous {
             .sum()
     }
 
-    /// Standard uncertainty of a form and its degrees of freedom. What the model misses may lie in the
-    /// form itself, finer than the knots. Under white noise positions of one cell share the covariance of
-    /// its coefficients.
-    fn form_std(&self, weights: &[f64], x: f64, room: &mut Room) -> (f64, f64) {
+    /// A form, its standard uncertainty and the degrees of freedom of that. What the model misses may lie
+    /// in the form itself, finer than the knots. Under white noise positions of one cell share the
+    /// covariance of its coefficients.
+    fn form_at(&self, weights: &[f64], x: f64, room: &mut Room) -> [f64; 3] {
         let (band, border) = &mut room.terms;
         band.clear();
         border.clear();
+        room.cells.resize(weights.len(), 0);
+        let mut value = 0.0;
         for (form, weight) in weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
-            self.push_basis(form, x, *weight, band);
+            let basis = &self.bases[form];
+            let k = basis.cell_near(x, room.cells[form]);
+            room.cells[form] = k;
+            let (left, width) = basis.cell(k);
+            let t = (x - left) / width;
+            value += weight * horner(&self.cubics[form][k], t);
+            for (l, function) in basis.polynomials(k).iter().enumerate() {
+                if let Some(j) = self.unknowns.coefficient(form, k + l) {
+                    band.push((j, weight * horner(function, t)));
+                }
+            }
             let [height, slope] = self.unknowns.line(form);
             border.push((height, -weight));
             border.push((slope, -weight * self.axis.xi(x)));
@@ -120,7 +134,7 @@ impl Simultaneous {
                 self.scatter.spread(&self.covariance, band, border)
             }
         };
-        (std.hypot(self.agreement.missed), freedom)
+        [value, std.hypot(self.agreement.missed), freedom]
     }
 
     pub(super) fn value_of(&self, form: usize, at: f64) -> (f64, f64) {

@@ -21,9 +21,9 @@
 //! trust the sum. A perturbation δN of them moves it by cᵀδN c, at most a few roundings of the squares
 //! over the least share that a pivot keeps of its diagonal.
 
+mod moments;
 mod normal;
 
-use errsep_solvers::by_processor;
 use nalgebra::{DMatrix, DVector};
 
 use super::gauge::{self, Axis};
@@ -32,7 +32,8 @@ use super::unknowns::{Form, Unknowns};
 use crate::basis::bspline::{Cubic, CubicBSpline};
 use crate::reversal::forward::Attitude;
 use crate::units::UM_PER_MM;
-use normal::{DETERMINED, Normal};
+use moments::{Stretch, gather};
+use normal::{DETERMINED, Functions, Normal};
 
 /// Rounding of a sum of squares, relative to that of the readings less their lines, where no pivot loses
 /// anything: some hundred roundings.
@@ -67,6 +68,24 @@ pub struct Squares {
     pub rounding: f64,
 }
 
+/// A linear fit by normal equations.
+pub struct Linear {
+    normal: Normal,
+    least: Least,
+}
+
+impl Linear {
+    /// The steps of band and border to the least sum of squares: the first step of Gauss and Newton from
+    /// where the fit begins, but for the rounding of normal equations.
+    pub fn step(&self) -> (Vec<f64>, Vec<f64>) {
+        let Self { normal, least } = self;
+        let mut beside: Vec<f64> = least.lines.iter().map(|y| -y).collect();
+        beside.push(-1.0);
+        beside.extend(least.multipliers.iter());
+        (normal.back(&beside), least.border.as_slice().to_vec())
+    }
+}
+
 /// The least over the unknowns of the border.
 struct Least {
     /// Sum of squares.
@@ -79,16 +98,6 @@ struct Least {
     lines: DVector<f64>,
     /// The multipliers of the gauge, (WᵀN⁻¹W)⁻¹d.
     multipliers: DVector<f64>,
-}
-
-/// A stretch of a channel between two breaks: its readings in moments of t = (x − start)/width.
-struct Stretch {
-    start: f64,
-    width: f64,
-    slide: usize,
-    side: usize,
-    powers: [f64; 7],
-    left: [f64; 4],
 }
 
 impl<'a> Rungs<'a> {
@@ -130,30 +139,17 @@ impl<'a> Rungs<'a> {
         })
     }
 
-    /// The least sum of squares with these unknowns on these bases; `None` where the normal equations
-    /// determine none, or leave only rounding.
-    pub fn squares(&self, unknowns: &Unknowns, bases: &[CubicBSpline]) -> Option<Squares> {
-        let (normal, least) = self.solved(unknowns, bases)?;
+    /// The least sum of squares of a linear fit; `None` where it is only rounding.
+    pub fn squares(&self, linear: &Linear) -> Option<Squares> {
+        let Linear { normal, least } = linear;
         let left = least.left;
         let rounding = ROUNDING * self.whole / normal.kept.min(least.kept) + self.of_readings;
         (left > rounding).then_some(Squares { left, rounding })
     }
 
-    /// The steps of band and border to the least sum of squares: the first step of Gauss and Newton from
-    /// where the fit begins, but for the rounding of normal equations.
-    pub fn step(
-        &self,
-        unknowns: &Unknowns,
-        bases: &[CubicBSpline],
-    ) -> Option<(Vec<f64>, Vec<f64>)> {
-        let (normal, least) = self.solved(unknowns, bases)?;
-        let mut beside: Vec<f64> = least.lines.iter().map(|y| -y).collect();
-        beside.push(-1.0);
-        beside.extend(least.multipliers.iter());
-        Some((normal.back(&beside), least.border.as_slice().to_vec()))
-    }
-
-    fn solved(&self, unknowns: &Unknowns, bases: &[CubicBSpline]) -> Option<(Normal, Least)> {
+    /// The linear fit with these unknowns on these bases; `None` where the normal equations determine
+    /// none.
+    pub fn solve(&self, unknowns: &Unknowns, bases: &[CubicBSpline]) -> Option<Linear> {
         let gathered: Vec<Vec<Stretch>> = (0..self.channels.len())
             .map(|c| self.stretches(c, unknowns, bases))
             .collect();
@@ -171,7 +167,7 @@ impl<'a> Rungs<'a> {
             return None;
         }
         let least = self.least(unknowns, &constraints.border, &normal)?;
-        Some((normal, least))
+        Some(Linear { normal, least })
     }
 
     /// The readings of a channel, stretch by stretch.
@@ -255,7 +251,7 @@ impl<'a> Rungs<'a> {
             let side = unknowns.side_of(begun.readings.channel);
             let [from, per] = contact(&begun.attitude);
             for stretch in stretches {
-                let mut functions = [[0.0; 4]; 8];
+                let mut functions = Functions::default();
                 let mut places = [None; 8];
                 // What t is in the artefact's cell.
                 let (left, width) = bases[side].cell(stretch.side);
@@ -263,14 +259,14 @@ impl<'a> Rungs<'a> {
                 let scale = per * stretch.width / width;
                 let per_cos = 1.0 / begun.attitude.cos;
                 for (k, polynomial) in bases[side].polynomials(stretch.side).iter().enumerate() {
-                    functions[k] = moved(polynomial, shift, scale, per_cos);
+                    functions.put(k, moved(polynomial, shift, scale, per_cos));
                     places[k] = unknowns.coefficient(side, stretch.side + k);
                 }
                 if let Some(form) = slide {
                     let sign = begun.readings.channel.indicator_sign();
                     for (k, polynomial) in bases[form].polynomials(stretch.slide).iter().enumerate()
                     {
-                        functions[4 + k] = moved(polynomial, 0.0, 1.0, sign);
+                        functions.put(4 + k, polynomial.map(|p| sign * p));
                         places[4 + k] = unknowns.coefficient(form, stretch.slide + k);
                     }
                 }
@@ -350,7 +346,7 @@ impl<'a> Rungs<'a> {
             } = begun.attitude;
             let [from, per] = contact(&begun.attitude);
             let across = sin * sin / cos;
-            for (j, sign) in unknowns.slope_signs(c).into_iter().enumerate() {
+            for (j, sign) in unknowns.slope_signs(c).enumerate() {
                 let factor = sign * UM_PER_MM;
                 add(
                     j,
@@ -398,50 +394,4 @@ fn moved(p: &Cubic, shift: f64, scale: f64, factor: f64) -> Cubic {
         second * (3.0 * d * shift + c),
         second * scale * d,
     ]
-}
-
-/// Readings taken together.
-const LANES: usize = 4;
-
-by_processor! {
-    fn gather(stretch: &mut Stretch, x: &[f64], left: &[f64]) from gather_generic
-}
-
-#[inline(always)]
-fn gather_generic<const FMA: bool>(stretch: &mut Stretch, x: &[f64], left: &[f64]) {
-    let (start, per_width) = (stretch.start, 1.0 / stretch.width);
-    let mut sums = [[0.0; LANES]; 11];
-    let mut add = |x: &[f64; LANES], left: &[f64; LANES], one: &[f64; LANES]| {
-        for l in 0..LANES {
-            let t = one[l] * ((x[l] - start) * per_width);
-            let t2 = t * t;
-            let t3 = t2 * t;
-            let powers = [one[l], t, t2, t3, t2 * t2, t2 * t3, t3 * t3];
-            for p in 0..7 {
-                sums[p][l] += powers[p];
-            }
-            for p in 0..4 {
-                sums[7 + p][l] += powers[p] * left[l];
-            }
-        }
-    };
-    let (whole, last) = x.as_chunks::<LANES>();
-    let (whole_left, last_left) = left.as_chunks::<LANES>();
-    for (x, left) in whole.iter().zip(whole_left) {
-        add(x, left, &[1.0; LANES]);
-    }
-    if !last.is_empty() {
-        let mut padded = [[0.0; LANES]; 3];
-        padded[0][..last.len()].copy_from_slice(last);
-        padded[1][..last.len()].copy_from_slice(last_left);
-        padded[2][..last.len()].fill(1.0);
-        add(&padded[0], &padded[1], &padded[2]);
-    }
-    let sum = |lanes: [f64; LANES]| (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]);
-    for p in 0..7 {
-        stretch.powers[p] = sum(sums[p]);
-    }
-    for p in 0..4 {
-        stretch.left[p] = sum(sums[7 + p]);
-    }
 }

@@ -40,7 +40,8 @@ pub fn lines(channels: &[ChannelReadings]) -> Result<Vec<(f64, f64)>, ReversalEr
 /// The tilts whose channel slopes come nearest to the lines'.
 pub fn tilts(unknowns: &Unknowns, lines: &[(f64, f64)]) -> Vec<f64> {
     let count = unknowns.tilt_count();
-    let signs = DMatrix::from_fn(lines.len(), count, |c, j| unknowns.slope_signs(c)[j]);
+    let rows = (0..lines.len()).flat_map(|c| unknowns.slope_signs(c).take(count));
+    let signs = DMatrix::from_row_iterator(lines.len(), count, rows);
     let slopes = DVector::from_iterator(lines.len(), lines.iter().map(|l| l.0));
     // The signs are those of an orthogonal design with a row or a column left out: always solvable.
     svd(signs, true, true)

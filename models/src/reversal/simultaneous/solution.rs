@@ -227,7 +227,7 @@ impl Simultaneous {
     pub(super) fn tilt_weights(&self, combination: &Combination) -> Vec<f64> {
         let mut border = vec![0.0; self.unknowns.border_count()];
         for (c, weight) in combination.weights.iter().enumerate() {
-            for (j, sign) in self.unknowns.slope_signs(c).into_iter().enumerate() {
+            for (j, sign) in self.unknowns.slope_signs(c).enumerate() {
                 border[j] += weight * sign;
             }
         }
@@ -291,7 +291,11 @@ impl Simultaneous {
         let channels = ChannelReadings::sort(observations);
         let survey = Survey::new(&channels, |i| observations.taken(i));
         let groups = traces::grouped(&survey.x, &survey.traces);
-        let times = times(observations);
+        let times = if self.joined.is_empty() {
+            Vec::new()
+        } else {
+            times(observations)
+        };
         let joined = self.joined(observations, &times);
         let problem = self.problem(&channels, joined.as_ref());
         let combinations: Vec<_> = self

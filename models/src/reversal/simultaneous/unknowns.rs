@@ -193,23 +193,26 @@ impl Unknowns {
     }
 
     /// The signs with which a channel's slope is made of the tilts and the closure.
-    pub fn slope_signs(&self, channel: usize) -> Vec<f64> {
-        if self.contrasts.is_empty() {
-            return (0..self.channels.len())
-                .map(|c| if c == channel { 1.0 } else { 0.0 })
-                .collect();
-        }
-        self.contrasts
-            .iter()
-            .chain(&self.closure)
-            .map(|contrast| contrast.sign(self.channels[channel]))
-            .collect()
+    pub fn slope_signs(&self, channel: usize) -> impl Iterator<Item = f64> + '_ {
+        let own = if self.contrasts.is_empty() {
+            self.channels.len()
+        } else {
+            0
+        };
+        let contrasts = self.contrasts.iter();
+        let closure = self.closure.iter().filter(move |_| own == 0);
+        (0..own)
+            .map(move |c| if c == channel { 1.0 } else { 0.0 })
+            .chain(
+                contrasts
+                    .chain(closure)
+                    .map(move |contrast| contrast.sign(self.channels[channel])),
+            )
     }
 
     /// The slope of a channel, rad.
     pub fn slope(&self, channel: usize, border: &[f64]) -> f64 {
         self.slope_signs(channel)
-            .iter()
             .zip(border)
             .map(|(sign, tilt)| sign * tilt)
             .sum()

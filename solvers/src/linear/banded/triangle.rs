@@ -1,5 +1,8 @@
 //! Storage of a banded upper triangle with dense columns beside it, and solving with it.
 
+use super::lanes::multiply_add;
+use crate::by_processor;
+
 /// An upper triangle R of `n` rows whose row i is nonzero in columns i..i+width only, with `tail`
 /// dense columns carried along (border unknowns and the right-hand side).
 #[derive(Debug, Clone)]
@@ -97,6 +100,13 @@ impl BandTriangle {
         }
     }
 
+    /// X ← R⁻¹X for X of n rows of `columns` values, row-major. Unknowns with a zero diagonal get zero.
+    pub(crate) fn solve_rows(&self, rows: &mut [f64], columns: usize) {
+        if columns > 0 {
+            solve_rows(self, rows, columns);
+        }
+    }
+
     /// x ← R⁻ᵀx. Unknowns with a zero diagonal get zero.
     pub fn solve_transposed(&self, x: &mut [f64]) {
         for i in 0..self.n {
@@ -109,5 +119,27 @@ impl BandTriangle {
                 }
             }
         }
+    }
+}
+
+by_processor! {
+    fn solve_rows(triangle: &BandTriangle, rows: &mut [f64], columns: usize) from solve_rows_generic
+}
+
+#[inline(always)]
+fn solve_rows_generic<const FMA: bool>(triangle: &BandTriangle, rows: &mut [f64], columns: usize) {
+    for i in (0..triangle.n).rev() {
+        let band = triangle.band(i);
+        let (own, below) = rows[i * columns..].split_at_mut(columns);
+        if band[0] == 0.0 {
+            own.fill(0.0);
+            continue;
+        }
+        for (r, below) in band[1..].iter().zip(below.chunks_exact(columns)) {
+            for (x, y) in own.iter_mut().zip(below) {
+                *x = multiply_add::<FMA>(-r, *y, *x);
+            }
+        }
+        own.iter_mut().for_each(|x| *x /= band[0]);
     }
 }

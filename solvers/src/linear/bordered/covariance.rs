@@ -10,6 +10,8 @@
 //! cov(c) = Z − PPᵀ + U C_y Uᵀ and cov(c, y) = U C_y with Z = (R_ccᵀR_cc)⁻¹, P = R_cc⁻¹Q and
 //! U = R_cc⁻¹(−R_cy + Q B).
 
+use std::sync::OnceLock;
+
 use nalgebra::DMatrix;
 
 use super::{
@@ -19,17 +21,30 @@ use super::{
 use crate::linear::banded::{BandInverse, BandTriangle};
 
 /// Covariances for unit noise: multiply by the noise variance where rows are not in units of it.
+///
+/// What belongs to the band is worked out when it first is asked for: the border alone costs nothing.
 #[derive(Debug, Clone)]
 pub struct BorderedCovariance {
+    /// R_cc with R_cy beside it.
     triangle: BandTriangle,
+    /// Q, p columns.
+    q: Vec<Vec<f64>>,
+    /// B, p × q.
+    b: DMatrix<f64>,
+    border: DMatrix<f64>,
+    /// A root of C_y: q rows of q values, row-major.
+    root: Vec<f64>,
+    of_band: OnceLock<OfBand>,
+}
+
+/// What it takes for the unknowns of the band.
+#[derive(Debug, Clone)]
+struct OfBand {
     inverse: BandInverse,
     /// P, n rows of p values.
     p: DMatrix<f64>,
     /// U, n rows of q values.
     u: DMatrix<f64>,
-    border: DMatrix<f64>,
-    /// A root of C_y: q rows of q values, row-major.
-    root: Vec<f64>,
     /// Row by row the q values of U·root and the p of P.
     beside: Vec<f64>,
 }
@@ -37,41 +52,51 @@ pub struct BorderedCovariance {
 impl BorderedCovariance {
     /// The covariance at a solution.
     pub fn new(system: &Bordered, solved: &Solved) -> Self {
-        let (n, q) = (system.band_len(), system.border_len());
-        let solve_columns = |count: usize, value: &dyn Fn(usize, usize) -> f64| {
-            let mut columns = DMatrix::zeros(n, count);
-            for (j, mut column) in columns.column_iter_mut().enumerate() {
-                let mut x: Vec<f64> = (0..n).map(|i| value(i, j)).collect();
-                system.triangle.solve(&mut x);
-                column.copy_from_slice(&x);
-            }
-            columns
-        };
-        let p = solve_columns(solved.q.len(), &|i, j| solved.q[j][i]);
-        let u = solve_columns(q, &|i, j| {
-            let pulled: f64 = solved
-                .q
-                .iter()
-                .enumerate()
-                .map(|(l, c)| c[i] * solved.b[(l, j)])
-                .sum();
-            pulled - system.triangle.tail_row(i)[j]
-        });
-        let rooted = &u * &solved.border_root;
-        let mut beside = Vec::with_capacity(n * (q + p.ncols()));
-        for i in 0..n {
-            beside.extend(rooted.row(i).iter());
-            beside.extend(p.row(i).iter());
-        }
         Self {
             triangle: system.triangle.clone(),
-            inverse: BandInverse::of(&system.triangle),
-            p,
-            u,
+            q: solved.q.clone(),
+            b: solved.b.clone(),
             border: solved.border_covariance.clone(),
             root: solved.border_root.transpose().as_slice().to_vec(),
-            beside,
+            of_band: OnceLock::new(),
         }
+    }
+
+    fn of_band(&self) -> &OfBand {
+        self.of_band.get_or_init(|| {
+            let (n, q, p) = (self.triangle.len(), self.border.nrows(), self.q.len());
+            let stride = q + p;
+            // Row by row −R_cy + Q B and Q, which R_cc⁻¹ makes U and P of.
+            let mut rows = vec![0.0; n * stride];
+            for (i, row) in rows.chunks_exact_mut(stride.max(1)).enumerate() {
+                let (u, p) = row.split_at_mut(q);
+                for (value, r) in u.iter_mut().zip(self.triangle.tail_row(i)) {
+                    *value = -r;
+                }
+                for (l, (own, column)) in p.iter_mut().zip(&self.q).enumerate() {
+                    *own = column[i];
+                    for (value, b) in u.iter_mut().zip(self.b.row(l).iter()) {
+                        *value += column[i] * b;
+                    }
+                }
+            }
+            self.triangle.solve_rows(&mut rows, stride);
+            let matrix = DMatrix::from_row_slice(n, stride, &rows);
+            let u = matrix.columns(0, q).into_owned();
+            let root = DMatrix::from_row_slice(q, q, &self.root);
+            let rooted = &u * root;
+            for (i, row) in rows.chunks_exact_mut(stride.max(1)).enumerate() {
+                for (value, rooted) in row.iter_mut().zip(rooted.row(i).iter()) {
+                    *value = *rooted;
+                }
+            }
+            OfBand {
+                inverse: BandInverse::of(&self.triangle),
+                p: matrix.columns(q, p).into_owned(),
+                u,
+                beside: rows,
+            }
+        })
     }
 
     /// The covariance matrix of the border's unknowns, q × q; zero rows where held.
@@ -82,26 +107,31 @@ impl BorderedCovariance {
     /// The covariance of two unknowns of the band no farther apart than its width; `None` beyond.
     pub fn band(&self, i: usize, j: usize) -> Option<f64> {
         (i.abs_diff(j) < self.triangle.width() && i.max(j) < self.triangle.len()).then(|| {
-            self.inverse.get(i, j) - self.p.row(i).dot(&self.p.row(j))
-                + (self.u.row(i) * &self.border * self.u.row(j).transpose())[0]
+            let OfBand { inverse, p, u, .. } = self.of_band();
+            inverse.get(i, j) - p.row(i).dot(&p.row(j))
+                + (u.row(i) * &self.border * u.row(j).transpose())[0]
         })
     }
 
     /// The covariance of an unknown of the band with one of the border.
     pub fn mixed(&self, i: usize, j: usize) -> f64 {
-        self.u.row(i).transpose().dot(&self.border.column(j))
+        let u = &self.of_band().u;
+        u.row(i).transpose().dot(&self.border.column(j))
     }
 
     /// The variance of a linear combination Σ w_i c_i + Σ v_j y_j, any distance apart.
     pub fn variance(&self, band: &[(usize, f64)], border: &[(usize, f64)]) -> f64 {
         let lowest = band.iter().map(|b| b.0).min().unwrap_or(0);
         let highest = band.iter().map(|b| b.0).max().unwrap_or(0);
-        let own = if highest - lowest < self.triangle.width() {
+        let own = if band.is_empty() {
+            0.0
+        } else if highest - lowest < self.triangle.width() {
+            let inverse = &self.of_band().inverse;
             let mut sum = 0.0;
             for (k, (i, a)) in band.iter().enumerate() {
-                sum += a * a * self.inverse.get(*i, *i);
+                sum += a * a * inverse.get(*i, *i);
                 for (j, b) in &band[..k] {
-                    sum += 2.0 * a * b * self.inverse.get(*i, *j);
+                    sum += 2.0 * a * b * inverse.get(*i, *j);
                 }
             }
             sum
@@ -113,11 +143,12 @@ impl BorderedCovariance {
             self.triangle.solve_transposed(&mut x);
             x.iter().map(|v| v * v).sum()
         };
-        let (q, stride) = (self.border.nrows(), self.border.nrows() + self.p.ncols());
+        let (q, stride) = (self.border.nrows(), self.border.nrows() + self.q.len());
         // Along the root of C_y what is gained, along P what the constraints take away.
         let mut beside = vec![0.0; stride];
         for (i, a) in band {
-            add(&mut beside, *a, &self.beside[i * stride..(i + 1) * stride]);
+            let rows = &self.of_band().beside;
+            add(&mut beside, *a, &rows[i * stride..(i + 1) * stride]);
         }
         for (j, v) in border {
             add(&mut beside, *v, &self.root[j * q..(j + 1) * q]);
@@ -135,8 +166,13 @@ impl BorderedCovariance {
         if highest - lowest >= self.triangle.width() {
             return None;
         }
-        let (q, stride) = (self.border.nrows(), self.border.nrows() + self.p.ncols());
-        let of_band = band.iter().map(|i| &self.beside[i * stride..][..stride]);
+        let (q, stride) = (self.border.nrows(), self.border.nrows() + self.q.len());
+        let OfBand {
+            inverse,
+            beside: rows,
+            ..
+        } = self.of_band();
+        let of_band = band.iter().map(|i| &rows[i * stride..][..stride]);
         let of_border = border.iter().map(|j| &self.root[j * q..][..q]);
         // Those of the border have no part that the constraints take away.
         let beside: Vec<(&[f64], &[f64])> = of_band
@@ -146,7 +182,7 @@ impl BorderedCovariance {
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         Some(DMatrix::from_fn(beside.len(), beside.len(), |a, b| {
             let own = match (band.get(a), band.get(b)) {
-                (Some(i), Some(j)) => self.inverse.get(*i, *j),
+                (Some(i), Some(j)) => inverse.get(*i, *j),
                 _ => 0.0,
             };
             own - product(beside[a].1, beside[b].1) + product(beside[a].0, beside[b].0)
@@ -156,12 +192,11 @@ impl BorderedCovariance {
     /// The covariance matrix times a vector over the unknowns of band and border: what each unknown has
     /// in common with that linear combination of all.
     pub fn times(&self, band: &[(usize, f64)], border: &[(usize, f64)]) -> (Vec<f64>, Vec<f64>) {
+        let OfBand { p, u, .. } = self.of_band();
         let combined =
             |m: &DMatrix<f64>, k: usize| -> f64 { band.iter().map(|(i, a)| a * m[(*i, k)]).sum() };
-        let lost: Vec<f64> = (0..self.p.ncols()).map(|k| combined(&self.p, k)).collect();
-        let mut seen: Vec<f64> = (0..self.border.nrows())
-            .map(|k| combined(&self.u, k))
-            .collect();
+        let lost: Vec<f64> = (0..p.ncols()).map(|k| combined(p, k)).collect();
+        let mut seen: Vec<f64> = (0..self.border.nrows()).map(|k| combined(u, k)).collect();
         for (j, v) in border {
             seen[*j] += v;
         }
@@ -181,12 +216,12 @@ impl BorderedCovariance {
         for (i, value) in own.iter_mut().enumerate() {
             *value -= lost
                 .iter()
-                .zip(self.p.row(i).iter())
+                .zip(p.row(i).iter())
                 .map(|(l, p)| l * p)
                 .sum::<f64>();
             *value += through
                 .iter()
-                .zip(self.u.row(i).iter())
+                .zip(u.row(i).iter())
                 .map(|(t, u)| t * u)
                 .sum::<f64>();
         }
@@ -200,7 +235,12 @@ impl BorderedCovariance {
     /// covariance of the local columns' coefficients: K = Z − PPᵀ + E Eᵀ with E the rows of U and
     /// of the unit matrix that the columns bring, times a root of C_y.
     pub fn hat_trace(&self, group: &Group, weight: f64) -> f64 {
-        let (columns, q, p) = (group.columns - 1, self.border.nrows(), self.p.ncols());
+        let (columns, q, p) = (group.columns - 1, self.border.nrows(), self.q.len());
+        let OfBand {
+            inverse,
+            beside: rows,
+            ..
+        } = self.of_band();
         let stride = q + p;
         // Row l: what column l brings through the border, and what the constraints take away.
         let mut through = vec![0.0; columns * stride];
@@ -213,7 +253,7 @@ impl BorderedCovariance {
         }
         for (row, unknown) in through.chunks_exact_mut(stride).zip(&group.band) {
             if let Some(j) = unknown {
-                let beside = &self.beside[j * stride..(j + 1) * stride];
+                let beside = &rows[j * stride..(j + 1) * stride];
                 for (sum, value) in row.iter_mut().zip(beside) {
                     *sum += value;
                 }
@@ -223,7 +263,7 @@ impl BorderedCovariance {
         for (l, i) in group.band.iter().enumerate() {
             for (m, j) in group.band.iter().enumerate() {
                 if let (Some(i), Some(j)) = (i, j) {
-                    near[l * group.band.len() + m] = self.inverse.get(*i, *j);
+                    near[l * group.band.len() + m] = inverse.get(*i, *j);
                 }
             }
         }

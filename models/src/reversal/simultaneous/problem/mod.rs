@@ -6,6 +6,8 @@
 
 mod tasks;
 
+use std::borrow::Cow;
+
 use errsep_solvers::linear::banded::Tall;
 use errsep_solvers::linear::bordered::{Constraints, Share};
 use errsep_solvers::loss::Loss;
@@ -258,17 +260,32 @@ impl<'a> Reversal<'a> {
 
     /// At most `most` readings of each channel in each cell.
     pub fn thinned(&self, most: usize) -> Vec<ChannelReadings> {
-        self.channels
-            .iter()
-            .enumerate()
-            .map(|(c, channel)| match self.slide_starts.get(c) {
-                Some(starts) => channel.thinned(starts, most),
-                None => {
-                    let form = self.unknowns.side_of(channel.channel);
-                    channel.thinned(&starts(&channel.x, self.bases[form].breaks()), most)
-                }
-            })
+        let channels = self.channels.iter().enumerate();
+        channels
+            .map(|(c, channel)| channel.thinned(&self.cell_starts(c), most))
             .collect()
+    }
+
+    /// How many readings these are.
+    pub fn thinned_count(&self, most: usize) -> usize {
+        let in_channel = |c: usize| -> usize {
+            let starts = self.cell_starts(c);
+            let counts = starts.windows(2).map(|w| w[1].saturating_sub(w[0]));
+            counts.map(|count| count.min(most)).sum()
+        };
+        (0..self.channels.len()).map(in_channel).sum()
+    }
+
+    /// First reading of a channel in each cell.
+    fn cell_starts(&self, channel: usize) -> Cow<'_, [usize]> {
+        match self.slide_starts.get(channel) {
+            Some(starts) => Cow::Borrowed(starts),
+            None => {
+                let readings = &self.channels[channel];
+                let form = self.unknowns.side_of(readings.channel);
+                Cow::Owned(starts(&readings.x, self.bases[form].breaks()))
+            }
+        }
     }
 
     /// The same unknowns, gauge and weights over other readings of the same channels.

@@ -8,14 +8,15 @@ use errsep_models::model::Shape;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder, raw_signatures, span};
+use crate::diagnosis::attribution::context::{Cause, Context, Remainder, raw_signatures};
 use crate::diagnosis::attribution::limits::is_beyond_limit;
+use crate::diagnosis::attribution::outweighed::{Member, drop_outweighed};
 use crate::diagnosis::attribution::shrink::held_out_square;
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::detection::space::{Space, orthonormal};
 use crate::diagnosis::levels::{
-    BENT, EARNED, EQUAL_EVIDENCE, HELD, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, ODDS, OUTDONE,
-    STANDS, WEIGHTY, chi_squared_of_two, chi_squared_quantile,
+    BENT, EARNED, EQUAL_EVIDENCE, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, STANDS, WEIGHTY,
+    chi_squared_of_two,
 };
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
 
@@ -38,16 +39,6 @@ pub(in crate::diagnosis) struct Answer {
     pub remainder: Remainder,
     /// Whether the remainder is adequate.
     pub complete: bool,
-}
-
-/// One way to explain the gap: causes with one of them varied.
-struct Member {
-    causes: Vec<Cause>,
-    misfit: f64,
-    evidence: f64,
-    left: Remainder,
-    /// Size as a part of what is physically plausible.
-    size: f64,
 }
 
 /// All effects that could stand in place of each cause, the others kept.
@@ -250,9 +241,7 @@ fn alternatives(
     };
     let effects = (0..context.catalogue.len()).into_par_iter();
     let mut members: Vec<Member> = effects.filter_map(best_of).collect();
-    drop_outdone(context, &mut members, k);
-    drop_holders(context, &mut members, k);
-    drop_unlikely(context, &mut members, k);
+    drop_outweighed(context, &mut members, k);
     let least = members
         .iter()
         .map(|m| m.misfit)
@@ -269,78 +258,6 @@ fn alternatives(
         })
     });
     members
-}
-
-/// Drops what stands in the place of the member of greatest evidence by its freedom alone: what a search of
-/// relatives has freed beyond the dictionary must pay for it, and so must unknowns by which it explains no
-/// more than chance.
-fn drop_outdone(context: &Context<'_>, members: &mut Vec<Member>, k: usize) {
-    let known = |m: &Member| (m.evidence, m.causes[k].unknowns(), m.misfit);
-    let leader = members.iter().map(known);
-    let Some((most, fewest, misfit)) = leader.max_by(|a, b| a.0.total_cmp(&b.0)) else {
-        return;
-    };
-    members.retain(|m| {
-        let more = m.causes[k].unknowns().saturating_sub(fewest);
-        if more == 0 || m.evidence > most - OUTDONE {
-            return true;
-        }
-        let order = context
-            .family_of(m.causes[k].effect)
-            .map(|f| context.order_of(f));
-        let freed = order.is_some_and(|order| m.causes[k].columns.len() > order);
-        let earned = misfit - m.misfit > chi_squared_quantile(0.99, more);
-        earned && !freed
-    });
-}
-
-/// Drops what holds the signature of the member of greatest evidence among others of its own that explain no
-/// more than chance: it is that member, and something that is not seen.
-fn drop_holders(context: &Context<'_>, members: &mut Vec<Member>, k: usize) {
-    let Some(most) =
-        (0..members.len()).max_by(|a, b| members[*a].evidence.total_cmp(&members[*b].evidence))
-    else {
-        return;
-    };
-    let leader = &members[most];
-    let (own, misfit) = (leader.causes[k].unknowns(), leader.misfit);
-    let own_length = leader.causes[k].projected.norm_squared();
-    let projected = leader.causes[k].projected.clone();
-    members.retain(|m| {
-        let more = m.causes[k].unknowns().saturating_sub(own);
-        if more == 0 || misfit - m.misfit > chi_squared_quantile(0.99, more) {
-            return true;
-        }
-        let basis = span(&m.causes, context.space.readings());
-        let left = &projected - &basis * basis.tr_mul(&projected);
-        left.norm_squared() > HELD * own_length
-    });
-}
-
-/// Drops what is outweighed by the member of greatest evidence.
-fn drop_unlikely(context: &Context<'_>, members: &mut Vec<Member>, k: usize) {
-    let known = |m: &Member| (m.evidence, m.causes[k].unknowns(), m.misfit);
-    let leader = members.iter().map(known);
-    let Some((_, unknowns, misfit)) = leader.max_by(|a, b| a.0.total_cmp(&b.0)) else {
-        return;
-    };
-    members.retain(|m| {
-        let own = (m.misfit, m.causes[k].unknowns());
-        !outweighed(context, own, (misfit, unknowns))
-    });
-}
-
-/// Whether of two explanations, each by what it leaves and its unknowns, the first is outweighed by the
-/// second: the odds are those of their likelihoods, in which further unknowns of the second count against
-/// it (Schwarz's approximation), those of the first not.
-pub(in crate::diagnosis) fn outweighed(
-    context: &Context<'_>,
-    first: (f64, usize),
-    second: (f64, usize),
-) -> bool {
-    let further = second.1.saturating_sub(first.1) as f64;
-    let log_readings = (context.space.readings() as f64).ln();
-    first.0 - second.0 - further * log_readings > 2.0 * ODDS.ln()
 }
 
 /// Brings the greatest evidence of each group to its front and makes it the cause, where these causes

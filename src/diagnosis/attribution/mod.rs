@@ -12,6 +12,7 @@ pub(super) mod doubt;
 pub(super) mod examined;
 pub(super) mod limits;
 pub(super) mod mixing;
+pub(super) mod outweighed;
 pub(super) mod refine;
 pub(super) mod refit;
 pub(super) mod reported;

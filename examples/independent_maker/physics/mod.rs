@@ -35,6 +35,9 @@ pub struct Facts {
     pub surfaces: [Form; 2],
 }
 
+/// What a catalogue would state of a source, by the size of the source.
+type SizeOf = Box<dyn Fn(f64) -> f64 + Send + Sync>;
+
 /// One realisation, ready for any size.
 pub struct Recipe {
     /// What it is, in a few words.
@@ -45,7 +48,7 @@ pub struct Recipe {
     pub start: f64,
     pub most: f64,
     /// The size, and its unit, that a catalogue may state in the same sense.
-    pub size: Option<(Box<dyn Fn(f64) -> f64 + Send + Sync>, &'static str)>,
+    pub size: Option<(SizeOf, &'static str)>,
 }
 
 impl Recipe {

@@ -136,8 +136,8 @@ impl Search<'_> {
             })
     }
 
-    /// The answer of one cause alone, where two leave nothing but do not stand together: beside the other one
-    /// may have been found that alone was hidden by what it does to the state.
+    /// The answer of one cause alone, where two leave nothing and the other is not needed: beside it one may have
+    /// been found that alone was hidden by what it does to the state.
     fn spared(&self, answer: &Answer) -> Option<Answer> {
         let (context, readings) = (self.context, self.readings);
         if answer.causes.len() != 2 || !context.adequate(&answer.causes, &answer.remainder) {
@@ -146,7 +146,12 @@ impl Search<'_> {
         let judged = self.partial.as_ref();
         let most = answer.remainder.residual.norm_squared() + HOPELESS;
         (0..answer.causes.len())
-            .map(|k| without(&answer.causes, k))
+            .map(|k| (k, without(&answer.causes, k)))
+            .filter(|(k, fewer)| {
+                let beside = context.remainder(readings, fewer);
+                context.p_value(&beside, answer.causes[*k].effect) > EARNED
+            })
+            .map(|(_, fewer)| fewer)
             .filter(|fewer| !judged.is_some_and(|judged| same(&judged.causes, fewer)))
             .map(|fewer| confidence_set(context, readings, &fewer))
             .find(|fewer| fewer.complete && fewer.remainder.residual.norm_squared() < most)

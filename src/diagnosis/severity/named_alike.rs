@@ -116,7 +116,7 @@ fn nothing_is_lost_by_the_order_of_the_score_stage() {
             let mut alike = 0;
             for name in Name::all(context, found.readings, &answer, 0.01) {
                 for family in Family::beside(context, &name.members) {
-                    let rivals = Drawn::of(context, &name, family, (1, 0), 32);
+                    let rivals = Drawn::of(context, &name, family, (1, 0), 64);
                     let given = name.given(context, &rivals);
                     // Exact limit: the same questions, asked in another order.
                     assert_eq!(

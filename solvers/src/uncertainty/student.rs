@@ -86,7 +86,8 @@ mod tests {
             (0.9999, 310.0, 3.763_977_829_236_517),
         ] {
             let off = student_quantile(probability, degrees) / expected - 1.0;
-            assert!(off.abs() < 1e-10, "{probability} {degrees}: {off:e}");
+            // What the expansion leaves out from 300 degrees on.
+            assert!(off.abs() < 1e-12, "{probability} {degrees}: {off:e}");
         }
     }
 }

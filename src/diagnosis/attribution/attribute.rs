@@ -2,7 +2,7 @@
 //!
 //! One cause is tried first, then two, then three; each further one must earn its place beside the
 //! others (`confidence.rs`). If no step forward succeeds, all pairs are tried, and then up to six causes as
-//! long as those found stand together.
+//! long as each takes a good part of what is left away.
 
 use nalgebra::DVector;
 use rayon::prelude::*;

@@ -10,7 +10,7 @@ pub const FROZEN: u64 = 1000;
 /// How to call it.
 pub const USAGE: &str = "\
 cargo run --release --example independent_maker -- [SET] [--cases N] [--seed S] [--from K]
-    [--design NAME] [--only EFFECT[/REALISATION]] [--dump DIR] [--certificate] [--frozen]
+    [--design NAME] [--only EFFECT[/REALISATION]] [--dump DIR] [--certificate] [--severity N] [--frozen]
 SET: one effect a case (default), or --pairs, --withheld, --nulls
 --cases N     seeds a realisation; with --pairs, --withheld cases; with --nulls cases a law (4)
 --seed S      the first seed; of pairs, withheld and nulls the only one (1)
@@ -18,6 +18,7 @@ SET: one effect a case (default), or --pairs, --withheld, --nulls
 --design      shared, jittered, shifted, thinned, different-grids, three-channels, unequal-repeats
 --dump DIR    writes readings and set-up of every case too
 --certificate works out of every effect not named alone whether the certificate tells it from others
+--severity N  rivals of each family for the severity of names (0: left out)
 --frozen      allows seeds from 1000 on, which are run once, after thresholds are fixed";
 
 /// What is run.
@@ -52,6 +53,8 @@ pub struct Arguments {
     pub dump: Option<PathBuf>,
     /// Whether separability is worked out.
     pub certificate: bool,
+    /// Rivals of each family for the severity of names.
+    pub severity: usize,
 }
 
 impl Arguments {
@@ -66,6 +69,7 @@ impl Arguments {
             only: None,
             dump: None,
             certificate: false,
+            severity: 0,
         };
         let mut frozen = false;
         let mut line = line;
@@ -82,6 +86,7 @@ impl Arguments {
                 "--only" => read.only = Some(only(&next()?)?),
                 "--dump" => read.dump = Some(PathBuf::from(next()?)),
                 "--certificate" => read.certificate = true,
+                "--severity" => read.severity = whole(&next()?)? as usize,
                 "--frozen" => frozen = true,
                 other => return Err(format!("{other} is not known")),
             }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use errsep::diagnosis::{NoiseLaw, NoiseSource, Options, certificate, diagnose};
+use errsep::diagnosis::{Diagnosability, NoiseLaw, NoiseSource, Options, certificate, diagnose};
 use errsep_models::model::FittedModel;
 use errsep_models::reversal::Observations;
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
@@ -15,6 +15,8 @@ pub struct Said {
     pub kind: String,
     /// The effects named.
     pub effects: Vec<String>,
+    /// Whether the name of each of these effects is strong; empty where severity was not asked for.
+    pub strong: Vec<bool>,
     /// Groups that cannot be told apart.
     pub groups: Vec<Vec<String>>,
     /// Probability of as much with nothing there.
@@ -55,8 +57,23 @@ impl Said {
         if self.kind != "effect" {
             return self.kind.clone();
         }
-        let causes: Vec<String> = self.causes().iter().map(|group| group.join("|")).collect();
+        let causes: Vec<String> = self
+            .causes()
+            .iter()
+            .enumerate()
+            .map(|(k, group)| match self.strong.get(k) {
+                Some(true) => format!("{} (strong)", group.join("|")),
+                _ => group.join("|"),
+            })
+            .collect();
         causes.join(" + ")
+    }
+
+    /// Whether a name is strong, of an effect or group for which `which` holds.
+    pub fn is_strong(&self, which: impl Fn(&[String]) -> bool) -> bool {
+        let causes = self.causes();
+        let mut named = causes.iter().zip(&self.strong);
+        named.any(|(group, strong)| *strong && which(group))
     }
 }
 
@@ -69,12 +86,13 @@ fn model(readings: &Observations, thickness: Option<f64>) -> Result<Linearised, 
     Linearised::new(readings, assumptions).map_err(|e| e.to_string())
 }
 
-/// Diagnoses readings with a catalogue from which some effects are left out.
+/// Diagnoses readings with a catalogue from which some effects are left out, with so many rivals of each
+/// family for the severity of names.
 pub fn ask(
     readings: &Observations,
     thickness: Option<f64>,
     without: &[&str],
-    seed: u64,
+    (severity, seed): (usize, u64),
 ) -> Result<Said, String> {
     let start = Instant::now();
     let model = model(readings, thickness)?;
@@ -82,6 +100,7 @@ pub fn ask(
     let options = Options {
         seed,
         without,
+        severity,
         ..Options::default()
     };
     let diagnosis = diagnose(&model, &options);
@@ -108,7 +127,13 @@ fn heard(json: &Value, seconds: f64) -> Option<Said> {
             }
         }
     }
+    let severity = verdict.get("severity").and_then(Value::as_array);
+    let strong = severity.into_iter().flatten().map(|name| {
+        let confidence = name.get("confidence").and_then(Value::as_str);
+        confidence == Some("strong")
+    });
     Some(Said {
+        strong: strong.collect(),
         kind: verdict.get("kind")?.as_str()?.to_owned(),
         effects: names(verdict.get("effects")?),
         groups: verdict
@@ -133,6 +158,21 @@ pub fn catalogue(readings: &Observations) -> Result<Vec<String>, String> {
         .collect())
 }
 
+/// The product's certificate of a measurement with this noise.
+fn certified(
+    undisturbed: &Observations,
+    thickness: Option<f64>,
+    sigma: f64,
+) -> Option<Vec<Diagnosability>> {
+    let model = model(undisturbed, thickness).ok()?;
+    let law = NoiseLaw::white(sigma, f64::INFINITY, NoiseSource::Stated);
+    let options = Options {
+        draws: 200,
+        ..Options::default()
+    };
+    Some(certificate(&model, model.effects(), &law, &options))
+}
+
 /// Standard deviations between an effect of which `visible` µm shows and the effect most like it, after
 /// the product's own certificate; none where the certificate gives none.
 pub fn apart(
@@ -141,15 +181,39 @@ pub fn apart(
     [sigma, visible]: [f64; 2],
     effect: &str,
 ) -> Option<f64> {
-    let model = model(undisturbed, thickness).ok()?;
-    let law = NoiseLaw::white(sigma, f64::INFINITY, NoiseSource::Stated);
-    let options = Options {
-        draws: 200,
-        ..Options::default()
-    };
-    let rows = certificate(&model, model.effects(), &law, &options);
+    let rows = certified(undisturbed, thickness, sigma)?;
     let row = rows.into_iter().find(|row| row.effect == effect)?;
     // The certificate's visible root mean square belongs to the detectable amplitude.
     let told_from = row.visible_rms? * row.identifiable? / row.detectable?;
     Some(4.65 * visible / told_from)
+}
+
+/// The same between an effect and each of some others, at its angle to the nearest of their shapes: the effect
+/// at the middle of its own, or each of the others there, whichever is nearer. An effect that could imitate
+/// it at no plausible size is infinitely far.
+pub fn apart_from(
+    undisturbed: &Observations,
+    thickness: Option<f64>,
+    [sigma, visible]: [f64; 2],
+    effect: &str,
+    others: &[String],
+) -> Option<Vec<f64>> {
+    let rows = certified(undisturbed, thickness, sigma)?;
+    let cosine = |of: &str, to: &str| {
+        let row = rows.iter().find(|row| row.effect == of);
+        let mut rivals = row.into_iter().flat_map(|row| &row.rivals);
+        rivals
+            .find(|(name, _)| name == to)
+            .map(|(_, cosine)| *cosine)
+    };
+    let length = visible / sigma * (undisturbed.readings.len() as f64).sqrt();
+    let apart = others.iter().map(|other| {
+        let nearest = [cosine(effect, other), cosine(other, effect)];
+        let nearest = nearest.into_iter().flatten().fold(f64::NAN, f64::max);
+        match nearest.is_nan() {
+            true => f64::INFINITY,
+            false => 2.0 * length * (0.5 * nearest.clamp(-1.0, 1.0).acos()).sin(),
+        }
+    });
+    Some(apart.collect())
 }

@@ -10,7 +10,7 @@ use crate::diagnosis::detection::fitted::without_misfit;
 use crate::diagnosis::diagnose::diagnose_with;
 use crate::diagnosis::noise::spikes::calmed;
 use crate::diagnosis::options::Options;
-use crate::diagnosis::severity::rivals::{Drawn, Family};
+use crate::diagnosis::severity::rivals::{Drawn, Family, Grounds};
 use crate::diagnosis::severity::stage::Name;
 
 /// Rivals of one family that were named by the score stage and by whole diagnoses.
@@ -60,7 +60,8 @@ fn compared(
     options: &Options,
     each: usize,
 ) -> Agreement {
-    let rivals = Drawn::of(context, name, family, (options.seed, 0), each);
+    let grounds = Grounds::of(context);
+    let rivals = Drawn::of(context, name, (family, &grounds), (options.seed, 0), each);
     let scored = name.given(context, &rivals);
     let base = without_misfit(context.model);
     let whole: Vec<bool> = (0..rivals.count)

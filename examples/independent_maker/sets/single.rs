@@ -4,17 +4,13 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::{LAWS, ended, known, prepared};
+use super::{APART, LAWS, ended, known, prepared};
 use crate::arguments::Arguments;
 use crate::case::Order;
 use crate::judge::{OUTCOMES, Outcome, gap_right, outcome, size_off};
 use crate::physics::{SOURCES, Source};
 use crate::product::{apart, ask};
 use crate::table::{print, rate};
-
-/// Standard deviations between two effects from which on they count as told apart: twice the 99 %
-/// quantile of the normal law.
-const APART: f64 = 4.65;
 
 /// What answers to a source are right.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -34,6 +30,8 @@ struct Row {
     what: &'static str,
     class: Class,
     outcome: Outcome,
+    /// Whether a name with the effect is strong, and one without it, where severity was asked for.
+    strong: Option<[bool; 2]>,
     law: &'static str,
     gap: Option<bool>,
     size: Option<bool>,
@@ -101,7 +99,12 @@ fn one(
         design: arguments.design.1,
     };
     let case = prepared(arguments, &order)?;
-    let said = ask(&case.observations, case.thickness, &[], seed);
+    let said = ask(
+        &case.observations,
+        case.thickness,
+        &[],
+        (arguments.severity, seed),
+    );
     let truth = &case.truths[0];
     let judged = said.as_ref().ok();
     let mut row = Row {
@@ -110,6 +113,10 @@ fn one(
         what: truth.what,
         class,
         outcome: outcome(&said, source.name),
+        strong: judged.filter(|_| arguments.severity > 0).map(|said| {
+            let holds = |group: &[String]| group.iter().any(|name| name == source.name);
+            [said.is_strong(holds), said.is_strong(|group| !holds(group))]
+        }),
         law: law.name(),
         gap: judged
             .filter(|_| class != Class::Absorbed)
@@ -222,6 +229,15 @@ fn overall(rows: &[&Row], class: Class) {
             "size within 2 u, of right answers that state it".to_owned(),
             yes(|row| row.size),
         ]);
+        if rows.iter().any(|row| row.strong.is_some()) {
+            lines.push(vec![
+                "alone or in a group, and strong".to_owned(),
+                yes(|row| {
+                    let held = matches!(row.outcome, Outcome::Alone | Outcome::Group);
+                    row.strong.filter(|_| held).map(|[right, _]| right)
+                }),
+            ]);
+        }
         if rows.iter().any(|row| row.separable.is_some()) {
             let separable: Vec<&&Row> = rows
                 .iter()
@@ -233,6 +249,12 @@ fn overall(rows: &[&Row], class: Class) {
                 rate(right, separable.len()),
             ]);
         }
+    }
+    if rows.iter().any(|row| row.strong.is_some()) {
+        lines.push(vec![
+            "a name without it, strong".to_owned(),
+            yes(|row| row.strong.map(|[_, wrong]| wrong)),
+        ]);
     }
     if class != Class::Absorbed {
         lines.push(vec![

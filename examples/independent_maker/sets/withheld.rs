@@ -4,11 +4,11 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::{LAWS, ended, known, namable, prepared};
+use super::{APART, LAWS, ended, known, namable, prepared};
 use crate::arguments::Arguments;
-use crate::case::Order;
+use crate::case::{Case, Order};
 use crate::physics::Source;
-use crate::product::ask;
+use crate::product::{Said, apart_from, ask};
 use crate::table::{print, rate};
 
 /// How an answer without the true effect's name stands.
@@ -16,23 +16,23 @@ use crate::table::{print, rate};
 enum Withheld {
     /// `unknown`.
     Unknown,
-    /// What the whole catalogue cannot tell from the truth either.
+    /// What the whole catalogue, or the certificate, cannot tell from the truth either.
     Alias,
     /// Another.
     Another,
+    /// Another by a strong name.
+    Strong,
     /// `none`.
     Nothing,
     /// Readings that are not taken.
     Refused,
 }
 
-const NAMES: [(Withheld, &str); 5] = [
+const NAMES: [(Withheld, &str); 6] = [
     (Withheld::Unknown, "`unknown`"),
-    (
-        Withheld::Alias,
-        "what the whole catalogue cannot tell from it",
-    ),
+    (Withheld::Alias, "what these readings cannot tell from it"),
     (Withheld::Another, "another is blamed"),
+    (Withheld::Strong, "another is blamed, strong"),
     (Withheld::Nothing, "`none`"),
     (Withheld::Refused, "refused"),
 ];
@@ -113,25 +113,17 @@ fn one(
         design: arguments.design.1,
     };
     let case = prepared(arguments, &order)?;
-    let said = ask(&case.observations, case.thickness, &[source.name], number);
+    let said = ask(
+        &case.observations,
+        case.thickness,
+        &[source.name],
+        (arguments.severity, number),
+    );
     let outcome = match &said {
         Err(_) => Withheld::Refused,
         Ok(said) if said.kind == "unknown" => Withheld::Unknown,
         Ok(said) if said.kind == "none" => Withheld::Nothing,
-        Ok(said) => {
-            let whole = ask(&case.observations, case.thickness, &[], number)?;
-            let alike = whole
-                .causes()
-                .into_iter()
-                .find(|group| group.iter().any(|n| n == source.name));
-            let alike = alike.unwrap_or_default();
-            let all = said.causes().concat();
-            if all.iter().all(|name| alike.contains(name)) {
-                Withheld::Alias
-            } else {
-                Withheld::Another
-            }
-        }
+        Ok(said) => blamed(&case, source.name, said, number)?,
     };
     if !matches!(outcome, Withheld::Unknown | Withheld::Alias) {
         let truth = &case.truths[0];
@@ -150,4 +142,25 @@ fn one(
         );
     }
     Ok((source.name, outcome))
+}
+
+/// How an answer stands that names others: names are aliases where the whole catalogue puts them into the
+/// group of the effect, or where the certificate does not tell them from it.
+fn blamed(case: &Case, effect: &str, said: &Said, number: u64) -> Result<Withheld, String> {
+    let whole = ask(&case.observations, case.thickness, &[], (0, number))?;
+    let own = |group: &Vec<String>| group.iter().any(|name| name == effect);
+    let mut aliases = whole.causes().into_iter().find(own).unwrap_or_default();
+    let named = said.causes().concat();
+    let sizes = [case.noise.sigma, case.truths[0].visible];
+    let apart = apart_from(&case.undisturbed, case.thickness, sizes, effect, &named);
+    let apart = apart.unwrap_or_default().into_iter().zip(named);
+    aliases.extend(apart.filter(|(sd, _)| *sd < APART).map(|(_, name)| name));
+    let told = |group: &[String]| group.iter().all(|name| !aliases.contains(name));
+    Ok(if !said.causes().iter().any(|group| told(group)) {
+        Withheld::Alias
+    } else if said.is_strong(told) {
+        Withheld::Strong
+    } else {
+        Withheld::Another
+    })
 }

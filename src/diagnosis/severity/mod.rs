@@ -20,7 +20,7 @@ use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::detection::null::BATCH;
 use crate::diagnosis::levels::{STRONG, SURE};
 use crate::diagnosis::options::Options;
-use crate::diagnosis::severity::rivals::{Drawn, Family};
+use crate::diagnosis::severity::rivals::{Drawn, Family, Grounds};
 use crate::diagnosis::severity::stage::Name;
 use crate::number::{percent, plain};
 
@@ -143,18 +143,19 @@ pub(in crate::diagnosis) fn severities(
     answer: &Answer,
     options: &Options,
 ) -> Vec<Severity> {
+    let grounds = Grounds::of(context);
     Name::all(context, readings, answer, options.false_alarm)
         .iter()
-        .map(|name| severity(context, name, options))
+        .map(|name| severity(context, &grounds, name, options))
         .collect()
 }
 
-fn severity(context: &Context<'_>, name: &Name, options: &Options) -> Severity {
+fn severity(context: &Context<'_>, grounds: &Grounds, name: &Name, options: &Options) -> Severity {
     let families = Family::beside(context, &name.members);
     let mut counts: Vec<(Family, Count)> = families
         .into_par_iter()
         .map(|family| {
-            let count = drawn(context, name, family, options);
+            let count = drawn(context, name, (family, grounds), options);
             (family, count)
         })
         .filter(|(_, count)| count.drawn > 0)
@@ -184,7 +185,12 @@ fn severity(context: &Context<'_>, name: &Name, options: &Options) -> Severity {
 
 /// Draws rivals of a family until it is settled on which side of the limit they are. A family that can
 /// hardly make a gap of this size is no rival: none are counted.
-fn drawn(context: &Context<'_>, name: &Name, family: Family, options: &Options) -> Count {
+fn drawn(
+    context: &Context<'_>,
+    name: &Name,
+    family: (Family, &Grounds),
+    options: &Options,
+) -> Count {
     let mut count = Count::default();
     for batch in 0..options.severity.div_ceil(BATCH) {
         let most = BATCH.min(options.severity - count.drawn);

@@ -13,7 +13,7 @@ use crate::diagnosis::attribution::outweighed::outweighed;
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::null::rows_of;
 use crate::diagnosis::levels::{EARNED, REFINED, UNSEARCHED};
-use crate::diagnosis::severity::rivals::{Drawn, Family};
+use crate::diagnosis::severity::rivals::{Drawn, Family, Grounds};
 use crate::diagnosis::severity::stage::Name;
 
 /// Four sets of twenty loads, noise of 1.
@@ -114,9 +114,10 @@ fn nothing_is_lost_by_the_order_of_the_score_stage() {
             let answer = found.found.expect("a gap this large is explained");
             let context = found.context;
             let mut alike = 0;
+            let grounds = Grounds::of(context);
             for name in Name::all(context, found.readings, &answer, 0.01) {
                 for family in Family::beside(context, &name.members) {
-                    let rivals = Drawn::of(context, &name, family, (1, 0), 64);
+                    let rivals = Drawn::of(context, &name, (family, &grounds), (1, 0), 64);
                     let given = name.given(context, &rivals);
                     // Exact limit: the same questions, asked in another order.
                     assert_eq!(

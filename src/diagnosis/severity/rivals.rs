@@ -8,6 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::detection::dictionary::{Entry, Meaning};
+use crate::diagnosis::detection::fitted::without_misfit;
 use crate::diagnosis::detection::null::{BATCH, seen, statistics};
 use crate::diagnosis::levels::{INVISIBLE, SAME};
 use crate::diagnosis::noise::law::draw_scatter;
@@ -24,6 +25,8 @@ const FINENESS: f64 = 8.0;
 const ROUNDS: usize = 6;
 /// Effects tried for each that is wanted: few of a family may be possible at the size of the gap.
 const TRIES: usize = 64;
+/// Part of the range by which values of the same place may differ by rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// A family of rivals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,7 +83,7 @@ impl Drawn {
     pub fn of(
         context: &Context<'_>,
         name: &Name,
-        family: Family,
+        (family, grounds): (Family, &Grounds),
         (seed, batch): (u64, usize),
         most: usize,
     ) -> Self {
@@ -89,7 +92,9 @@ impl Drawn {
         let most = most.min(BATCH);
         let gaps = match family {
             Family::Effect(k) => effects(context, name, k, most, &mut random),
-            _ => smooth(context, name, family, most, &mut random),
+            Family::Position => smooth(context, name, &grounds.position, most, &mut random),
+            Family::Time => smooth(context, name, &grounds.time, most, &mut random),
+            Family::Reading => smooth(context, name, &grounds.reading, most, &mut random),
         };
         let spikes = Spikes::new(context.model);
         let mut readings = DMatrix::zeros(context.space.readings(), BATCH);
@@ -157,14 +162,14 @@ fn effects(
 fn smooth(
     context: &Context<'_>,
     name: &Name,
-    family: Family,
+    ground: &Ground,
     most: usize,
     random: &mut ChaCha8Rng,
 ) -> Vec<DVector<f64>> {
     let mut gaps = Vec::new();
-    let Some(ground) = Ground::of(context, family) else {
+    if !(ground.range > 2.0 * ground.spacing) {
         return gaps;
-    };
+    }
     for _ in 0..ROUNDS {
         let mut raw = DMatrix::zeros(context.space.readings(), BATCH);
         for mut column in raw.column_iter_mut() {
@@ -227,6 +232,33 @@ fn cosines(context: &Context<'_>, name: &Name, left: DMatrix<f64>) -> Vec<f64> {
         .collect()
 }
 
+/// What smooth rivals may be functions of.
+pub(in crate::diagnosis) struct Grounds {
+    position: Ground,
+    time: Ground,
+    reading: Ground,
+}
+
+impl Grounds {
+    /// Those of a context.
+    pub fn of(context: &Context<'_>) -> Self {
+        let places = context.model.places();
+        // What the model reads: a gap is no function of itself, nor of the noise.
+        let reading = Ground::new(without_misfit(context.model).iter().copied().collect());
+        // What reads the same all along, but for noise, carries no function of the reading.
+        let varies = reading.range > context.law.sigma();
+        Self {
+            position: Ground::new(places.iter().map(|p| p.x).collect()),
+            time: Ground::new(places.iter().map(|p| p.time).collect()),
+            reading: if varies {
+                reading
+            } else {
+                Ground::new(Vec::new())
+            },
+        }
+    }
+}
+
 /// That of which a smooth rival is a function.
 struct Ground {
     values: Vec<f64>,
@@ -236,34 +268,23 @@ struct Ground {
 }
 
 impl Ground {
-    fn of(context: &Context<'_>, family: Family) -> Option<Self> {
-        let places = context.model.places();
-        let values: Vec<f64> = match family {
-            Family::Effect(_) => return None,
-            Family::Position => places.iter().map(|p| p.x).collect(),
-            Family::Time => places.iter().map(|p| p.time).collect(),
-            Family::Reading => context.model.observed().iter().copied().collect(),
-        };
+    fn new(values: Vec<f64>) -> Self {
         let mut sorted = values.clone();
         sorted.sort_by(f64::total_cmp);
-        sorted.dedup();
-        let (from, to) = (*sorted.first()?, *sorted.last()?);
-        let spacing = (to - from) / sorted.len().saturating_sub(1).max(1) as f64;
-        Some(Self {
+        let from = sorted.first().copied().unwrap_or(0.0);
+        let range = sorted.last().copied().unwrap_or(0.0) - from;
+        sorted.dedup_by(|later, earlier| *later - *earlier <= ROUNDING * range);
+        Self {
             values,
             from,
-            range: to - from,
-            spacing,
-        })
+            range,
+            spacing: range / sorted.len().saturating_sub(1).max(1) as f64,
+        }
     }
 
-    /// A smooth function times a normal weight for each channel: zero where there is no range.
+    /// A smooth function times a normal weight for each channel.
     fn smooth(&self, context: &Context<'_>, random: &mut ChaCha8Rng) -> DVector<f64> {
-        let n = self.values.len();
         let shortest = 2.0 * self.spacing;
-        if !(self.range > shortest) {
-            return DVector::zeros(n);
-        }
         let length = shortest * (self.range / shortest).powf(random.random::<f64>());
         let cosines: Vec<(f64, f64)> = (0..COSINES)
             .map(|_| {
@@ -287,7 +308,7 @@ impl Ground {
             })
             .collect();
         let places = context.model.places();
-        DVector::from_fn(n, |k, _| {
+        DVector::from_fn(self.values.len(), |k, _| {
             let at = (self.values[k] - self.from) / step;
             let low = (at as usize).min(points - 2);
             let part = at - low as f64;

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use errsep::diagnosis::{Diagnosability, NoiseLaw, NoiseSource, Options, certificate, diagnose};
+use errsep::diagnosis::{NoiseLaw, NoiseSource, Options, certificate, diagnose};
 use errsep_models::model::FittedModel;
 use errsep_models::reversal::Observations;
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
@@ -158,21 +158,6 @@ pub fn catalogue(readings: &Observations) -> Result<Vec<String>, String> {
         .collect())
 }
 
-/// The product's certificate of a measurement with this noise.
-fn certified(
-    undisturbed: &Observations,
-    thickness: Option<f64>,
-    sigma: f64,
-) -> Option<Vec<Diagnosability>> {
-    let model = model(undisturbed, thickness).ok()?;
-    let law = NoiseLaw::white(sigma, f64::INFINITY, NoiseSource::Stated);
-    let options = Options {
-        draws: 200,
-        ..Options::default()
-    };
-    Some(certificate(&model, model.effects(), &law, &options))
-}
-
 /// Standard deviations between an effect of which `visible` µm shows and the effect most like it, after
 /// the product's own certificate; none where the certificate gives none.
 pub fn apart(
@@ -181,39 +166,15 @@ pub fn apart(
     [sigma, visible]: [f64; 2],
     effect: &str,
 ) -> Option<f64> {
-    let rows = certified(undisturbed, thickness, sigma)?;
+    let model = model(undisturbed, thickness).ok()?;
+    let law = NoiseLaw::white(sigma, f64::INFINITY, NoiseSource::Stated);
+    let options = Options {
+        draws: 200,
+        ..Options::default()
+    };
+    let rows = certificate(&model, model.effects(), &law, &options);
     let row = rows.into_iter().find(|row| row.effect == effect)?;
     // The certificate's visible root mean square belongs to the detectable amplitude.
     let told_from = row.visible_rms? * row.identifiable? / row.detectable?;
     Some(4.65 * visible / told_from)
-}
-
-/// The same between an effect and each of some others, at its angle to the nearest of their shapes: the effect
-/// at the middle of its own, or each of the others there, whichever is nearer. An effect that could imitate
-/// it at no plausible size is infinitely far.
-pub fn apart_from(
-    undisturbed: &Observations,
-    thickness: Option<f64>,
-    [sigma, visible]: [f64; 2],
-    effect: &str,
-    others: &[String],
-) -> Option<Vec<f64>> {
-    let rows = certified(undisturbed, thickness, sigma)?;
-    let cosine = |of: &str, to: &str| {
-        let row = rows.iter().find(|row| row.effect == of);
-        let mut rivals = row.into_iter().flat_map(|row| &row.rivals);
-        rivals
-            .find(|(name, _)| name == to)
-            .map(|(_, cosine)| *cosine)
-    };
-    let length = visible / sigma * (undisturbed.readings.len() as f64).sqrt();
-    let apart = others.iter().map(|other| {
-        let nearest = [cosine(effect, other), cosine(other, effect)];
-        let nearest = nearest.into_iter().flatten().fold(f64::NAN, f64::max);
-        match nearest.is_nan() {
-            true => f64::INFINITY,
-            false => 2.0 * length * (0.5 * nearest.clamp(-1.0, 1.0).acos()).sin(),
-        }
-    });
-    Some(apart.collect())
 }

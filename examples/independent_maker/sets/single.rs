@@ -4,13 +4,17 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::{APART, LAWS, ended, known, prepared};
+use super::{LAWS, ended, known, prepared};
 use crate::arguments::Arguments;
 use crate::case::Order;
 use crate::judge::{OUTCOMES, Outcome, gap_right, outcome, size_off};
 use crate::physics::{SOURCES, Source};
 use crate::product::{apart, ask};
 use crate::table::{print, rate};
+
+/// Standard deviations between two effects from which on they count as told apart: twice the 99 %
+/// quantile of the normal law.
+const APART: f64 = 4.65;
 
 /// What answers to a source are right.
 #[derive(Clone, Copy, PartialEq, Eq)]

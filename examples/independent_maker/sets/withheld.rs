@@ -4,11 +4,11 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::{APART, LAWS, ended, known, namable, prepared};
+use super::{LAWS, ended, known, namable, prepared};
 use crate::arguments::Arguments;
 use crate::case::{Case, Order};
 use crate::physics::Source;
-use crate::product::{Said, apart_from, ask};
+use crate::product::{Said, ask};
 use crate::table::{print, rate};
 
 /// How an answer without the true effect's name stands.
@@ -16,7 +16,7 @@ use crate::table::{print, rate};
 enum Withheld {
     /// `unknown`.
     Unknown,
-    /// What the whole catalogue, or the certificate, cannot tell from the truth either.
+    /// What the readings cannot tell from the truth.
     Alias,
     /// Another.
     Another,
@@ -144,17 +144,14 @@ fn one(
     Ok((source.name, outcome))
 }
 
-/// How an answer stands that names others: names are aliases where the whole catalogue puts them into the
-/// group of the effect, or where the certificate does not tell them from it.
+/// How an answer stands that names others. Aliases are what the whole catalogue puts into the group of the
+/// effect, and what would still be named with a quarter of the noise.
 fn blamed(case: &Case, effect: &str, said: &Said, number: u64) -> Result<Withheld, String> {
     let whole = ask(&case.observations, case.thickness, &[], (0, number))?;
     let own = |group: &Vec<String>| group.iter().any(|name| name == effect);
     let mut aliases = whole.causes().into_iter().find(own).unwrap_or_default();
-    let named = said.causes().concat();
-    let sizes = [case.noise.sigma, case.truths[0].visible];
-    let apart = apart_from(&case.undisturbed, case.thickness, sizes, effect, &named);
-    let apart = apart.unwrap_or_default().into_iter().zip(named);
-    aliases.extend(apart.filter(|(sd, _)| *sd < APART).map(|(_, name)| name));
+    let quieter = ask(&case.quieter, case.thickness, &[effect], (0, number))?;
+    aliases.extend(quieter.causes().concat());
     let told = |group: &[String]| group.iter().all(|name| !aliases.contains(name));
     Ok(if !said.causes().iter().any(|group| told(group)) {
         Withheld::Alias

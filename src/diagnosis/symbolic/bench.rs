@@ -26,6 +26,9 @@ const DRAWS: usize = 320;
 /// *Limit.* Laws that predict equally well and are fitted to all repeats, the simplest first.
 const JUDGED: usize = 6;
 
+/// Part of what stands out, in squares, that one term along the reading must explain to be taken out before others.
+const MOSTLY: f64 = 0.8;
+
 /// Why no law is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Refusal {
@@ -182,6 +185,25 @@ impl<'a> Bench<'a> {
         both.max_by(|a, b| a.explained.total_cmp(&b.explained))
     }
 
+    /// The best law of one term along the reading, where it explains most of what stands out. Changed by the law
+    /// itself, the readings give it away to laws of two terms until it is taken out of them.
+    pub fn along_reading(&self, readings: &DVector<f64>) -> Option<Fitted> {
+        let residual = self.whole.residual(readings);
+        let least = MOSTLY * self.visible(readings);
+        let of = |way: &Way| {
+            let mut singles = self.search(way).singles(&way.chosen.residual(readings));
+            singles.retain(|f| self.grammar.is_along_reading(&f.terms));
+            singles.retain(|f| self.grammar.is_possible(f));
+            let best = singles
+                .into_iter()
+                .max_by(|a, b| a.explained.total_cmp(&b.explained))?;
+            self.whole.refined(&self.grammar, &best.terms, &residual)
+        };
+        let both = self.ways.iter().filter_map(of);
+        let best = both.max_by(|a, b| a.explained.total_cmp(&b.explained));
+        best.filter(|best| best.explained >= least)
+    }
+
     fn tried(&self, way: &Way, readings: &DVector<f64>) -> Vec<Tried> {
         let held = way.held.residual(readings);
         let mut found = self.search(way).candidates(&way.chosen.residual(readings));
@@ -272,7 +294,8 @@ impl<'a> Bench<'a> {
         let terms = &law.fitted.terms;
         let fitted = self.whole.refined(&self.grammar, terms, residual);
         let fitted = fitted.ok_or(Refusal::Nothing)?;
-        let own = evidence(&self.grammar, &self.whole, &fitted, self.forms());
+        let prior = self.ways[0].lens.prior(&self.grammar, &fitted.terms);
+        let own = evidence(&self.grammar, &self.whole, &fitted, prior);
         let odds = own.ok_or(Refusal::Nothing)? - smooth;
         if odds < LAW_ODDS.ln() {
             return Err(Refusal::Smooth);

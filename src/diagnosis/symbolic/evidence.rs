@@ -12,14 +12,9 @@ use crate::diagnosis::symbolic::view::{Fitted, View};
 /// With D what is seen of its parameters, S the standard deviations of their priors and T what it explains it is
 /// ½T − ½ ln det(I + S DᵀD S) less ½ for each amplitude. The prior of an amplitude makes of its column alone what
 /// the law as a whole explains, that of a shape is its range in the grammar over √12; a step's place is one of
-/// as many as there are. All forms of one term have one half of the prior between them, all of two the other.
-/// (A shape that the model absorbs is as open afterwards as before, and costs nothing.)
-pub(super) fn evidence(
-    grammar: &Grammar,
-    view: &View,
-    fitted: &Fitted,
-    forms: usize,
-) -> Option<f64> {
+/// as many as there are. All laws of one term have one half of the prior between them, all of two the other.
+/// `prior`: ln of the probability of its form. (A shape that the model absorbs is as open afterwards as before, and costs nothing.)
+pub(super) fn evidence(grammar: &Grammar, view: &View, fitted: &Fitted, prior: f64) -> Option<f64> {
     let seen = tangents(grammar, view, fitted);
     let amplitudes = fitted.amplitudes.len();
     let mut scales: Vec<f64> = seen
@@ -42,12 +37,6 @@ pub(super) fn evidence(
     let root = whole.cholesky()?;
     let diagonal = root.l_dirty().diagonal();
     sum -= diagonal.iter().map(|d| d.ln()).sum::<f64>();
-    let forms = forms.max(1) as f64;
-    let ways = if fitted.terms.len() == 1 {
-        forms
-    } else {
-        0.5 * forms * forms
-    };
-    sum -= (2.0 * ways).ln();
+    sum += prior;
     sum.is_finite().then_some(sum)
 }

@@ -16,6 +16,11 @@ use crate::diagnosis::symbolic::view::Fitted;
 
 /// Part by which the noise must change for laws to be sought anew without the best of them.
 const ANEW: f64 = 0.02;
+/// *Limit.* Rounds in which a law along the reading is taken out of the reading: each leaves that part of its error
+/// that the law changes the reading by, a third at most.
+const ROUNDS: usize = 5;
+/// Part of a law's change by which a round may move it at the end.
+const SETTLED: f64 = 1e-3;
 
 /// Another law that predicts held-out repeats as well.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -105,32 +110,53 @@ pub(in crate::diagnosis) fn law(
     let attempt = first.attempt(&readings);
     let best = match &attempt {
         Ok(accepted) => Some(accepted.fitted.clone()),
-        Err(_) => best_in_white(model, &first.law, &readings, options),
+        Err(_) => first
+            .along_reading(&readings)
+            .or_else(|| best_in_white(model, &first.law, &readings, options)),
     };
     let Some(best) = best else {
-        return Ok(none(
-            &first,
-            &readings,
-            Refusal::Nothing,
-            (options, injections),
-        ));
+        let seeds = (options, injections);
+        return Ok(none(&first, &readings, Refusal::Nothing, seeds));
     };
-    // Noise and state are found again without it.
-    let change = first.change(&best.terms, &best.amplitudes);
-    let state = model.refit(model.observed() - &change);
-    let clean = state.linearised();
-    let noise = estimate(&state, &clean);
-    if attempt.is_err() && (noise.sigma() / sigma - 1.0).abs() < ANEW {
-        let why = attempt.err().unwrap_or(Refusal::Nothing);
-        return Ok(none(&first, &readings, why, (options, injections)));
+    let refused = attempt.err();
+    let mut change = first.change(&best.terms, &best.amplitudes);
+    let mut along = first.grammar.is_along_reading(&best.terms);
+    for round in 1.. {
+        // Noise and state are found again without it; the readings that a law is a function of with them.
+        let state = model.refit(model.observed() - &change);
+        let clean = state.linearised();
+        let noise = estimate(&state, &clean);
+        if let Some(why) = refused.filter(|_| !along && round == 1)
+            && (noise.sigma() / sigma - 1.0).abs() < ANEW
+        {
+            return Ok(none(&first, &readings, why, (options, injections)));
+        }
+        let bench = Bench::new(&state, noise.with_tails(calm.tails), options).ok_or(NoRepeats)?;
+        let readings = clean + &change;
+        let attempt = bench.attempt(&readings);
+        if along && round < ROUNDS {
+            let next = match &attempt {
+                Ok(accepted) => Some(accepted.fitted.clone()),
+                Err(_) => bench.along_reading(&readings),
+            };
+            if let Some(next) = next {
+                let moved = bench.change(&next.terms, &next.amplitudes);
+                let settled = (&moved - &change).norm() <= SETTLED * moved.norm();
+                along = bench.grammar.is_along_reading(&next.terms);
+                change = moved;
+                if !settled {
+                    continue;
+                }
+            }
+        }
+        let seeds = (options, injections);
+        return Ok(match attempt {
+            Ok(accepted) => told(&bench, &accepted, model)
+                .unwrap_or_else(|| none(&bench, &readings, Refusal::Nothing, seeds)),
+            Err(why) => none(&bench, &readings, why, seeds),
+        });
     }
-    let second = Bench::new(&state, noise.with_tails(calm.tails), options).ok_or(NoRepeats)?;
-    let readings = clean + change;
-    Ok(match second.attempt(&readings) {
-        Ok(accepted) => told(&second, &accepted, model)
-            .unwrap_or_else(|| none(&second, &readings, Refusal::Nothing, (options, injections))),
-        Err(why) => none(&second, &readings, why, (options, injections)),
-    })
+    Err(NoRepeats)
 }
 
 /// The best law as it would be in white noise: what jumps or swings between traces passes for noise that

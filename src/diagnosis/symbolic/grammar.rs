@@ -82,6 +82,14 @@ impl Grammar {
         &self.coordinates[self.kinds[term.kind].coordinate]
     }
 
+    /// Whether any term is a function of the reading.
+    pub fn is_along_reading(&self, terms: &[Term]) -> bool {
+        let along = |t: &Term| {
+            self.coordinate(*t).along == Along::Reading && self.function(*t) != Function::One
+        };
+        terms.iter().any(along)
+    }
+
     /// Number of amplitudes.
     pub fn order(&self, terms: &[Term]) -> usize {
         terms.iter().map(|t| self.function(*t).order()).sum()

@@ -1,5 +1,7 @@
 //! The whole grammar on its grid, seen in one space: every term's statistic at the cost of one product a block.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -158,6 +160,32 @@ impl Lens {
     /// Number of different forms of one term.
     pub fn forms(&self) -> usize {
         self.patterns.iter().map(Vec::len).sum()
+    }
+
+    /// ln of the prior probability of a law's form: one term and two are as probable, and so are the classes of forms of
+    /// a term, by the number of its parameters and whether its pattern is plain (all channels alike or one alone,
+    /// whatever the direction); all forms of a class are. What is simple is thereby the likelier.
+    pub fn prior(&self, grammar: &Grammar, terms: &[Term]) -> f64 {
+        let class = |kind: usize, pattern: usize| {
+            let parameters = grammar.kinds[kind].function.parameters();
+            (parameters, grammar.patterns[pattern].is_simple())
+        };
+        let mut forms: BTreeMap<(usize, bool), f64> = BTreeMap::new();
+        for (kind, patterns) in self.patterns.iter().enumerate() {
+            for pattern in patterns {
+                *forms.entry(class(kind, *pattern)).or_default() += 1.0;
+            }
+        }
+        let of = |term: &Term| {
+            let own = forms.get(&class(term.kind, term.pattern));
+            own.copied().unwrap_or(1.0).ln() + (forms.len().max(1) as f64).ln()
+        };
+        let all: f64 = terms.iter().map(of).sum();
+        // Of two terms either may be the first.
+        match terms.len() {
+            1 => -all - 2f64.ln(),
+            _ => -all,
+        }
     }
 
     /// Products with whitened, projected vectors of the view, one a column.

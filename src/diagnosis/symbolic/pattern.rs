@@ -56,6 +56,12 @@ impl Pattern {
         self.turn == Turn::Alike && self.channels.iter().all(|w| *w == 1)
     }
 
+    /// Whether it is of one channel or of all alike, whatever the direction.
+    pub fn is_simple(&self) -> bool {
+        let alone = self.channels.iter().filter(|w| **w != 0).count() == 1;
+        self.turn == Turn::Alike && (alone || !self.is_of_channels())
+    }
+
     /// The weight of a block.
     pub fn weight(&self, block: usize) -> f64 {
         let backward = block % 2 == 1;

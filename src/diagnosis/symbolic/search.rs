@@ -10,6 +10,8 @@ use crate::diagnosis::symbolic::view::{Fitted, View};
 /// Kinds of a first term, and of second ones beside each, that are followed.
 const FIRSTS: usize = 10;
 const SECONDS: usize = 5;
+/// Patterns of a kind that are refined: between two places of the grid another may explain more.
+const PATTERNS: usize = 4;
 /// Pairs that are refined, and rounds in which either term may be exchanged.
 const PAIRS: usize = 14;
 const ROUNDS: usize = 2;
@@ -91,13 +93,26 @@ impl Search<'_> {
         different(spots, count)
     }
 
+    /// Laws of one term of each kind, refined: of the patterns of a kind those that explain most on the grid.
+    pub fn singles(&self, residual: &DVector<f64>) -> Vec<Fitted> {
+        let only = DMatrix::from_columns(std::slice::from_ref(residual));
+        let products = self.lens.products(self.view, only);
+        let spots = self.lens.forms_by_surprise(&products, 0, &[]);
+        let firsts = different(spots.clone(), FIRSTS);
+        let of_kind = |first: &Spot| {
+            let kind = first.term.kind;
+            let own = spots.iter().filter(move |s| s.term.kind == kind);
+            own.take(PATTERNS)
+                .filter_map(|s| self.view.refined(self.grammar, &[s.term], residual))
+                .max_by(|a, b| a.explained.total_cmp(&b.explained))
+        };
+        firsts.iter().filter_map(of_kind).collect()
+    }
+
     /// Laws that explain nearly as much as the best, refined, each form once.
     pub fn candidates(&self, residual: &DVector<f64>) -> Vec<Fitted> {
         let refined = |terms: &[Term]| self.view.refined(self.grammar, terms, residual);
-        let only = DMatrix::from_columns(std::slice::from_ref(residual));
-        let products = self.lens.products(self.view, only);
-        let firsts = different(self.lens.forms_by_surprise(&products, 0, &[]), FIRSTS);
-        let singles: Vec<Fitted> = firsts.iter().filter_map(|s| refined(&[s.term])).collect();
+        let singles = self.singles(residual);
         let mut coarse: Vec<(f64, [Term; 2])> = Vec::new();
         for first in &singles {
             let term = first.terms[0];

@@ -151,6 +151,9 @@ impl Spikes {
         let usual = |(size, alone): &(f64, bool)| *alone || *size <= 3.0 * SIGMA * middle;
         let sizes: Vec<f64> = heights.into_iter().filter(usual).map(|h| h.0).collect();
         let n = sizes.len();
+        if n == 0 {
+            return None;
+        }
         let far = sizes.partition_point(|s| *s <= 3.0 * SIGMA * middle);
         Some(Weight {
             beyond: (n - far) as f64 / n as f64,

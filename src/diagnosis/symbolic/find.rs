@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::diagnosis::catalogue::tabulated::Tabulated;
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::noise::law::NoiseLaw;
-use crate::diagnosis::noise::spikes::calmed;
+use crate::diagnosis::noise::spikes::{Tails, calmed};
 use crate::diagnosis::options::Options;
 use crate::diagnosis::symbolic::bench::{Accepted, Bench, Refusal};
 use crate::diagnosis::symbolic::injected::{Power, power};
@@ -118,45 +118,61 @@ pub(in crate::diagnosis) fn law(
         let seeds = (options, injections);
         return Ok(none(&first, &readings, Refusal::Nothing, seeds));
     };
-    let refused = attempt.err();
-    let mut change = first.change(&best.terms, &best.amplitudes);
+    if let Err(why) = attempt
+        && !first.grammar.is_along_reading(&best.terms)
+        && !changes_noise(model, &first, &best, sigma)
+    {
+        return Ok(none(&first, &readings, why, (options, injections)));
+    }
+    without(model, calm.tails, (&first, best), (options, injections))
+}
+
+/// Whether the noise is another one without a law.
+fn changes_noise(model: &AnyModel, bench: &Bench<'_>, best: &Fitted, sigma: f64) -> bool {
+    let change = bench.change(&best.terms, &best.amplitudes);
+    let state = model.refit(model.observed() - change);
+    let noise = estimate(&state, &state.linearised());
+    (noise.sigma() / sigma - 1.0).abs() >= ANEW
+}
+
+/// What is found once noise and state are found again without the best law of a first search; the readings that a law
+/// is a function of too, round by round.
+fn without(
+    model: &AnyModel,
+    tails: Option<Tails>,
+    (first, best): (&Bench<'_>, Fitted),
+    seeds: (&Options, usize),
+) -> Result<LawFound, NoRepeats> {
     let mut along = first.grammar.is_along_reading(&best.terms);
-    for round in 1.. {
-        // Noise and state are found again without it; the readings that a law is a function of with them.
+    let mut change = first.change(&best.terms, &best.amplitudes);
+    let mut round = 1;
+    loop {
         let state = model.refit(model.observed() - &change);
         let clean = state.linearised();
-        let noise = estimate(&state, &clean);
-        if let Some(why) = refused.filter(|_| !along && round == 1)
-            && (noise.sigma() / sigma - 1.0).abs() < ANEW
-        {
-            return Ok(none(&first, &readings, why, (options, injections)));
-        }
-        let bench = Bench::new(&state, noise.with_tails(calm.tails), options).ok_or(NoRepeats)?;
+        let noise = estimate(&state, &clean).with_tails(tails);
+        let bench = Bench::new(&state, noise, seeds.0).ok_or(NoRepeats)?;
         let readings = clean + &change;
         let attempt = bench.attempt(&readings);
-        if along && round < ROUNDS {
-            let next = match &attempt {
-                Ok(accepted) => Some(accepted.fitted.clone()),
-                Err(_) => bench.along_reading(&readings),
-            };
-            if let Some(next) = next {
-                let moved = bench.change(&next.terms, &next.amplitudes);
-                let settled = (&moved - &change).norm() <= SETTLED * moved.norm();
+        let next = match &attempt {
+            _ if !along || round == ROUNDS => None,
+            Ok(accepted) => Some(accepted.fitted.clone()),
+            Err(_) => bench.along_reading(&readings),
+        };
+        if let Some(next) = next {
+            let before =
+                std::mem::replace(&mut change, bench.change(&next.terms, &next.amplitudes));
+            if (&change - before).norm() > SETTLED * change.norm() {
                 along = bench.grammar.is_along_reading(&next.terms);
-                change = moved;
-                if !settled {
-                    continue;
-                }
+                round += 1;
+                continue;
             }
         }
-        let seeds = (options, injections);
-        return Ok(match attempt {
-            Ok(accepted) => told(&bench, &accepted, model)
-                .unwrap_or_else(|| none(&bench, &readings, Refusal::Nothing, seeds)),
-            Err(why) => none(&bench, &readings, why, seeds),
-        });
+        let told = match attempt {
+            Ok(accepted) => told(&bench, &accepted, model).ok_or(Refusal::Nothing),
+            Err(why) => Err(why),
+        };
+        return Ok(told.unwrap_or_else(|why| none(&bench, &readings, why, seeds)));
     }
-    Err(NoRepeats)
 }
 
 /// The best law as it would be in white noise: what jumps or swings between traces passes for noise that

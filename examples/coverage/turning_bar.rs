@@ -45,13 +45,19 @@ pub fn rows(seeds: u64) -> Vec<Row> {
         let one = |seed| one(seed, *share, *length, *stray);
         of(name, *stray > 0.0, one, seeds)
     });
+    let mean = of(
+        "steady turn of 30 turns with 40 readings, noise a running mean over 5 readings",
+        false,
+        |seed| judged(running_mean(seed)),
+        seeds,
+    );
     let other = of(
         "another maker: loaded drive, uneven feed, steps of 0.02 um, noise correlated over 4 readings",
         true,
         |seed| judged(another(seed)),
         seeds,
     );
-    own.chain(other).collect()
+    own.chain(mean).chain(other).collect()
 }
 
 fn of(
@@ -125,6 +131,31 @@ fn one(seed: u64, share: f64, readings: f64, stray: f64) -> Option<Found> {
     })
 }
 
+/// Turns that are steady, in noise that no law of the fit has: a running mean.
+fn running_mean(seed: u64) -> Made {
+    let made = TurningPlan {
+        readings: 1200,
+        turns: 30.0,
+        noise: Law::of_white(0.0),
+        seed,
+        ..TurningPlan::default()
+    };
+    let (mut all, _) = simulate(&made);
+    let mut random = ChaCha8Rng::seed_from_u64(0x0e4d_0000 + seed);
+    let white: Vec<f64> = (0..all.len() + 4)
+        .map(|_| StandardNormal.sample(&mut random))
+        .collect();
+    for (reading, window) in all.iter_mut().zip(white.windows(5)) {
+        reading.value += 0.1 * window.iter().sum::<f64>();
+    }
+    Made {
+        readings: all,
+        slope: made.slope_rad,
+        eccentricity: made.eccentricity_um,
+        inclination: made.gamma_rad[0].hypot(made.gamma_rad[1]),
+    }
+}
+
 /// A run with what is true of it: α + τ (rad), |e| at mid travel (µm), |γ| (rad).
 struct Made {
     readings: Vec<TurningReading>,
@@ -175,11 +206,16 @@ fn another(seed: u64) -> Made {
             .sum::<f64>()
     };
     let form: Vec<f64> = places.iter().map(|p| bump(p.1)).collect();
-    // The line of the form over the readings belongs to the slope.
-    let mean = |values: &dyn Fn(usize) -> f64| (0..n).map(values).sum::<f64>() / n as f64;
-    let (mx, mf) = (mean(&|i| places[i].1), mean(&|i| form[i]));
-    let line =
-        mean(&|i| (places[i].1 - mx) * (form[i] - mf)) / mean(&|i| (places[i].1 - mx).powi(2));
+    // The line of the form belongs to the slope: that over the places along x, each of which counts by the
+    // travel that it stands for, not by the readings that an uneven feed takes there.
+    let place = |i: usize| places[i.min(n - 1)].1;
+    let travel = |i: usize| 0.5 * (place(i + 1) - place(i.max(1) - 1));
+    let mean = |values: &dyn Fn(usize) -> f64| {
+        let sum = (0..n).map(|i| travel(i) * values(i)).sum::<f64>();
+        sum / (0..n).map(travel).sum::<f64>()
+    };
+    let (mx, mf) = (mean(&place), mean(&|i| form[i]));
+    let line = mean(&|i| (place(i) - mx) * (form[i] - mf)) / mean(&|i| (place(i) - mx).powi(2));
     let middle = f64::midpoint(places[0].1, places[n - 1].1);
     let readings = (0..n)
         .map(|i| {

@@ -1,6 +1,7 @@
 //! Differences between repeats of a trace, and how likely a law of noise makes them.
 
 use super::law::decays;
+use super::posterior::NoiseValues;
 
 /// A trace of this many readings can show what is correlated along it.
 const LONG: usize = 20;
@@ -66,16 +67,17 @@ impl Contrasts {
             }),
         }
     }
+}
 
-    /// Number of values in all contrasts.
-    pub fn count(&self) -> usize {
+impl NoiseValues for Contrasts {
+    fn count(&self) -> usize {
         let of = |g: &Group| g.positions.len() * g.rows.len();
         self.groups.iter().map(of).sum()
     }
 
     /// Least mean spacing and greatest length of the traces that are long enough to show more than
-    /// white noise; `None` where none is.
-    pub fn reach(&self) -> Option<(f64, f64)> {
+    /// white noise.
+    fn reach(&self) -> Option<(f64, f64)> {
         let (spacing, length) = self
             .groups
             .iter()
@@ -91,11 +93,13 @@ impl Contrasts {
         (spacing > 0.0 && spacing.is_finite()).then_some((spacing, length))
     }
 
-    /// The likelihood of a law of a white and a correlated part with each of some shifts.
-    ///
+    fn has_shifts(&self) -> bool {
+        true
+    }
+
     /// The correlated part is Markov, so one pass of the Kalman filter gives determinant and quadratic
     /// form; a shift is an update of rank one.
-    pub fn likelihoods(
+    fn likelihoods(
         &self,
         white: f64,
         correlated: f64,

@@ -2,9 +2,9 @@
 //!
 //! One reading = white noise + a part that is correlated along its trace (Ornstein–Uhlenbeck: a Markov
 //! process of variance o and correlation exp(−|Δx|/ℓ)) + a shift of the whole trace. [`Law`] holds the
-//! variances, [`Contrasts`] what differs between repeats of a trace, and [`Posterior`] which laws these
-//! contrasts allow. Nothing here needs a matrix of readings × readings: every product with a covariance
-//! is one pass along the trace, at any spacing.
+//! variances, [`Contrasts`] what differs between repeats of a trace, and [`Posterior`] which laws
+//! these, or other [values](NoiseValues) that hold nothing but noise, allow. Nothing here needs a matrix of
+//! readings × readings: every product with a covariance is one pass along the trace, at any spacing.
 
 mod contrasts;
 mod law;
@@ -12,4 +12,4 @@ mod posterior;
 
 pub use contrasts::{Contrasts, Likelihood};
 pub use law::{Law, decays, markov_form};
-pub use posterior::{Possible, Posterior};
+pub use posterior::{NoiseValues, Possible, Posterior};

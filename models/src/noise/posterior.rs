@@ -1,12 +1,12 @@
-//! Which laws of noise contrasts of repeats allow, each with its probability.
+//! Which laws of noise the readings allow, each with its probability.
 //!
 //! Four kinds of law are weighed: white alone, with shifts, with a correlated part, with both; each a
-//! quarter beforehand. Beforehand, too, the correlated part's share of the standard deviation beside the
-//! white one, the shift's share of the whole and the logarithm of the correlation length are uniform,
-//! and that of the scale everywhere. The scale is integrated in closed form; the others on a grid that
+//! quarter beforehand (where shifts are not seen there are two kinds, each a half). Beforehand, too, the
+//! correlated part's share of the standard deviation beside the white one, the shift's share of the whole
+//! and the logarithm of the correlation length are uniform, and that of the scale everywhere. The scale is integrated in closed form; the others on a grid that
 //! closes in on where the probability lies.
 
-use super::contrasts::Contrasts;
+use super::contrasts::Likelihood;
 use super::law::Law;
 
 /// Fewest values in contrasts from which a law can be told.
@@ -33,7 +33,7 @@ pub struct Possible {
     /// Its probability.
     pub probability: f64,
     /// Quadratic form of the contrasts under it: the scale is this over χ² of as many degrees of
-    /// freedom as there are values in the contrasts.
+    /// freedom as there are values in the values.
     pub quadratic: f64,
 }
 
@@ -47,30 +47,50 @@ pub struct Posterior {
 /// A side of the grid: from, to.
 type Side = (f64, f64);
 
+/// Values that hold noise and nothing else, and how likely a law makes them.
+pub trait NoiseValues {
+    /// Number of values.
+    fn count(&self) -> usize;
+
+    /// Least and greatest correlation length that they can show, in the unit of the positions; `None` where
+    /// they show no more than white noise.
+    fn reach(&self) -> Option<(f64, f64)>;
+
+    /// Whether a shift of a whole trace is seen in them.
+    fn has_shifts(&self) -> bool;
+
+    /// The likelihood of a law of a white and a correlated part with each of some shifts.
+    fn likelihoods(
+        &self,
+        white: f64,
+        correlated: f64,
+        length: f64,
+        shifts: &[f64],
+    ) -> Vec<Likelihood>;
+}
+
 impl Posterior {
-    /// What contrasts tell; `None` where they are too few, or all zero.
-    pub fn of(contrasts: &Contrasts) -> Option<Self> {
-        if contrasts.count() < FEWEST {
+    /// What values tell; `None` where they are too few, or all zero.
+    pub fn of(values: &impl NoiseValues) -> Option<Self> {
+        if values.count() < FEWEST {
             return None;
         }
-        let plain = contrasts.likelihoods(1.0, 0.0, 1.0, &[0.0])[0];
+        let plain = values.likelihoods(1.0, 0.0, 1.0, &[0.0])[0];
         if !(plain.quadratic > f64::MIN_POSITIVE && plain.quadratic.is_finite()) {
             return None;
         }
         let mut possible = Vec::new();
-        let lengths = contrasts
+        let lengths = values
             .reach()
             .map(|(spacing, travel)| (spacing.ln(), travel.max(2.0 * spacing).ln()));
-        for shift in [false, true] {
-            explore(contrasts, None, shift, plain.minus_log, &mut possible);
+        let shifts = [false, true];
+        for shift in shifts
+            .into_iter()
+            .take(1 + usize::from(values.has_shifts()))
+        {
+            explore(values, None, shift, plain.minus_log, &mut possible);
             if let Some(lengths) = lengths {
-                explore(
-                    contrasts,
-                    Some(lengths),
-                    shift,
-                    plain.minus_log,
-                    &mut possible,
-                );
+                explore(values, Some(lengths), shift, plain.minus_log, &mut possible);
             }
         }
         let top = possible
@@ -87,8 +107,20 @@ impl Posterior {
         }
         (sum > 0.0 && sum.is_finite()).then_some(Self {
             possible,
-            count: contrasts.count() as f64,
+            count: values.count() as f64,
         })
+    }
+
+    /// White noise of a variance that is known as from so many values.
+    pub fn of_white(variance: f64, count: usize) -> Self {
+        Self {
+            possible: vec![Possible {
+                law: Law::of_white(1.0),
+                probability: 1.0,
+                quadratic: variance * (count.max(FEWEST) as f64 - 2.0),
+            }],
+            count: count.max(FEWEST) as f64,
+        }
     }
 
     /// The laws, their probabilities adding up to one.
@@ -142,7 +174,7 @@ impl Posterior {
 /// Goes over one kind of law; the logarithm of each point's probability, up to a constant, goes where
 /// the probability belongs.
 fn explore(
-    contrasts: &Contrasts,
+    values: &impl NoiseValues,
     lengths: Option<Side>,
     shift: bool,
     reference: f64,
@@ -156,7 +188,7 @@ fn explore(
     ];
     let mut sides = limits;
     for round in 0..MOST_ROUNDS {
-        let points = on_grid(contrasts, lengths.is_some(), &sides, reference);
+        let points = on_grid(values, lengths.is_some(), &sides, reference);
         let next = closer(&points, &sides, &limits);
         let shortens = next
             .iter()
@@ -200,7 +232,7 @@ fn middles(side: Side, count: usize) -> Vec<f64> {
 
 /// All points of a grid with their laws; the probability is its logarithm.
 fn on_grid(
-    contrasts: &Contrasts,
+    values: &impl NoiseValues,
     correlated: bool,
     sides: &[Side; 3],
     reference: f64,
@@ -212,7 +244,7 @@ fn on_grid(
         for b in middles(sides[1], POINTS) {
             let own = a * a;
             let length = if correlated { b.exp() } else { 1.0 };
-            let found = contrasts.likelihoods(1.0 - own, own, length, &shifts);
+            let found = values.likelihoods(1.0 - own, own, length, &shifts);
             for ((likelihood, share), shift) in found.into_iter().zip(&shares).zip(&shifts) {
                 let law = Law {
                     white: 1.0 - own,
@@ -261,6 +293,7 @@ fn closer(points: &[([f64; 3], Possible)], sides: &[Side; 3], limits: &[Side; 3]
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::noise::Contrasts;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use statrs::distribution::{ContinuousCDF, StudentsT};

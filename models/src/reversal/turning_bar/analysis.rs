@@ -1,23 +1,24 @@
 //! Every model of a run beside the others, under one law of the noise.
 
-use errsep_solvers::structured::StructuredProblem;
-use nalgebra::{Matrix4, Vector4};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-use super::answers::Told;
-use super::contrasts::{TurnResiduals, turn_residuals};
+use super::contrasts::{Scatter, TurnResiduals, turn_residuals};
 use super::error::TurningError;
 use super::fit::{TurningFit, bent, fit, steady, unsteady};
-use super::noise::{law, misfit, windows};
-use super::problem::{HARMONICS, Held};
+use super::noise::{laws, misfit, windows};
+use super::problem::Held;
 use super::run::Run;
-use super::setting::{Along, Setting, Wave};
-use super::spread::Spread;
+use super::setting::{Setting, Wave};
+use super::spread::{Slow, Spread};
 use super::start::Survey;
-use crate::noise::Law;
+use crate::noise::{Law, Posterior};
 
-/// A cell of a spline is so many turns long or longer: what happens within a turn is the section's.
-const TURNS_A_CELL: f64 = 2.0;
+/// A cell of a spline is so many turns long or longer: each turn has one level and one wave, and what happens
+/// within a turn is the section's.
+const TURNS_A_CELL: f64 = 1.0;
+/// Levels or waves of single turns are taken to hold more than noise where noise alone makes as much less often
+/// than this: what were always added, and never taken away, would make uncertainties too large on average.
+const SLOW_SEEN: f64 = 0.05;
 /// Steps of the ladder of cells without a better one after which it ends.
 const PATIENCE: usize = 2;
 /// Cells from which the law of the noise is first taken, at most.
@@ -52,7 +53,10 @@ pub struct Rival<'a> {
 pub struct Analysis<'a> {
     /// Law of the noise, µm² and the unit of time.
     pub law: Law,
-    /// By what the variances of the law are raised, for slow parts that it does not hold.
+    /// What levels and waves of single turns scatter beyond the law.
+    pub slow: Slow,
+    /// By how many times the squares of levels or waves of single turns, whichever are more, exceed what the
+    /// law allows; 1 where noise alone makes as much.
     pub factor: f64,
     /// A straight bar that turns steadily, or as recorded.
     pub steady: Rival<'a>,
@@ -84,13 +88,13 @@ pub fn analyse<'a>(
     let even = steady(run, survey, &first)?;
     let (noise, setting) = match unsteady(run, survey, &first, &even) {
         Ok(fits) => {
-            let noise = law(run, &fits[0].psi, &fits[0].residuals);
+            let noise = laws(run, &fits[0].psi, &fits[0].residuals).mean();
             (
                 noise,
                 chosen(run, survey, &first, &fits[0], plan, &noise, most),
             )
         }
-        Err(_) => (law(run, &even.psi, &even.residuals), first),
+        Err(_) => (laws(run, &even.psi, &even.residuals).mean(), first),
     };
     let even = steady(run, survey, &setting)?;
     let strays = unsteady(run, survey, &setting, &even).unwrap_or_default();
@@ -107,10 +111,14 @@ pub fn analyse<'a>(
     let least = least.min_by(|a, b| {
         misfit(run, &a.residuals, &noise).total_cmp(&misfit(run, &b.residuals, &noise))
     });
-    let noise = least.map_or(noise, |fit| law(run, &fit.psi, &fit.residuals));
+    let known = least.map_or_else(
+        || Posterior::of_white(noise.variance(), run.len()),
+        |fit| laws(run, &fit.psi, &fit.residuals),
+    );
+    let noise = known.mean();
     let rival = |fit: TurningFit<'a>| Rival {
         misfit: misfit(run, &fit.residuals, &noise),
-        turns: turn_residuals(&fit, &noise),
+        turns: turn_residuals(&fit, &known),
         held_out: None,
         fit,
     };
@@ -119,20 +127,25 @@ pub fn analyse<'a>(
     let mirror = (strays.len() > 1).then(|| strays[1].misfit - strays[0].misfit);
     let mut strays = strays.into_iter();
     let (even, stray, bend) = (rival(even), strays.next(), bend.map(rival));
-    let slow = [Some(&even), stray.as_ref(), bend.as_ref()]
-        .into_iter()
-        .flatten()
-        .map(|r| {
-            let (turns, taken) = (
-                r.turns.turns.len() as f64,
-                r.fit.problem.form.coefficient_count() as f64,
-            );
-            r.turns.slow * turns / f64::max(turns - taken, 1.0)
-        })
-        .fold(f64::INFINITY, f64::min);
+    let all = [Some(&even), stray.as_ref(), bend.as_ref()];
+    let least = all.into_iter().flatten();
+    let least = least.min_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    let seen = |of: fn(&TurnResiduals) -> Scatter| {
+        let scatter = least.map(|rival| of(&rival.turns));
+        scatter.filter(|s| s.p_value < SLOW_SEEN && s.ratio > 1.0)
+    };
+    let (levels, waves) = (seen(|t| t.levels), seen(|t| t.waves));
+    let ratio = |s: Option<Scatter>| s.map_or(1.0, |s| s.ratio);
+    let excess = |s: Option<Scatter>| s.map_or(0.0, |s| s.excess);
+    let slow = Slow {
+        level: excess(levels),
+        wave: excess(waves),
+    };
+    let factor = ratio(levels).max(ratio(waves));
     Ok(Analysis {
         law: noise,
-        factor: slow.max(1.0),
+        slow,
+        factor,
         steady: even,
         unsteady: stray,
         bent: bend,
@@ -197,7 +210,7 @@ fn best_of(
     let mut best: Option<(f64, Setting)> = None;
     let mut since = 0;
     let mut cells = 1;
-    while cells <= most && since <= PATIENCE {
+    while since <= PATIENCE {
         let setting = with(cells);
         if let Some(value) = score(&setting) {
             if best.as_ref().is_none_or(|b| value < b.0) {
@@ -207,7 +220,10 @@ fn best_of(
                 since += 1;
             }
         }
-        cells = (cells + 1).max(cells * 7 / 5);
+        if cells == most {
+            break;
+        }
+        cells = (cells + 1).max(cells * 7 / 5).min(most);
     }
     best.map(|b| b.1)
 }
@@ -215,7 +231,7 @@ fn best_of(
 impl Rival<'_> {
     /// Covariance of its unknowns.
     pub fn spread(&self, analysis: &Analysis) -> Spread {
-        Spread::new(&self.fit, &analysis.law, analysis.factor)
+        Spread::new(&self.fit, &analysis.law, analysis.slow)
     }
 }
 
@@ -245,13 +261,17 @@ impl Analysis<'_> {
         };
         match rival.fit.strays(&rival.spread(self)) {
             Some((square, freedom)) if freedom > 0.0 => {
-                ChiSquared::new(freedom).map_or(1.0, |law| law.sf(square))
+                let known = self.steady.turns.freedom.max(3.0);
+                // The covariance is the mean over the laws, known / (known − 2) of Fisher's scale.
+                let ratio = square / freedom * known / (known - 2.0);
+                FisherSnedecor::new(freedom, known).map_or(1.0, |law| law.sf(ratio))
             }
             _ => 1.0,
         }
     }
 
-    /// Fits steady turn and rivals to every other turn and sees what they miss of the turns between.
+    /// Fits steady turn and rivals to every other turn and sees what they miss of the turns between. Where a
+    /// spline has cells shorter than two turns nothing is told: a cell would have no reading that is fitted.
     pub fn hold_out(&mut self, run: &Run, survey: &Survey) {
         let mut turn = vec![0; run.len()];
         for (k, window) in windows(&self.steady.fit.psi, 1.0).into_iter().enumerate() {
@@ -262,7 +282,11 @@ impl Analysis<'_> {
             self.unsteady.as_mut(),
             self.bent.as_mut(),
         ];
+        let most = (survey.turns / 2.0) as usize;
         for rival in rivals.into_iter().flatten() {
+            if rival.fit.setting().most_cells() > most {
+                continue;
+            }
             let halves =
                 [0, 1].map(|half| missed(&rival.fit, survey, run, &|i| turn[i] % 2 == half));
             rival.held_out = match halves {
@@ -298,77 +322,4 @@ fn missed(
     let out = left.iter().enumerate().filter(|(i, _)| !keep(*i));
     let (sum, count) = out.fold((0.0, 0.0), |(s, n), (_, r)| (s + r * r, n + 1.0));
     Some((sum, count))
-}
-
-/// Slopes of traces at pairs of opposite angles of the once-per-turn wave, as they follow twice the
-/// angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pairs {
-    /// Amplitude over twice the angle, rad, in the readings.
-    pub amplitude_rad: Told,
-    /// The same of a section that is oval and the same all along the bar, rad.
-    pub of_oval_rad: f64,
-    /// Amplitude of that section, µm.
-    pub oval_um: f64,
-}
-
-impl TurningFit<'_> {
-    /// What pairs of opposite angles would scatter by; `None` without harmonic 2.
-    ///
-    /// The wave is highest where ψ is the direction of e + γx. A trace at the angle w behind that sees
-    /// cos 2ψ turn along the bar with twice that direction: a section that does not change brings a
-    /// slope there that follows 2w.
-    pub fn pairs(&self, spread: &Spread) -> Option<Pairs> {
-        let setting = &self.problem.setting;
-        if matches!(setting.wave, Wave::Bent { .. }) {
-            return None;
-        }
-        let h = setting.harmonics.iter().position(|k| *k == 2)?;
-        let per = setting.per_harmonic();
-        let from = HARMONICS + per * h;
-        let middle = self.problem.frame.xi(self.middle_mm());
-        let value = |l: usize| self.at.border[from + l];
-        let oval = match setting.along {
-            Along::Constant => (value(0), value(1)),
-            Along::Linear => (value(0) + middle * value(2), value(1) + middle * value(3)),
-        };
-        let (mut normal, mut seen, mut constant) =
-            (Matrix4::zeros(), Vector4::zeros(), Vector4::zeros());
-        for (i, psi) in self.psi.iter().enumerate() {
-            let x = self.problem.run.x[i];
-            let bar = self.axis_direction(x);
-            let xi = self.problem.frame.xi(x) - middle;
-            let (s, c) = (2.0 * (psi - bar)).sin_cos();
-            let row = Vector4::new(c, s, xi * c, xi * s);
-            let (s, c) = (2.0 * psi).sin_cos();
-            let own = oval.0 * c + oval.1 * s;
-            let change = match setting.along {
-                Along::Constant => 0.0,
-                Along::Linear => xi * (value(2) * c + value(3) * s),
-            };
-            normal += row * row.transpose();
-            seen += row * (self.residuals[i] + own + change);
-            constant += row * own;
-        }
-        let inverse = normal.try_inverse()?;
-        let amplitude = |right: &Vector4<f64>| {
-            let found = inverse * right;
-            1e-3 * found[2].hypot(found[3]) / self.problem.frame.half_mm
-        };
-        // As sure as the change of the oval section along the bar.
-        let mut row = nalgebra::DVector::zeros(self.inverse.nrows());
-        if per > 2 {
-            row[self.problem.band_count() + from + 2] = 1.0;
-        } else {
-            row[self.problem.band_count() + from] = 1.0;
-        }
-        Some(Pairs {
-            amplitude_rad: Told {
-                value: amplitude(&seen),
-                std: 1e-3 * spread.variance(&row).sqrt() / self.problem.frame.half_mm,
-            },
-            of_oval_rad: amplitude(&constant),
-            oval_um: oval.0.hypot(oval.1),
-        })
-    }
 }

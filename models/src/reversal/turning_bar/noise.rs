@@ -1,66 +1,162 @@
 //! The noise of a run: white and correlated over a short time, from what a fit leaves.
 //!
 //! What is slower than the windows below is not counted as noise: level, slope and once-per-turn wave,
-//! growing evenly, are taken out of each window of two turns before the law is sought, so that it is
-//! the same whichever model left them. The likelihood of white noise beside an Ornstein–Uhlenbeck
-//! process at uneven times comes from a Kalman filter of one state.
+//! growing evenly, are unknowns of each window of two turns, so that the law is the same whichever model
+//! left the residuals. The likelihood is that of what is left in each window without these unknowns
+//! (restricted likelihood: r'V⁻¹r at their best values, and ln|V| + ln|X'V⁻¹X|). Residuals of a least squares
+//! in the window would seem less correlated than the noise is, most where its length comes near the window's.
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, DVector};
-use std::convert::Infallible;
+use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
 
 use super::run::Run;
-use crate::noise::Law;
-use errsep_solvers::scalar::least_between;
+use crate::noise::{Law, Likelihood, NoiseValues, Posterior};
 
 /// Turns of a window.
 const WINDOW_TURNS: f64 = 2.0;
-/// Unknowns taken out of each window.
+/// Unknowns of a window.
 const WINDOW_UNKNOWNS: usize = 6;
-/// The longest correlation is this part of a turn: beyond it noise and form are one.
-const LONGEST: f64 = 0.1;
-/// Rounds of the search over length and share.
-const ROUNDS: usize = 3;
+/// The longest correlation is this part of a turn: beyond it noise, form and wave are one.
+const LONGEST: f64 = 0.25;
 
-/// The law of the noise in residuals (µm) of readings that see the angles ψ (rad).
-pub fn law(run: &Run, psi: &[f64], residuals: &[f64]) -> Law {
-    let (inside, part) = inside_windows(run, psi, residuals);
-    let n = inside.len() as f64;
-    let steps: Vec<f64> = run.time.windows(2).map(|w| w[1] - w[0]).collect();
-    let whole = (psi[psi.len() - 1] - psi[0]).abs() / TAU;
-    let turn = (run.times().1 - run.times().0) / whole.max(1.0);
-    let mean_step = steps.iter().sum::<f64>() / steps.len() as f64;
-    let (low, high) = (
-        (0.1 * mean_step).ln(),
-        f64::max(LONGEST * turn, mean_step).ln(),
-    );
-    let cost = |share: f64, length: f64| {
-        let (log, squares) = filtered(&steps, &inside, 1.0 - share, share, length);
-        0.5 * log + 0.5 * n * (squares / n).max(f64::MIN_POSITIVE).ln()
-    };
-    // The best of a coarse grid, then in turn along either.
-    let grid = (0..8).flat_map(|i| (1..8).map(move |j| (f64::from(i) / 7.0, f64::from(j) / 8.0)));
-    let (mut length, mut share) = grid
-        .map(|(i, share)| (low + i * (high - low), share))
-        .min_by(|a, b| cost(a.1, a.0.exp()).total_cmp(&cost(b.1, b.0.exp())))
-        .unwrap_or((low, 0.0));
-    for _ in 0..ROUNDS {
-        let (from, to) = ((share - 0.13).max(0.0), (share + 0.13).min(0.999));
-        let by_share = |s: f64| Ok::<f64, Infallible>(cost(s, length.exp()));
-        share = least_between(from, to, 1e-4, by_share).unwrap_or(share);
-        let reach = (high - low) / 7.0;
-        let (from, to) = ((length - reach).max(low), (length + reach).min(high));
-        let by_length = |l: f64| Ok::<f64, Infallible>(cost(share, l.exp()));
-        length = least_between(from, to, 1e-3, by_length).unwrap_or(length);
+/// The laws of the noise that the residuals (µm) of readings that see the angles ψ (rad) allow.
+pub fn laws(run: &Run, psi: &[f64], residuals: &[f64]) -> Posterior {
+    let windows = Windows::of(run, psi, residuals);
+    let mean = residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64;
+    let white = mean.max(f64::MIN_POSITIVE);
+    Posterior::of(&windows).unwrap_or_else(|| Posterior::of_white(white, residuals.len()))
+}
+
+/// A reading's row of a window: its residual after the rows of the unknowns.
+const COLUMNS: usize = WINDOW_UNKNOWNS + 1;
+
+/// The residuals of a run in windows.
+struct Windows {
+    windows: Vec<Window>,
+    reach: (f64, f64),
+}
+
+struct Window {
+    /// Time since the reading before.
+    steps: Vec<f64>,
+    rows: Vec<SVector<f64, COLUMNS>>,
+    /// ln|X'X|.
+    log_plain: f64,
+}
+
+impl Windows {
+    fn of(run: &Run, psi: &[f64], residuals: &[f64]) -> Self {
+        let whole = (psi[psi.len() - 1] - psi[0]).abs() / TAU;
+        let span = run.times().1 - run.times().0;
+        let turn = span / whole.max(1.0);
+        let spacing = span / (run.len() - 1) as f64;
+        let found = windows(psi, WINDOW_TURNS).into_iter().filter_map(|window| {
+            if window.len() < 4 * WINDOW_UNKNOWNS {
+                return None;
+            }
+            let (first, last) = (run.time[window.start], run.time[window.end - 1]);
+            let (middle, half) = (f64::midpoint(first, last), 0.5 * (last - first));
+            let row = |i: usize| {
+                let tau = (run.time[i] - middle) / half;
+                let (s, c) = psi[i].sin_cos();
+                SVector::from([1.0, tau, c, s, tau * c, tau * s, residuals[i]])
+            };
+            let rows: Vec<_> = window.clone().map(row).collect();
+            let normal = rows.iter().map(|r| r * r.transpose()).sum();
+            Some(Window {
+                steps: window
+                    .map(|i| run.time[i] - run.time[i.max(1) - 1])
+                    .collect(),
+                log_plain: eliminated(&normal)?.0,
+                rows,
+            })
+        });
+        Self {
+            windows: found.collect(),
+            reach: (spacing, LONGEST * turn),
+        }
     }
-    let (_, squares) = filtered(&steps, &inside, 1.0 - share, share, length.exp());
-    let variance = squares / n / part;
-    Law {
-        white: variance * (1.0 - share),
-        correlated: variance * share,
-        length: length.exp(),
-        shift: 0.0,
+}
+
+/// ln of the determinant of the part of X'V⁻¹X that belongs to the unknowns, and what the residuals' own part
+/// is without them.
+fn eliminated(normal: &SMatrix<f64, COLUMNS, COLUMNS>) -> Option<(f64, f64)> {
+    let own = normal.fixed_view::<WINDOW_UNKNOWNS, WINDOW_UNKNOWNS>(0, 0);
+    let right = normal.fixed_view::<WINDOW_UNKNOWNS, 1>(0, WINDOW_UNKNOWNS);
+    let factor = own.into_owned().cholesky()?;
+    let log = 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
+    let taken = right.dot(&factor.solve(&right));
+    let left = normal[(WINDOW_UNKNOWNS, WINDOW_UNKNOWNS)] - taken;
+    Some((log, left))
+}
+
+impl Window {
+    /// Logarithm of the determinant and quadratic form of what holds noise alone, by a Kalman filter.
+    fn filtered(&self, white: f64, correlated: f64, length: f64) -> (f64, f64) {
+        let mut normal = SMatrix::<f64, COLUMNS, COLUMNS>::zeros();
+        let mut state = SVector::<f64, COLUMNS>::zeros();
+        let (mut log, mut doubt) = (0.0, correlated);
+        let mut last = (f64::NAN, 0.0);
+        for (i, (row, step)) in self.rows.iter().zip(&self.steps).enumerate() {
+            if i > 0 {
+                if *step != last.0 {
+                    last = (*step, (-step / length).exp());
+                }
+                let decay = last.1;
+                state *= decay;
+                doubt = decay * decay * doubt + correlated * (1.0 - decay * decay);
+            }
+            let variance = (doubt + white).max(f64::MIN_POSITIVE);
+            let innovation = row - state;
+            log += variance.ln();
+            normal.ger(1.0 / variance, &innovation, &innovation, 1.0);
+            let gain = doubt / variance;
+            state += innovation * gain;
+            doubt *= 1.0 - gain;
+        }
+        match eliminated(&normal) {
+            Some((own, squares)) => (log + own - self.log_plain, squares),
+            None => (f64::INFINITY, f64::INFINITY),
+        }
+    }
+}
+
+impl NoiseValues for Windows {
+    fn count(&self) -> usize {
+        let of = |w: &Window| w.rows.len() - WINDOW_UNKNOWNS;
+        self.windows.iter().map(of).sum()
+    }
+
+    fn reach(&self) -> Option<(f64, f64)> {
+        Some(self.reach)
+    }
+
+    /// A level is an unknown of each window.
+    fn has_shifts(&self) -> bool {
+        false
+    }
+
+    fn likelihoods(
+        &self,
+        white: f64,
+        correlated: f64,
+        length: f64,
+        shifts: &[f64],
+    ) -> Vec<Likelihood> {
+        let of = |w: &Window| w.filtered(white, correlated, length);
+        let parts: Vec<(f64, f64)> = self.windows.par_iter().map(of).collect();
+        let (log, squares) = parts
+            .iter()
+            .fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
+        let quadratic = squares.max(f64::MIN_POSITIVE);
+        let count = self.count() as f64;
+        let found = Likelihood {
+            minus_log: 0.5 * (count * (quadratic / count).ln() + log),
+            quadratic,
+        };
+        vec![found; shifts.len()]
     }
 }
 
@@ -90,34 +186,6 @@ fn filtered(steps: &[f64], values: &[f64], white: f64, correlated: f64, length: 
         doubt *= 1.0 - gain;
     }
     (log, squares)
-}
-
-/// What is left in the windows, and the part of the variance that it still has.
-fn inside_windows(run: &Run, psi: &[f64], residuals: &[f64]) -> (Vec<f64>, f64) {
-    let mut inside = residuals.to_vec();
-    let mut taken = 0;
-    for window in windows(psi, WINDOW_TURNS) {
-        let n = window.len();
-        if n < 4 * WINDOW_UNKNOWNS {
-            continue;
-        }
-        let (first, last) = (run.time[window.start], run.time[window.end - 1]);
-        let (middle, half) = (f64::midpoint(first, last), 0.5 * (last - first));
-        let design = DMatrix::from_fn(n, WINDOW_UNKNOWNS, |r, c| {
-            let i = window.start + r;
-            let tau = (run.time[i] - middle) / half;
-            let (sin, cos) = psi[i].sin_cos();
-            [1.0, tau, cos, sin, tau * cos, tau * sin][c]
-        });
-        let values = DVector::from_column_slice(&residuals[window.clone()]);
-        if let Some(factor) = design.tr_mul(&design).cholesky() {
-            let left = &values - &design * factor.solve(&design.tr_mul(&values));
-            inside[window.clone()].copy_from_slice(left.as_slice());
-            taken += WINDOW_UNKNOWNS;
-        }
-    }
-    let n = residuals.len() as f64;
-    (inside, 1.0 - taken as f64 / n)
 }
 
 /// Stretches of so many turns, as many as are whole; the last holds what is left over.

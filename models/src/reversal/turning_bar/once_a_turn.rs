@@ -10,7 +10,7 @@ use super::fit::fit;
 use super::problem::{ECCENTRICITY, Held, SPEED, THETA};
 use super::run::Run;
 use super::setting::{Along, Setting, Wave};
-use super::spread::Spread;
+use super::spread::{Slow, Spread};
 use super::start::Survey;
 use crate::noise::Law;
 
@@ -77,7 +77,7 @@ pub fn once_a_turn(run: &Run, about_hz: Option<f64>) -> Result<OnceATurn, Turnin
     })?;
     // What the wave's growth leaves in the first fit is no noise: that of the second is.
     let noise = Law::of_white(bar.squares / bar.freedom());
-    let frequency = wave.speed(survey.base_hz, &Spread::new(&wave, &noise, 1.0));
+    let frequency = wave.speed(survey.base_hz, &Spread::new(&wave, &noise, Slow::default()));
     let middle = survey.frame.middle;
     let direction = bar.axis_direction(middle_of(run));
     // Highest where ψ = −θ is the direction of the run-out.

@@ -100,6 +100,14 @@ impl Setting {
         Ok(())
     }
 
+    /// Cells of the spline that has most.
+    pub fn most_cells(&self) -> usize {
+        match self.wave {
+            Wave::Steady => self.form_cells,
+            Wave::Unsteady { cells } | Wave::Bent { cells } => cells.max(self.form_cells),
+        }
+    }
+
     /// Unknowns of one harmonic.
     pub fn per_harmonic(&self) -> usize {
         match self.along {

@@ -2,12 +2,24 @@
 //!
 //! Least squares weighs all readings alike; under a covariance V of the readings its unknowns have
 //! (JᵀJ)⁻¹ JᵀVJ (JᵀJ)⁻¹. JᵀVJ takes one pass: with S_i = Σ_{j<i} e^{−(t_i − t_j)/ℓ} row_j the sum over
-//! all pairs is Σ (row_i row_iᵀ + row_i S_iᵀ + S_i row_iᵀ).
+//! all pairs is Σ (row_i row_iᵀ + row_i S_iᵀ + S_i row_iᵀ). What levels and waves of single turns scatter beyond
+//! the law is a further part of V: of each turn Σ row_i, Σ row_i cos ψ_i and Σ row_i sin ψ_i, squared. So a level
+//! makes the slope of the form less sure and not the eccentricity, and a wave the other way round.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::fit::TurningFit;
+use super::noise::windows;
 use crate::noise::Law;
+
+/// What is slow in the residuals and not in the law: variances from turn to turn, µm².
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Slow {
+    /// Of the level.
+    pub level: f64,
+    /// Of either amplitude of the once-per-turn wave.
+    pub wave: f64,
+}
 
 /// Covariance of the unknowns, band before border, µm² and what follows from the units of each.
 #[derive(Debug, Clone)]
@@ -16,14 +28,18 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Under a law of the noise, all variances times `factor`.
-    pub fn new(fit: &TurningFit, law: &Law, factor: f64) -> Self {
+    /// Under a law of the noise and what is slower.
+    pub fn new(fit: &TurningFit, law: &Law, slow: Slow) -> Self {
         let p = fit.inverse.nrows();
         let time = &fit.problem.run.time;
         let mut before = DVector::<f64>::zeros(p);
         let mut last = None;
         let mut pairs = DMatrix::<f64>::zeros(p, p);
         let mut own = DMatrix::<f64>::zeros(p, p);
+        let ends = windows(&fit.psi, 1.0).into_iter().map(|turn| turn.end - 1);
+        let mut ends = ends.peekable();
+        let mut turn = DMatrix::<f64>::zeros(p, 3);
+        let mut slowly = DMatrix::<f64>::zeros(p, p);
         fit.problem.rows(&fit.at, |i, row| {
             let decay = last.map_or(0.0, |t: f64| (-(time[i] - t) / law.length).exp());
             before *= decay;
@@ -37,11 +53,25 @@ impl Spread {
                 before[*j] += a;
             }
             last = Some(time[i]);
+            let (sin, cos) = fit.psi[i].sin_cos();
+            for (j, a) in row {
+                for (k, wave) in [1.0, cos, sin].into_iter().enumerate() {
+                    turn[(*j, k)] += a * wave;
+                }
+            }
+            if ends.next_if_eq(&i).is_some() {
+                for (k, variance) in [slow.level, slow.wave, slow.wave].into_iter().enumerate() {
+                    slowly.syger(variance, &turn.column(k), &turn.column(k), 1.0);
+                }
+                turn.fill(0.0);
+            }
         });
-        let meat =
-            own * (law.white + law.correlated) + (&pairs + pairs.transpose()) * law.correlated;
+        slowly.fill_upper_triangle_with_lower_triangle();
+        let meat = own * (law.white + law.correlated)
+            + (&pairs + pairs.transpose()) * law.correlated
+            + slowly;
         Self {
-            covariance: (&fit.inverse * meat * &fit.inverse) * factor,
+            covariance: &fit.inverse * meat * &fit.inverse,
         }
     }
 

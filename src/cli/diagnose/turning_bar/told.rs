@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use errsep_models::reversal::turning_bar::{
-    Analysis, Bar, Harmonic, Pairs, Rival, Run, Survey, Told as Value, TurnCurve,
+    Analysis, Bar, Harmonic, Pairs, Rival, Run, Slow, Spread, Survey, Told as Value, TurnCurve,
 };
 
 use crate::diagnosis::Kind;
@@ -112,7 +112,7 @@ impl<'a, 'b> Told<'a, 'b> {
     pub(super) fn slope_std_white(&self) -> f64 {
         let variance = self.chosen.fit.squares / self.chosen.fit.freedom();
         let law = errsep_models::noise::Law::of_white(variance);
-        let spread = errsep_models::reversal::turning_bar::Spread::new(&self.chosen.fit, &law, 1.0);
+        let spread = Spread::new(&self.chosen.fit, &law, Slow::default());
         self.chosen.fit.slope(&spread).std
     }
 
@@ -248,8 +248,9 @@ impl<'a, 'b> Told<'a, 'b> {
                 plain(law.correlated.sqrt(), 2),
                 if self.analysis.factor > 1.0 {
                     format!(
-                        ". What is slower, within two turns or more, is not counted as noise (all that is left stays together over about {slower} readings): variances are raised {} times for it",
-                        plain(self.analysis.factor, 2)
+                        ". What is slower, within two turns or more, is not counted as noise (all that is left stays together over about {slower} readings): from turn to turn levels scatter by {} µm and waves by {} µm beyond it, which is added",
+                        plain(self.analysis.slow.level.sqrt(), 2),
+                        plain(self.analysis.slow.wave.sqrt(), 2)
                     )
                 } else {
                     String::new()

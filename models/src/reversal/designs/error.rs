@@ -4,6 +4,7 @@ use errsep_solvers::{FitError, NoValue};
 use thiserror::Error;
 
 use crate::basis::bspline::BreakError;
+use crate::reversal::simultaneous::Reached;
 
 /// Why there is no solution.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -89,5 +90,7 @@ pub enum DesignFitError {
     NotConverged {
         /// How it ended, in words.
         ending: String,
+        /// Where it stood then: the slopes by name, no effects.
+        reached: Box<Reached>,
     },
 }

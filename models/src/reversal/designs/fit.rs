@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use errsep_solvers::linear::bordered::BorderedCovariance;
 use errsep_solvers::loss::Loss;
-use errsep_solvers::structured::{Parameters, fit_structured};
+use errsep_solvers::structured::{Parameters, StructuredFit, fit_structured};
 
 use super::determined::Determined;
 use super::error::DesignFitError;
@@ -19,6 +19,7 @@ use crate::reversal::channel_noise::settle::{Asked, Settled, settle};
 use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::channel_noise::white::Told;
 use crate::reversal::channel_noise::{freedom_left, weights_of};
+use crate::reversal::simultaneous;
 use crate::reversal::simultaneous::fitted_knots::FittedKnots;
 use crate::reversal::simultaneous::knots::FEWEST_POSITIONS;
 
@@ -55,8 +56,7 @@ pub fn fit(
     };
     let settled = settle(&mut problem, start, asked, &survey, &mut sigmas)?;
     let Some(covariance) = settled.fit.covariance() else {
-        let ending = settled.fit.ending.to_string();
-        return Err(DesignFitError::NotConverged { ending });
+        return Err(not_converged(&problem, &settled.fit));
     };
     let told = told(&problem, &settled, &covariance, &survey, &sigmas, options)?;
     let knots = FittedKnots::new(chosen.common, chosen.table, &settled.residuals);
@@ -72,6 +72,25 @@ pub fn fit(
     let mut solution = DesignFit::new(observations, determined.clone(), reached);
     solution.convergence.seconds = began.elapsed().as_secs_f64();
     Ok(solution)
+}
+
+/// The fit has no answer: how it ended, and where.
+fn not_converged(problem: &DesignProblem, fit: &StructuredFit) -> DesignFitError {
+    let (layout, at) = (&problem.layout, &fit.parameters);
+    let slopes = layout.names.iter().take(layout.slope_count).cloned();
+    let residuals = problem.residuals(at).ok().map(|all| all.concat());
+    let rms =
+        |all: Vec<f64>| (all.iter().map(|r| r * r).sum::<f64>() / all.len().max(1) as f64).sqrt();
+    DesignFitError::NotConverged {
+        ending: fit.ending.to_string(),
+        reached: Box::new(simultaneous::Reached {
+            tilts: slopes.zip(at.border.iter().copied()).collect(),
+            thickness_mm: layout.thickness.then(|| 2.0 * problem.half_mm(at)),
+            effects: Vec::new(),
+            residual_rms_um: residuals.map(rms),
+            iterations: fit.iterations,
+        }),
+    }
 }
 
 /// What the fit tells of its noise: white, unless repeats tell more.

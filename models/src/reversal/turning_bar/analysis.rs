@@ -77,25 +77,7 @@ pub fn analyse<'a>(
     survey: &'a Survey,
     plan: &Plan,
 ) -> Result<Analysis<'a>, TurningError> {
-    let most = ((survey.turns / TURNS_A_CELL) as usize).max(1);
-    let first = Setting {
-        form_cells: plan.form_cells.unwrap_or(most.min(FIRST_CELLS.0)),
-        wave: Wave::Unsteady {
-            cells: plan.turn_cells.unwrap_or(most.min(FIRST_CELLS.1)),
-        },
-        ..plan.setting.clone()
-    };
-    let even = steady(run, survey, &first)?;
-    let (noise, setting) = match unsteady(run, survey, &first, &even) {
-        Ok(fits) => {
-            let noise = laws(run, &fits[0].psi, &fits[0].residuals).mean();
-            (
-                noise,
-                chosen(run, survey, &first, &fits[0], plan, &noise, most),
-            )
-        }
-        Err(_) => (laws(run, &even.psi, &even.residuals).mean(), first),
-    };
+    let (noise, setting) = described(run, survey, plan)?;
     let even = steady(run, survey, &setting)?;
     let strays = unsteady(run, survey, &setting, &even).unwrap_or_default();
     let Wave::Unsteady { cells } = setting.wave else {
@@ -127,9 +109,41 @@ pub fn analyse<'a>(
     let mirror = (strays.len() > 1).then(|| strays[1].misfit - strays[0].misfit);
     let mut strays = strays.into_iter();
     let (even, stray, bend) = (rival(even), strays.next(), bend.map(rival));
-    let all = [Some(&even), stray.as_ref(), bend.as_ref()];
-    let least = all.into_iter().flatten();
-    let least = least.min_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    let (slow, factor) = slow_of([Some(&even), stray.as_ref(), bend.as_ref()]);
+    Ok(Analysis {
+        law: noise,
+        slow,
+        factor,
+        steady: even,
+        unsteady: stray,
+        bent: bend,
+        mirror,
+    })
+}
+
+/// A first law of the noise, and the cells that describe the run best under it.
+fn described(run: &Run, survey: &Survey, plan: &Plan) -> Result<(Law, Setting), TurningError> {
+    let most = ((survey.turns / TURNS_A_CELL) as usize).max(1);
+    let first = Setting {
+        form_cells: plan.form_cells.unwrap_or(most.min(FIRST_CELLS.0)),
+        wave: Wave::Unsteady {
+            cells: plan.turn_cells.unwrap_or(most.min(FIRST_CELLS.1)),
+        },
+        ..plan.setting.clone()
+    };
+    let even = steady(run, survey, &first)?;
+    let Ok(fits) = unsteady(run, survey, &first, &even) else {
+        return Ok((laws(run, &even.psi, &even.residuals).mean(), first));
+    };
+    let noise = laws(run, &fits[0].psi, &fits[0].residuals).mean();
+    let setting = chosen(run, survey, &first, &fits[0], plan, &noise, most);
+    Ok((noise, setting))
+}
+
+/// What is slow in the rival of least misfit where it is seen, and by what it raises the variances.
+fn slow_of(rivals: [Option<&Rival>; 3]) -> (Slow, f64) {
+    let all = rivals.into_iter().flatten();
+    let least = all.min_by(|a, b| a.misfit.total_cmp(&b.misfit));
     let seen = |of: fn(&TurnResiduals) -> Scatter| {
         let scatter = least.map(|rival| of(&rival.turns));
         scatter.filter(|s| s.p_value < SLOW_SEEN && s.ratio > 1.0)
@@ -141,16 +155,7 @@ pub fn analyse<'a>(
         level: excess(levels),
         wave: excess(waves),
     };
-    let factor = ratio(levels).max(ratio(waves));
-    Ok(Analysis {
-        law: noise,
-        slow,
-        factor,
-        steady: even,
-        unsteady: stray,
-        bent: bend,
-        mirror,
-    })
+    (slow, ratio(levels).max(ratio(waves)))
 }
 
 /// The cells that describe the run best: of the form, then of the turn, up a ladder each, by the

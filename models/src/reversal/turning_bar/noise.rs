@@ -209,3 +209,73 @@ pub fn windows(psi: &[f64], turns: f64) -> Vec<std::ops::Range<usize>> {
     }
     windows
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+
+    /// A window of uneven readings, its values those of no law.
+    fn window() -> (Window, Vec<f64>) {
+        let times: Vec<f64> = (0..40)
+            .map(|k| f64::from(k) + 0.3 * f64::from(k * k % 7) / 7.0)
+            .collect();
+        let rows = times.iter().enumerate().map(|(k, t)| {
+            let (tau, k) = (t / 20.0 - 1.0, k as f64);
+            let (s, c) = (0.37 * t).sin_cos();
+            let value = (1.7 * k).sin() + 0.5 * (0.3 * k * k).cos();
+            SVector::from([1.0, tau, c, s, tau * c, tau * s, value])
+        });
+        let rows: Vec<_> = rows.collect();
+        let normal = rows.iter().map(|r| r * r.transpose()).sum();
+        let steps = |k: usize| times[k] - times[k.max(1) - 1];
+        let window = Window {
+            steps: (0..times.len()).map(steps).collect(),
+            log_plain: eliminated(&normal).unwrap().0,
+            rows,
+        };
+        (window, times)
+    }
+
+    /// Beside the likelihood of what an orthonormal complement of the unknowns' columns leaves of the values, with
+    /// the whole covariance written out.
+    #[test]
+    fn the_filter_is_the_likelihood_of_what_holds_noise_alone() {
+        let (window, times) = window();
+        let n = times.len();
+        let columns = DMatrix::from_fn(n, WINDOW_UNKNOWNS, |i, j| window.rows[i][j]);
+        let values = DVector::from_fn(n, |i, _| window.rows[i][WINDOW_UNKNOWNS]);
+        let projector =
+            DMatrix::identity(n, n) - &columns * columns.clone().pseudo_inverse(1e-12).unwrap();
+        let eigen = projector.symmetric_eigen();
+        let kept: Vec<usize> = (0..n).filter(|k| eigen.eigenvalues[*k] > 0.5).collect();
+        let complement = eigen.eigenvectors.select_columns(&kept);
+        assert_eq!(complement.ncols(), n - WINDOW_UNKNOWNS);
+        for (white, correlated, length) in [(1.0, 0.0, 1.0), (0.4, 0.9, 3.0), (0.05, 2.0, 11.0)] {
+            let covariance = DMatrix::from_fn(n, n, |i, j| {
+                let own = if i == j { white } else { 0.0 };
+                own + correlated * (-(times[i] - times[j]).abs() / length).exp()
+            });
+            let left = complement
+                .tr_mul(&(covariance * &complement))
+                .cholesky()
+                .unwrap();
+            let seen = complement.tr_mul(&values);
+            let log = 2.0 * left.l().diagonal().map(f64::ln).sum();
+            let squares = seen.dot(&left.solve(&seen));
+            let found = window.filtered(white, correlated, length);
+            // Rounding of a covariance whose condition is below 1e3.
+            assert!(
+                (found.0 - log).abs() < 1e-9 * log.abs().max(1.0),
+                "{} {log}",
+                found.0
+            );
+            assert!(
+                (found.1 - squares).abs() < 1e-9 * squares,
+                "{} {squares}",
+                found.1
+            );
+        }
+    }
+}

@@ -525,3 +525,23 @@ fn a_prediction_and_its_residual_make_the_reading() {
     }
     assert!(found.predict(6, 0.0).is_err());
 }
+
+/// A fit that is broken off says where it stood: no value of it is an answer.
+#[test]
+fn a_fit_that_is_broken_off_says_where_it_stood() {
+    let (observations, _) = simulate(&plan(EIGHT)).unwrap();
+    let mut options = options(8);
+    options.minimisation.max_iterations = 1;
+    let Err(DesignFitError::NotConverged { ending, reached }) = fit(&observations, &options) else {
+        panic!("one step of a search that begins far away is no minimum");
+    };
+    assert!(!ending.is_empty());
+    let names: Vec<&str> = reached.tilts.iter().map(|(name, _)| &name[..]).collect();
+    assert!(
+        names.starts_with(&["gamma_1", "gamma_2", "cone"]),
+        "{names:?}"
+    );
+    assert!(reached.tilts.iter().all(|(_, rad)| rad.abs() < 1.0));
+    assert!(reached.residual_rms_um.is_some_and(f64::is_finite));
+    assert_eq!((reached.thickness_mm, reached.iterations), (None, 1));
+}

@@ -14,6 +14,7 @@ use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
 
 use super::Args;
 use super::diagnosed::Diagnosed;
+use super::json::reached as reached_json;
 use super::noise;
 use super::refusal::OTHER_UNITS;
 use crate::cli::Answer;
@@ -246,9 +247,15 @@ fn refusal(why: &DesignFitError, args: &Args, data: &DesignData) -> Message {
         }
         _ => None,
     };
-    match named.and_then(|c| data.first.get(c)) {
+    let message = match named.and_then(|c| data.first.get(c)) {
         Some(place) => message.at(place.clone()).remedy(remedy),
         None => message.in_file(&args.data).remedy(remedy),
+    };
+    match why {
+        DesignFitError::NotConverged { ending, reached } => {
+            message.reaching(reached_json(reached, ending))
+        }
+        _ => message,
     }
 }
 

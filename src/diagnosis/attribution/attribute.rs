@@ -4,6 +4,7 @@
 //! others (`confidence.rs`). If no step forward succeeds, all pairs are tried, and then up to six causes as
 //! long as each takes a good part of what is left away.
 
+use errsep_models::model::Shape;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -21,7 +22,7 @@ pub(in crate::diagnosis) fn attribute(
     first: &Remainder,
     begun: &[Cause],
 ) -> Option<Answer> {
-    let strongest_alone = strongest(context, readings, first, &[], 0.0);
+    let strongest_alone = strongest(context, readings, first, &[]);
     if let [only] = begun {
         let start = finer(&only.shape);
         let (cause, t) = context.refine(context.model, readings, only.effect, &start, &[]);
@@ -76,7 +77,7 @@ impl Search<'_> {
             let here = partial.map_or(self.first, |answer| &answer.remainder);
             let next = match size {
                 1 => alone.take(),
-                _ => strongest(context, readings, here, &causes, 0.0),
+                _ => strongest(context, readings, here, &causes),
             };
             let Some((next, _)) = next else {
                 break;
@@ -169,7 +170,7 @@ pub(in crate::diagnosis) fn roughly(
     let mut left: Option<Remainder> = None;
     for _ in 0..FREELY {
         let here = left.as_ref().unwrap_or(first);
-        let Some((next, _)) = strongest(context, readings, here, &causes, 0.0) else {
+        let Some((next, _)) = strongest(context, readings, here, &causes) else {
             break;
         };
         causes.push(next);
@@ -241,15 +242,24 @@ fn same(one: &[Cause], other: &[Cause]) -> bool {
     one.len() == other.len() && one.iter().all(holds)
 }
 
-/// The refined effect of greatest evidence beside the causes, and its statistic. `known`: one that
-/// another cause has there already.
+/// The refined effect of greatest evidence beside the causes, and its statistic.
 fn strongest(
     context: &Context<'_>,
     readings: &DVector<f64>,
     remainder: &Remainder,
     causes: &[Cause],
-    known: f64,
 ) -> Option<(Cause, f64)> {
+    let refined = standing_out(context, readings, remainder, causes);
+    greatest(context, readings, causes, refined, 0.0)
+}
+
+/// The effects that stand out most beside the causes, refined.
+fn standing_out(
+    context: &Context<'_>,
+    readings: &DVector<f64>,
+    remainder: &Remainder,
+    causes: &[Cause],
+) -> Vec<(Cause, f64)> {
     let mut ranked: Vec<(f64, usize)> = (0..context.catalogue.len())
         .filter(|effect| causes.iter().all(|c| c.effect != *effect))
         .filter(|effect| context.p_value(remainder, *effect) < EARNED)
@@ -260,22 +270,36 @@ fn strongest(
         .collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     ranked.truncate(REFINED);
-    let refined: Vec<(Cause, f64)> = ranked
+    ranked
         .into_par_iter()
         .filter_map(|(_, effect)| {
             let start = context.start(remainder, effect)?;
             Some(context.refine(context.model, readings, effect, start, causes))
         })
-        .collect();
+        .collect()
+}
+
+/// Of effects refined beside the causes that of greatest evidence. `known`: a statistic that another cause has there
+/// already.
+fn greatest(
+    context: &Context<'_>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    refined: Vec<(Cause, f64)>,
+    known: f64,
+) -> Option<(Cause, f64)> {
     let best = refined.iter().map(|(_, t)| *t).fold(known, f64::max);
-    refined
-        .into_iter()
+    let settled: Vec<(Cause, f64)> = refined
+        .into_par_iter()
         .map(|found| {
             if found.1 < IN_REACH * best {
                 return found;
             }
             context.come_back(context.model, readings, found, causes)
         })
+        .collect();
+    settled
+        .into_iter()
         .filter(|(cause, _)| possible(context, readings, causes, cause))
         .max_by(|a, b| paid(context, a).total_cmp(&paid(context, b)))
 }
@@ -294,17 +318,24 @@ fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause]) 
         for k in 0..causes.len() {
             let others = without(causes, k);
             let start = finer(&causes[k].shape);
-            let refined =
-                context.refine(context.model, readings, causes[k].effect, &start, &others);
             let left = context.misfit(readings, &others);
             let again = (left - tried[k]).abs() > NO_BETTER;
-            let swapped = again.then(|| {
+            let refine = |effect: usize, start: &Shape| {
+                context.refine(context.model, readings, effect, start, &others)
+            };
+            let (refined, found) = rayon::join(
+                || refine(causes[k].effect, &start),
+                || {
+                    again.then(|| {
+                        let remainder = context.remainder(readings, &others);
+                        standing_out(context, readings, &remainder, &others)
+                    })
+                },
+            );
+            let swapped = found.map(|found| {
                 tried[k] = left;
-                let remainder = context.remainder(readings, &others);
-                let strongest = strongest(context, readings, &remainder, &others, refined.1);
-                strongest.map(|(c, _)| {
-                    context.refine(context.model, readings, c.effect, &finer(&c.shape), &others)
-                })
+                let strongest = greatest(context, readings, &others, found, refined.1);
+                strongest.map(|(c, _)| refine(c.effect, &finer(&c.shape)))
             });
             match swapped.flatten() {
                 Some(other) if paid(context, &other) > paid(context, &refined) + BETTER => {

@@ -43,18 +43,43 @@ impl Context<'_> {
             .collect();
         // The best first: what it is searched to spares the search of many others.
         relatives.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut ahead: Vec<Option<(Shape, f64)>> = vec![None; relatives.len()];
         let mut searched: Vec<usize> = Vec::new();
-        for (here, own, other) in relatives {
+        for k in 0..relatives.len() {
             let (least, columns) = weighed(&shape, t);
-            let alike = searched.iter().filter(|v| **v == other.variant).count();
-            // One that holds the other needs no search to be better; one of another kind does.
-            let reach = if own == columns { UNSEARCHED * t } else { 0.0 };
-            if here <= least - reach || alike >= ALIKE {
+            let is_spared = |(here, own, other): &(f64, usize, Shape), searched: &[usize]| {
+                let alike = searched.iter().filter(|v| **v == other.variant).count();
+                // One that holds the other needs no search to be better; one of another kind does.
+                let reach = if *own == columns { UNSEARCHED * t } else { 0.0 };
+                *here <= least - reach || alike >= ALIKE
+            };
+            if is_spared(&relatives[k], &searched) {
                 continue;
             }
-            searched.push(other.variant);
-            let (found, own_t) = seen.searched(&other);
-            if weighed(&found, own_t).0 > least {
+            let other = relatives[k].2.variant;
+            if ahead[k].is_none() {
+                // Others that will be searched unless this one spares them, on processors that would stand idle.
+                let mut next: Vec<usize> = Vec::new();
+                let mut then = searched.clone();
+                for j in k..relatives.len() {
+                    if next.len() < rayon::current_num_threads() && !is_spared(&relatives[j], &then)
+                    {
+                        next.push(j);
+                        then.push(relatives[j].2.variant);
+                    }
+                }
+                let found: Vec<(Shape, f64)> = next
+                    .par_iter()
+                    .map(|j| seen.searched(&relatives[*j].2))
+                    .collect();
+                next.into_iter()
+                    .zip(found)
+                    .for_each(|(j, found)| ahead[j] = Some(found));
+            }
+            searched.push(other);
+            if let Some((found, own_t)) = ahead[k].take()
+                && weighed(&found, own_t).0 > least
+            {
                 (shape, t) = (found, own_t);
             }
         }

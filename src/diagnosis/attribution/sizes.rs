@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use errsep_models::model::{Estimate, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rayon::prelude::*;
 
 use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::attribution::doubt::{ROUNDS, StateDraws};
@@ -78,10 +79,9 @@ impl Sizes {
             return Some(plain);
         };
         let (columns, _) = instruments(context, causes, &plain.amplitudes);
-        let mut derivatives = columns.clone();
-        for (parameter, unknown) in plain.parameters.iter().enumerate() {
-            let Unknown::Amplitude(cause, k) = *unknown else {
-                continue;
+        let slope = |parameter: usize| {
+            let Unknown::Amplitude(cause, k) = plain.parameters[parameter] else {
+                return None;
             };
             let at = first_amplitude(causes, cause) + k;
             let step = 0.5 * plain.covariance[(parameter, parameter)].sqrt();
@@ -93,7 +93,13 @@ impl Sizes {
                 predicted(context, readings, causes, &moved, length)
             };
             let slope = (predicted(1.0) - predicted(-1.0)) / (2.0 * step);
-            if slope.iter().all(|v| v.is_finite()) {
+            slope.iter().all(|v| v.is_finite()).then_some(slope)
+        };
+        let all = (0..plain.parameters.len()).into_par_iter();
+        let slopes: Vec<Option<DVector<f64>>> = all.map(slope).collect();
+        let mut derivatives = columns.clone();
+        for (parameter, slope) in slopes.into_iter().enumerate() {
+            if let Some(slope) = slope {
                 derivatives.set_column(parameter, &slope);
             }
         }

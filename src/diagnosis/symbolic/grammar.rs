@@ -11,6 +11,22 @@ use crate::diagnosis::symbolic::view::Fitted;
 /// *Limit.* Part of the readings' range that a law along the reading may change them by.
 const OFF: f64 = 0.3;
 
+/// *Limit.* Correlation from which on two coordinates grow with each other.
+const TOGETHER: f64 = 0.99;
+
+/// Whether two coordinates grow, or one falls as the other grows, over all readings alike.
+fn grow_together(a: &Coordinate, b: &Coordinate) -> bool {
+    let n = a.values.len() as f64;
+    let mean = |c: &Coordinate| c.values.iter().sum::<f64>() / n;
+    let (of_a, of_b) = (mean(a), mean(b));
+    let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
+    for (u, v) in a.values.iter().zip(&b.values) {
+        let (u, v) = (u - of_a, v - of_b);
+        (aa, ab, bb) = (aa + u * u, ab + u * v, bb + v * v);
+    }
+    ab * ab > TOGETHER * TOGETHER * aa * bb
+}
+
 /// A function of a coordinate.
 #[derive(Clone, Copy)]
 pub(super) struct Kind {
@@ -41,6 +57,8 @@ pub(super) struct Grammar {
     pub patterns: Vec<Pattern>,
     /// Channel and direction of every reading.
     pub blocks: Vec<usize>,
+    /// By coordinate, the first that it grows with: on a calibration line the reading is the position.
+    grows_with: Vec<usize>,
 }
 
 impl Grammar {
@@ -66,7 +84,14 @@ impl Grammar {
             kinds.extend(Function::all(c).into_iter().map(of));
         }
         kinds.sort_by_key(|k| k.function.parameters());
+        let grows_with = (0..coordinates.len())
+            .map(|k| {
+                let before = (0..k).find(|j| grow_together(&coordinates[*j], &coordinates[k]));
+                before.unwrap_or(k)
+            })
+            .collect();
         Some(Self {
+            grows_with,
             coordinates,
             kinds,
             patterns: Pattern::all(model),
@@ -107,7 +132,8 @@ impl Grammar {
         ]
     }
 
-    /// Whether two terms may stand together: two steps or bends of one coordinate and pattern are a bump.
+    /// Whether two terms may stand together: two steps or bends of one pattern and of one coordinate, or of two that
+    /// grow with each other, are a bump.
     pub fn may_join(&self, a: Term, b: Term) -> bool {
         let broken = |t: Term| {
             matches!(
@@ -115,7 +141,8 @@ impl Grammar {
                 Function::Step | Function::Absolute(_) | Function::Corner
             )
         };
-        let same = self.kinds[a.kind].coordinate == self.kinds[b.kind].coordinate;
+        let along = |t: Term| self.grows_with[self.kinds[t.kind].coordinate];
+        let same = along(a) == along(b);
         !(broken(a) && broken(b) && same && a.pattern == b.pattern)
     }
 

@@ -71,6 +71,65 @@ fn a_law_of_the_time_is_found_in_its_channel() {
     assert!(law.p_value < 1e-3 && law.odds > 100.0 && law.confirmed > 3.0);
 }
 
+/// A jump of one channel, while another is read beside it: both are read in the first half of the time, so that a
+/// step in its middle is a constant of theirs.
+#[test]
+fn a_jump_of_one_of_two_channels_read_together_is_found() {
+    let range = reversal(4, |_| 0.0)
+        .places()
+        .iter()
+        .map(|p| p.time)
+        .fold(0.0, f64::max);
+    let law = told(&reversal(4, |p| {
+        if p.channel == 1 && p.time >= 0.2 * range {
+            1.5
+        } else {
+            0.0
+        }
+    }));
+    let [term] = law.terms.as_slice() else {
+        panic!("{law:?}");
+    };
+    assert_eq!(term.function, "step", "{law:?}");
+    assert_eq!((term.along, term.pattern.as_str()), (Some("time"), "1B"));
+}
+
+/// A curved indicator: the readings that the law is sought along are changed by it, by a tenth of themselves.
+#[test]
+fn a_law_along_the_reading_is_found_though_it_changes_the_reading() {
+    let observations = scene(6, 400e-6).measured(6);
+    let model = Linearised::new(&observations, Assumptions::default()).unwrap();
+    let steepest = model.observed().iamax();
+    let channel = model.places()[steepest].channel;
+    let truth = 0.1 / model.observed()[steepest].abs();
+    let places = model.places().iter().zip(model.observed());
+    let change = places.map(|(p, r)| {
+        if p.channel == channel {
+            truth * r * r
+        } else {
+            0.0
+        }
+    });
+    let change = DVector::from_iterator(model.places().len(), change);
+    let law = told(&model.refit(model.observed() + change));
+    let [term] = law.terms.as_slice() else {
+        panic!("{law:?}");
+    };
+    assert_eq!(term.function, "power 2", "{law:?}");
+    let name = &model.channel_names()[channel];
+    assert_eq!((term.along, &term.pattern), (Some("reading"), name));
+    let found = term
+        .parameters
+        .iter()
+        .find(|p| p.name == "amplitude")
+        .unwrap();
+    // The form of the law is exact; what the noise leaves is less: 1 % of its size.
+    assert!(
+        (found.value / truth - 1.0).abs() < 0.01,
+        "{found:?} {truth}"
+    );
+}
+
 /// A sum of two terms, by the change that it makes: what the formula that is told makes of every reading.
 #[test]
 fn a_sum_of_two_terms_is_found() {

@@ -107,3 +107,17 @@ fn any_number_of_threads_gives_the_same_severity() {
     assert_eq!(format!("{one:?}"), format!("{two:?}"));
     assert_eq!(one, two);
 }
+
+/// A circle reads the same all around: no error is a function of its reading, and lobes are none of themselves.
+#[test]
+fn what_reads_the_same_has_no_rival_along_the_reading() {
+    let mut makers = MAKERS.iter();
+    let circle = makers.find(|m| m.model == "circle").unwrap();
+    let smallest = seen_from(circle, "lobes", &options(0));
+    let diagnosis = (circle.diagnosed)(&[("lobes", 4.0 * smallest)], 3, &options(64));
+    let severity = only(&diagnosis);
+    assert_eq!(severity.effect, "lobes");
+    let names: Vec<&str> = severity.rivals.iter().map(|r| &r.name[..]).collect();
+    assert!(names.contains(&"smooth in position"), "{names:?}");
+    assert!(!names.contains(&"smooth in reading"), "{names:?}");
+}

@@ -151,6 +151,7 @@ impl Spikes {
         let usual = |(size, alone): &(f64, bool)| *alone || *size <= 3.0 * SIGMA * middle;
         let sizes: Vec<f64> = heights.into_iter().filter(usual).map(|h| h.0).collect();
         let n = sizes.len();
+        // Of readings that are not finite none is usual.
         if n == 0 {
             return None;
         }

@@ -4,9 +4,10 @@
 //! is how often the law is found exactly: the same class of expression, and a visible change equal to 1 % of its root
 //! mean square; and how often a law is told where there is none: in the noise, in Gaussian processes, in bumps.
 
-#[path = "../tests/other_models/mod.rs"]
+mod laws;
+#[path = "../../tests/other_models/mod.rs"]
 mod other_models;
-#[path = "../tests/scene/mod.rs"]
+#[path = "../../tests/scene/mod.rs"]
 mod scene;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,7 @@ use errsep_models::calibration_line::CalibrationLine;
 use errsep_models::circle::CirclePoints;
 use errsep_models::model::{Effect, FittedModel, Place, Shape};
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
+use laws::{At, CIRCLE, LINE, Listed, READING, REVERSAL};
 use nalgebra::DVector;
 use other_models::{calibration_line_made, circle_made};
 use rand::{RngExt, SeedableRng};
@@ -29,127 +31,6 @@ use statrs::distribution::{Beta, ContinuousCDF};
 const SEEN: [f64; 2] = [250.0, 1000.0];
 /// The same of gaps that are no law.
 const SEEN_SMOOTH: [f64; 2] = [30.0, 1000.0];
-
-/// What a law may ask of a reading: position and time over their ranges (0 to 1), the reading over half its range
-/// about zero, the direction, the channel.
-struct At {
-    x: f64,
-    t: f64,
-    r: f64,
-    d: f64,
-    c: usize,
-}
-
-/// Classes and coordinates of the terms that are right, the law with four parameters of chance in 0 to 1, and the
-/// parameter by which its uncertainty is judged: its name in the answer and the truth over the coordinate's range.
-type Listed = (
-    &'static [(&'static str, &'static str)],
-    fn(&At, &[f64; 4]) -> f64,
-    Option<(&'static str, fn(&[f64; 4]) -> f64)>,
-);
-
-fn one(a: &At, channel: usize) -> f64 {
-    f64::from(u8::from(a.c == channel))
-}
-
-fn from(value: f64, place: f64) -> f64 {
-    f64::from(u8::from(value >= place))
-}
-
-const REVERSAL: [Listed; 14] = [
-    (
-        &[("power 2", "position")],
-        |a, _| one(a, 0) * a.x * a.x,
-        None,
-    ),
-    (
-        &[("power 3", "position")],
-        |a, _| one(a, 3) * (a.x - 0.5).powi(3),
-        None,
-    ),
-    (
-        &[("absolute value", "position")],
-        |a, p| one(a, 1) * (a.x - 0.25 - 0.5 * p[0]).abs(),
-        Some(("origin", |p| 0.25 + 0.5 * p[0])),
-    ),
-    (
-        &[("step", "position")],
-        |a, p| one(a, 2) * from(a.x, 0.2 + 0.6 * p[0]),
-        None,
-    ),
-    (
-        &[("cosine", "position")],
-        |a, p| one(a, 0) * (TAU * a.x * (1.5 + 8.0 * p[0]) + TAU * p[1]).cos(),
-        Some(("period", |p| 1.0 / (1.5 + 8.0 * p[0]))),
-    ),
-    (&[("power 2", "position")], |a, _| a.d * a.x * a.x, None),
-    (
-        &[("cosine", "position")],
-        |a, p| a.d * one(a, 1) * (TAU * a.x * (2.0 + 18.0 * p[0]) + TAU * p[1]).cos(),
-        Some(("period", |p| 1.0 / (2.0 + 18.0 * p[0]))),
-    ),
-    (
-        &[("saturating exponential", "time")],
-        |a, p| 1.0 - (-a.t / (0.1 + 0.5 * p[0])).exp(),
-        Some(("constant", |p| 0.1 + 0.5 * p[0])),
-    ),
-    (
-        &[("growing exponential", "time")],
-        |a, p| one(a, 0) * ((a.t / (0.2 + 0.3 * p[0])).exp() - 1.0),
-        Some(("constant", |p| 0.2 + 0.3 * p[0])),
-    ),
-    (
-        &[("cosine", "time")],
-        |a, p| (TAU * a.t * (1.2 + 4.0 * p[0]) + TAU * p[1]).cos(),
-        Some(("period", |p| 1.0 / (1.2 + 4.0 * p[0]))),
-    ),
-    (
-        &[("step", "time")],
-        |a, p| one(a, 1) * from(a.t, 0.1 + 0.3 * p[0]),
-        None,
-    ),
-    (&[("power 2", "time")], |a, _| a.t * a.t, None),
-    (
-        &[("cosine", "time"), ("power 2", "position")],
-        |a, p| 4.0 * one(a, 0) * a.x * a.x + (TAU * a.t * (1.2 + 3.0 * p[0]) + TAU * p[1]).cos(),
-        Some(("period", |p| 1.0 / (1.2 + 3.0 * p[0]))),
-    ),
-    (
-        &[("constant", ""), ("step", "time")],
-        |a, p| 0.5 * a.d + one(a, 2) * from(a.t, 0.6 + 0.3 * p[0]),
-        None,
-    ),
-];
-
-/// Along the reading: readings are large here beside what the law changes.
-const READING: [Listed; 3] = [
-    (
-        &[("power 2", "reading")],
-        |a, _| one(a, 0) * a.r * a.r,
-        None,
-    ),
-    (&[("power 3", "reading")], |a, _| a.r.powi(3), None),
-    (&[("absolute value", "reading")], |a, _| a.r.abs(), None),
-];
-
-const LINE: [Listed; 2] = [
-    (
-        &[("cosine", "position")],
-        |a, p| (TAU * a.x * (1.3 + 5.0 * p[0]) + TAU * p[1]).cos(),
-        Some(("period", |p| 1.0 / (1.3 + 5.0 * p[0]))),
-    ),
-    (
-        &[("growing exponential", "position")],
-        |a, p| (a.x / (0.2 + 0.1 * p[0])).exp() - 1.0,
-        Some(("constant", |p| 0.2 + 0.1 * p[0])),
-    ),
-];
-
-const CIRCLE: [Listed; 1] = [(
-    &[("step", "time")],
-    |a, p| from(a.t, 0.2 + 0.6 * p[0]),
-    None,
-)];
 
 /// The circumstances of all readings. A reading is the mean of those that differ by nothing but noise.
 fn circumstances<M: FittedModel + 'static>(model: &M) -> Vec<At> {

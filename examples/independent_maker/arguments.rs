@@ -17,7 +17,7 @@ SET: one effect a case (default), or --pairs, --withheld, --nulls
 --from K      first number of a pair, a withheld case or a null (0)
 --design      shared, jittered, shifted, thinned, different-grids, three-channels, unequal-repeats
 --dump DIR    writes readings and set-up of every case too
---certificate works out of every effect not named alone whether the certificate tells it from others
+--certificate works out of every effect whether the certificate tells it from others
 --severity N  rivals of each family for the severity of names (0: left out)
 --frozen      allows seeds from 1000 on, which are run once, after thresholds are fixed";
 

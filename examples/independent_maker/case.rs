@@ -42,8 +42,10 @@ pub struct Case {
     pub observations: Observations,
     /// The same measurement without noise and without sources.
     pub undisturbed: Observations,
-    /// The same measurement with a quarter of the noise.
-    pub quieter: Observations,
+    /// Where and when they are taken.
+    pub schedule: Schedule,
+    /// What the sources change in each reading of each trace, µm.
+    pub change: Vec<Vec<f64>>,
     /// Thickness of the artefact, mm, where the set-up states it.
     pub thickness: Option<f64>,
     /// The noise.
@@ -56,9 +58,6 @@ pub struct Case {
 
 /// Least and greatest visible root mean square, in standard deviations of a reading.
 const VISIBLE: [f64; 2] = [0.7, 3.0];
-/// Part of the noise of the quieter measurement: of 4800 readings a difference of 4.65 standard deviations, which
-/// tells two effects apart, is then 19, and these stand out of the sum of the squares by more than three of its own.
-const QUIETER: f64 = 0.25;
 /// How near the visible part comes to what is wanted.
 const CLOSE: f64 = 0.003;
 
@@ -116,20 +115,16 @@ pub fn made(order: &Order) -> Case {
     let undisturbed = rig.readings(&schedule, &[]);
     let clean = rig.readings(&schedule, &sources);
     let written = noise.upon(&clean, &schedule, &mut chance);
-    let quieter = Noise {
-        sigma: QUIETER * noise.sigma,
-        resolution: QUIETER * noise.resolution,
-        ..noise
-    };
-    let quieter = quieter.upon(&clean, &schedule, &mut chance);
+    let change = difference(&clean, &undisturbed);
     Case {
         observations: observed(&schedule, &written),
         undisturbed: observed(&schedule, &undisturbed),
-        quieter: observed(&schedule, &quieter),
         thickness: (!tilted).then_some(rig.thickness),
         noise,
         truths,
-        gap: true_gap(&schedule, &difference(&clean, &undisturbed)),
+        gap: true_gap(&schedule, &change),
+        schedule,
+        change,
     }
 }
 

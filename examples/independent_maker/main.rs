@@ -18,6 +18,7 @@ mod physics;
 mod product;
 mod projection;
 mod rig;
+mod seen;
 mod sets;
 mod table;
 

@@ -1,12 +1,17 @@
 //! What is asked of the product, and what it says: all of the product that this example touches.
 
+use std::collections::HashMap;
 use std::time::Instant;
 
-use errsep::diagnosis::{NoiseLaw, NoiseSource, Options, certificate, diagnose};
+use errsep::diagnosis::{Components, NoiseLaw, Options, certificate, diagnose};
 use errsep_models::model::FittedModel;
-use errsep_models::reversal::Observations;
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
+use errsep_models::reversal::{Channel, Observations};
 use serde_json::Value;
+
+use crate::case::Case;
+use crate::design::Schedule;
+use crate::rig::Moment;
 
 /// What a diagnosis says, from its JSON.
 #[derive(Debug, Clone)]
@@ -25,6 +30,8 @@ pub struct Said {
     pub gap: f64,
     /// Sizes: effect, value, standard uncertainty, unit.
     pub sizes: Vec<(String, f64, f64, String)>,
+    /// What the effects named change in the readings, in the order of the traces; empty where none is named.
+    pub change: Vec<Vec<f64>>,
     /// How long it took, s.
     pub seconds: f64,
 }
@@ -86,16 +93,11 @@ fn model(readings: &Observations, thickness: Option<f64>) -> Result<Linearised, 
     Linearised::new(readings, assumptions).map_err(|e| e.to_string())
 }
 
-/// Diagnoses readings with a catalogue from which some effects are left out, with so many rivals of each
+/// Diagnoses the readings of a case with a catalogue from which some effects are left out, with so many rivals of each
 /// family for the severity of names.
-pub fn ask(
-    readings: &Observations,
-    thickness: Option<f64>,
-    without: &[&str],
-    (severity, seed): (usize, u64),
-) -> Result<Said, String> {
+pub fn ask(case: &Case, without: &[&str], (severity, seed): (usize, u64)) -> Result<Said, String> {
     let start = Instant::now();
-    let model = model(readings, thickness)?;
+    let model = model(&case.observations, case.thickness)?;
     let without = without.iter().map(|name| (*name).to_owned()).collect();
     let options = Options {
         seed,
@@ -105,8 +107,39 @@ pub fn ask(
     };
     let diagnosis = diagnose(&model, &options);
     let json = serde_json::to_value(&diagnosis).map_err(|e| e.to_string())?;
-    heard(&json, start.elapsed().as_secs_f64())
-        .ok_or_else(|| "an answer without a verdict".to_owned())
+    let mut said = heard(&json, start.elapsed().as_secs_f64())
+        .ok_or_else(|| "an answer without a verdict".to_owned())?;
+    if said.kind == "effect" {
+        said.change = at_moments(&case.schedule, &model, &diagnosis.detail.change);
+    }
+    Ok(said)
+}
+
+/// What is said of the model's readings, at those of the case: for each that of the same channel, repeat and direction
+/// at the nearest position.
+fn at_moments(schedule: &Schedule, model: &Linearised, said: &[f64]) -> Vec<Vec<f64>> {
+    let names = model.channel_names();
+    let mut traces: HashMap<(&str, u32, bool), Vec<(f64, f64)>> = HashMap::new();
+    for (place, value) in model.places().iter().zip(said) {
+        let key = (
+            names[place.channel].as_str(),
+            place.repeat,
+            place.direction > 0.0,
+        );
+        traces.entry(key).or_default().push((place.x, *value));
+    }
+    let of = |moment: Moment| {
+        let channel = Channel::ALL[moment.channel()].name();
+        let key = (channel, moment.repeat, moment.direction > 0.0);
+        let trace = traces.get(&key).into_iter().flatten();
+        let far = |x: f64| (x - moment.x).abs();
+        let nearest = trace.min_by(|a, b| far(a.0).total_cmp(&far(b.0)));
+        nearest.map_or(0.0, |(_, value)| *value)
+    };
+    let traces = schedule.traces.iter();
+    traces
+        .map(|trace| trace.moments().map(of).collect())
+        .collect()
 }
 
 fn heard(json: &Value, seconds: f64) -> Option<Said> {
@@ -145,6 +178,7 @@ fn heard(json: &Value, seconds: f64) -> Option<Said> {
         p_value: verdict.get("p_value")?.as_f64()?,
         gap: json.get("gap")?.get("before")?.get("rms")?.as_f64()?,
         sizes,
+        change: Vec::new(),
         seconds,
     })
 }
@@ -158,23 +192,27 @@ pub fn catalogue(readings: &Observations) -> Result<Vec<String>, String> {
         .collect())
 }
 
-/// Standard deviations between an effect of which `visible` µm shows and the effect most like it, after
-/// the product's own certificate; none where the certificate gives none.
-pub fn apart(
-    undisturbed: &Observations,
-    thickness: Option<f64>,
-    [sigma, visible]: [f64; 2],
-    effect: &str,
-) -> Option<f64> {
-    let model = model(undisturbed, thickness).ok()?;
-    let law = NoiseLaw::white(sigma, f64::INFINITY, NoiseSource::Stated);
+/// Standard deviations between the effect of a case, which is so many standard deviations from nothing, and the
+/// effect most like it, after the product's own certificate for the law of the case's noise; none where the
+/// certificate gives none.
+pub fn apart(case: &Case, seen: f64) -> Option<f64> {
+    let model = model(&case.undisturbed, case.thickness).ok()?;
+    let noise = &case.noise;
+    let variance = noise.sigma * noise.sigma;
+    let law = NoiseLaw::stated(Components {
+        white: variance * (1.0 - noise.correlated) + noise.resolution * noise.resolution / 12.0,
+        correlated: variance * noise.correlated,
+        length: noise.length,
+        shift: 0.0,
+    });
     let options = Options {
         draws: 200,
         ..Options::default()
     };
     let rows = certificate(&model, model.effects(), &law, &options);
+    let effect = case.truths.first()?.name;
     let row = rows.into_iter().find(|row| row.effect == effect)?;
-    // The certificate's visible root mean square belongs to the detectable amplitude.
-    let told_from = row.visible_rms? * row.identifiable? / row.detectable?;
-    Some(4.65 * visible / told_from)
+    // The certificate's visible root mean square, in units of the noise, belongs to the detectable amplitude.
+    let length = row.visible_rms? / law.sigma() * (model.places().len() as f64).sqrt();
+    Some(4.65 * seen / (length * row.identifiable? / row.detectable?))
 }

@@ -9,6 +9,7 @@ use std::sync::OnceLock;
 use nalgebra::{DMatrix, DVector};
 
 use crate::design::{POSITIONS, Schedule};
+use crate::rig::Moment;
 
 /// Signs of M and α, of β, and the surface of each channel 1A, 1B, 2A, 2B.
 const M: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
@@ -44,6 +45,30 @@ pub fn true_gap(schedule: &Schedule, change: &[Vec<f64>]) -> f64 {
     }
 }
 
+/// The cell of a reading.
+pub fn cell(schedule: &Schedule, moment: &Moment) -> usize {
+    let nearest = (moment.x / schedule.spacing).round().max(0.0) as usize;
+    moment.channel() * POSITIONS + nearest.min(POSITIONS - 1)
+}
+
+/// What the fit takes up of single readings: independent columns, one row a cell in use, and the row of each cell.
+pub fn absorbed(schedule: &Schedule) -> (DMatrix<f64>, Vec<usize>) {
+    let nothing: Vec<Vec<f64>> = schedule
+        .traces
+        .iter()
+        .map(|trace| vec![0.0; trace.moments().count()])
+        .collect();
+    let count = Cells::of(schedule, &nothing).count;
+    let mut basis = Absorbed::of(&count).basis;
+    let mut row_of = vec![0; count.len()];
+    let used = count.iter().enumerate().filter(|(_, n)| **n > 0.0);
+    for (row, (cell, n)) in used.enumerate() {
+        row_of[cell] = row;
+        basis.row_mut(row).scale_mut(1.0 / n.sqrt());
+    }
+    (basis, row_of)
+}
+
 impl Cells {
     fn of(schedule: &Schedule, change: &[Vec<f64>]) -> Self {
         let zero = vec![0.0; 4 * POSITIONS];
@@ -54,8 +79,7 @@ impl Cells {
         };
         for (trace, values) in schedule.traces.iter().zip(change) {
             for (moment, value) in trace.moments().zip(values) {
-                let nearest = (moment.x / schedule.spacing).round().max(0.0) as usize;
-                let cell = moment.channel() * POSITIONS + nearest.min(POSITIONS - 1);
+                let cell = cell(schedule, &moment);
                 cells.count[cell] += 1.0;
                 cells.sum[cell] += value;
                 cells.square[cell] += value * value;

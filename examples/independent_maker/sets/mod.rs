@@ -22,6 +22,10 @@ pub const LAWS: [Law; 4] = [
     Law::RoughForms,
 ];
 
+/// Standard deviations between two effects from which on they count as told apart: twice the 99 %
+/// quantile of the normal law.
+pub const APART: f64 = 4.65;
+
 /// Makes a case and writes it where that is asked for.
 pub fn prepared(arguments: &Arguments, order: &Order) -> Result<Case, String> {
     let case = made(order);

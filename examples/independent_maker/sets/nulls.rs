@@ -66,12 +66,7 @@ fn one(arguments: &Arguments, law: Law, number: u64) -> Result<Option<f64>, Stri
         design: arguments.design.1,
     };
     let case = prepared(arguments, &order)?;
-    let said = ask(
-        &case.observations,
-        case.thickness,
-        &[],
-        (arguments.severity, number),
-    );
+    let said = ask(&case, &[], (arguments.severity, number));
     if let Ok(said) = &said
         && said.p_value < 0.01
     {

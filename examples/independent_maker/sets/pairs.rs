@@ -59,12 +59,7 @@ fn one(arguments: &Arguments, namable: &[&'static Source], number: u64) -> Resul
         design: arguments.design.1,
     };
     let case = prepared(arguments, &order)?;
-    let said = ask(
-        &case.observations,
-        case.thickness,
-        &[],
-        (arguments.severity, number),
-    );
+    let said = ask(&case, &[], (arguments.severity, number));
     let outcome = both(&said, [first.name, second.name]);
     if outcome != Both::Exactly {
         let shows: Vec<String> = case

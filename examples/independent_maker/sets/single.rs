@@ -4,17 +4,14 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::{LAWS, ended, known, prepared};
+use super::{APART, LAWS, ended, known, prepared};
 use crate::arguments::Arguments;
 use crate::case::Order;
 use crate::judge::{OUTCOMES, Outcome, gap_right, outcome, size_off};
 use crate::physics::{SOURCES, Source};
 use crate::product::{apart, ask};
+use crate::seen::Seen;
 use crate::table::{print, rate};
-
-/// Standard deviations between two effects from which on they count as told apart: twice the 99 %
-/// quantile of the normal law.
-const APART: f64 = 4.65;
 
 /// What answers to a source are right.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -103,12 +100,7 @@ fn one(
         design: arguments.design.1,
     };
     let case = prepared(arguments, &order)?;
-    let said = ask(
-        &case.observations,
-        case.thickness,
-        &[],
-        (arguments.severity, seed),
-    );
+    let said = ask(&case, &[], (arguments.severity, seed));
     let truth = &case.truths[0];
     let judged = said.as_ref().ok();
     let mut row = Row {
@@ -142,9 +134,9 @@ fn one(
         }
     }
     let mut separation = String::new();
-    if arguments.certificate && class == Class::Listed && row.outcome != Outcome::Alone {
-        let sizes = [case.noise.sigma, truth.visible];
-        let apart = apart(&case.undisturbed, case.thickness, sizes, source.name);
+    if arguments.certificate && class == Class::Listed {
+        let seen = Seen::new(&case.schedule, &case.noise);
+        let apart = seen.and_then(|seen| apart(&case, seen.of(&case.change)));
         row.separable = Some(apart.is_some_and(|sd| sd >= APART));
         separation = apart.map_or(", not to be told apart".to_owned(), |sd| {
             format!(", {sd:.1} sd apart")
@@ -245,11 +237,11 @@ fn overall(rows: &[&Row], class: Class) {
         if rows.iter().any(|row| row.separable.is_some()) {
             let separable: Vec<&&Row> = rows
                 .iter()
-                .filter(|row| row.separable.unwrap_or(true))
+                .filter(|row| row.separable == Some(true))
                 .collect();
             let right = separable.iter().filter(|row| row.right()).count();
             lines.push(vec![
-                "right, of those right or told apart by the certificate".to_owned(),
+                "right, of those that the certificate tells apart".to_owned(),
                 rate(right, separable.len()),
             ]);
         }

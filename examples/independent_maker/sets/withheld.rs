@@ -4,11 +4,12 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::{LAWS, ended, known, namable, prepared};
+use super::{APART, LAWS, ended, known, namable, prepared};
 use crate::arguments::Arguments;
 use crate::case::{Case, Order};
 use crate::physics::Source;
 use crate::product::{Said, ask};
+use crate::seen::Seen;
 use crate::table::{print, rate};
 
 /// How an answer without the true effect's name stands.
@@ -113,22 +114,20 @@ fn one(
         design: arguments.design.1,
     };
     let case = prepared(arguments, &order)?;
-    let said = ask(
-        &case.observations,
-        case.thickness,
-        &[source.name],
-        (arguments.severity, number),
-    );
-    let outcome = match &said {
-        Err(_) => Withheld::Refused,
-        Ok(said) if said.kind == "unknown" => Withheld::Unknown,
-        Ok(said) if said.kind == "none" => Withheld::Nothing,
-        Ok(said) => blamed(&case, source.name, said, number)?,
+    let said = ask(&case, &[source.name], (arguments.severity, number));
+    let (outcome, apart) = match &said {
+        Err(_) => (Withheld::Refused, None),
+        Ok(said) if said.kind == "unknown" => (Withheld::Unknown, None),
+        Ok(said) if said.kind == "none" => (Withheld::Nothing, None),
+        Ok(said) => {
+            let (outcome, apart) = blamed(&case, source.name, said, number)?;
+            (outcome, Some(apart))
+        }
     };
-    if !matches!(outcome, Withheld::Unknown | Withheld::Alias) {
+    if outcome != Withheld::Unknown {
         let truth = &case.truths[0];
         println!(
-            "--withheld --seed {} --from {number} --cases 1{}: {}/{which} ({}), {}, shows {:.2} noise: {}",
+            "--withheld --seed {} --from {number} --cases 1{}: {}/{which} ({}), {}, shows {:.2} noise: {}{}",
             arguments.seed,
             arguments
                 .only
@@ -138,26 +137,29 @@ fn one(
             truth.what,
             law.name(),
             truth.visible / case.noise.sigma,
-            said.map_or_else(|what| what, |said| said.in_words())
+            said.map_or_else(|what| what, |said| said.in_words()),
+            apart.map_or(String::new(), |sd| format!(", {sd:.1} sd apart")),
         );
     }
     Ok((source.name, outcome))
 }
 
-/// How an answer stands that names others. Aliases are what the whole catalogue puts into the group of the
-/// effect, and what would still be named with a quarter of the noise.
-fn blamed(case: &Case, effect: &str, said: &Said, number: u64) -> Result<Withheld, String> {
-    let whole = ask(&case.observations, case.thickness, &[], (0, number))?;
+/// How an answer stands that names others. What is named cannot be told from the withheld effect where the whole
+/// catalogue puts it into one group with that, or where what the effect changes and what is named, at its best size,
+/// are less than [`APART`] standard deviations apart in what shows beside the noise.
+fn blamed(case: &Case, effect: &str, said: &Said, number: u64) -> Result<(Withheld, f64), String> {
+    let seen = Seen::new(&case.schedule, &case.noise);
+    let apart = seen.map_or(f64::INFINITY, |s| s.beside(&case.change, &said.change));
+    let whole = ask(case, &[], (0, number))?;
     let own = |group: &Vec<String>| group.iter().any(|name| name == effect);
-    let mut aliases = whole.causes().into_iter().find(own).unwrap_or_default();
-    let quieter = ask(&case.quieter, case.thickness, &[effect], (0, number))?;
-    aliases.extend(quieter.causes().concat());
+    let aliases = whole.causes().into_iter().find(own).unwrap_or_default();
     let told = |group: &[String]| group.iter().all(|name| !aliases.contains(name));
-    Ok(if !said.causes().iter().any(|group| told(group)) {
+    let outcome = if apart < APART || !said.causes().iter().any(|group| told(group)) {
         Withheld::Alias
     } else if said.is_strong(told) {
         Withheld::Strong
     } else {
         Withheld::Another
-    })
+    };
+    Ok((outcome, apart))
 }

@@ -16,7 +16,8 @@ pub struct AnyModel(Box<dyn Behind>);
 impl AnyModel {
     /// A copy of a model.
     pub fn new<M: FittedModel + 'static>(model: &M) -> Self {
-        Self(Box::new(model.clone()))
+        let any = (model as &dyn Any).downcast_ref::<Self>();
+        any.map_or_else(|| Self(Box::new(model.clone())), Self::clone)
     }
 
     /// Effects of a model as effects of any.
@@ -26,8 +27,17 @@ impl AnyModel {
     pub fn effects_of<M: FittedModel + 'static>(
         effects: Vec<Box<dyn Effect<M>>>,
     ) -> Vec<Box<dyn Effect<Self>>> {
+        let effects: Box<dyn Any> = Box::new(effects);
+        let effects = match effects.downcast::<Vec<Box<dyn Effect<Self>>>>() {
+            Ok(known) => return *known,
+            Err(effects) => effects.downcast::<Vec<Box<dyn Effect<M>>>>(),
+        };
         let any = |effect| Box::new(AnyEffect(effect)) as Box<dyn Effect<Self>>;
-        effects.into_iter().map(any).collect()
+        effects
+            .into_iter()
+            .flat_map(|known| *known)
+            .map(any)
+            .collect()
     }
 
     /// The model itself. Models and effects of one diagnosis are of one kind: both come from one call.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use errsep_models::calibration_line::{CalibrationLine, CalibrationReading, LackOfFit};
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use serde::Deserialize;
 
 use super::Args;
@@ -55,7 +55,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
             readings.len(),
             model.traces().len()
         ),
-        model,
+        model: AnyModel::new(&model),
         along: "x",
         notes,
         inputs: Vec::new(),
@@ -63,7 +63,8 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     .answer_with(args, |plan| {
         Some(
             read(&plan.data, &plan.columns.map())
-                .and_then(|readings| fitted(&readings, noise, plan)),
+                .and_then(|readings| fitted(&readings, noise, plan))
+                .map(|model| AnyModel::new(&model)),
         )
     })
 }

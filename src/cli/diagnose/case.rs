@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use errsep_models::model::{Effect, FittedModel, Place};
+use errsep_models::model::{AnyModel, Effect, FittedModel, Place};
 
 use serde_json::{Value, json};
 
@@ -18,8 +18,8 @@ use crate::io::{CsvTable, Message, OutFile, SetupFile, Status};
 use crate::report::diagnosis as sheet;
 
 /// A fitted model and what people should know of it.
-pub(super) struct Case<M> {
-    pub model: M,
+pub(super) struct Case {
+    pub model: AnyModel,
     /// What the readings are, in words.
     pub readings: String,
     /// Name of the positions, for axes of plots.
@@ -29,7 +29,7 @@ pub(super) struct Case<M> {
     pub inputs: Vec<PathBuf>,
 }
 
-impl<M: FittedModel + 'static> Case<M> {
+impl Case {
     /// Diagnoses the case.
     pub(super) fn answer(self, args: &Args) -> Result<Answer, Message> {
         self.answer_with(args, |_| None)
@@ -39,7 +39,7 @@ impl<M: FittedModel + 'static> Case<M> {
     pub(super) fn answer_with(
         self,
         args: &Args,
-        plan: impl Fn(&Args) -> Option<Result<M, Message>>,
+        plan: impl Fn(&Args) -> Option<Result<AnyModel, Message>>,
     ) -> Result<Answer, Message> {
         within_reach_of(&self.model, self.along, &args.data)?;
         if let Some(seal) = &args.check {
@@ -203,10 +203,10 @@ fn tell_learnt(
 }
 
 /// The model's effects and the user's own.
-pub(super) fn catalogue<M: FittedModel + 'static>(
+pub(super) fn catalogue(
     args: &Args,
-    model: &M,
-) -> Result<Vec<Box<dyn Effect<M>>>, Message> {
+    model: &AnyModel,
+) -> Result<Vec<Box<dyn Effect<AnyModel>>>, Message> {
     let mut catalogue = model.effects();
     for effect in own_effects(args, model)? {
         catalogue.push(Box::new(effect));
@@ -215,10 +215,7 @@ pub(super) fn catalogue<M: FittedModel + 'static>(
 }
 
 /// The user's own effects.
-fn own_effects<M: FittedModel + 'static>(
-    args: &Args,
-    model: &M,
-) -> Result<Vec<Tabulated>, Message> {
+fn own_effects(args: &Args, model: &AnyModel) -> Result<Vec<Tabulated>, Message> {
     let Some(path) = &args.effects else {
         return Ok(Vec::new());
     };
@@ -253,11 +250,7 @@ fn own_effects<M: FittedModel + 'static>(
 }
 
 /// What the fit leaves of every reading, without and with the effects.
-pub(super) fn residuals<M: FittedModel + 'static>(
-    model: &M,
-    before: &[f64],
-    after: &[f64],
-) -> CsvTable {
+pub(super) fn residuals(model: &AnyModel, before: &[f64], after: &[f64]) -> CsvTable {
     let places = model.places();
     let numbers = |value: fn(&Place) -> f64| -> Vec<f64> { places.iter().map(value).collect() };
     let suffix = |unit: &str| match unit {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use serde_json::json;
 
 use super::Args;
@@ -20,7 +20,7 @@ use crate::report::number::percent;
 use crate::report::plot::{Axis, Chart, Series};
 use crate::report::{self, Cell, Figure, Page, Section, Table};
 
-impl<M: FittedModel + 'static> Case<M> {
+impl Case {
     /// The score of the readings against a seal.
     pub(super) fn checked(self, args: &Args, seal: &SealFile) -> Result<Answer, Message> {
         let options = Options {
@@ -205,7 +205,7 @@ fn gaps(found: &Checked) -> Vec<(&'static str, &CheckedGap)> {
 /// By channel: positions, and what the readings there differ by in units of half their band.
 type Missed = Vec<(String, Vec<f64>, Vec<f64>)>;
 
-fn missed<M: FittedModel + 'static>(model: &M, found: &Checked) -> Missed {
+fn missed(model: &AnyModel, found: &Checked) -> Missed {
     let of = |(channel, name): (usize, String)| {
         let own = model.places().iter().zip(&found.missed);
         let own = own.filter(|(p, m)| p.channel == channel && m.is_some());
@@ -283,7 +283,7 @@ fn page(
     .section(section)
 }
 
-fn table<M: FittedModel + 'static>(model: &M, channels: &[String], found: &Checked) -> CsvTable {
+fn table(model: &AnyModel, channels: &[String], found: &Checked) -> CsvTable {
     let rows: Vec<_> = model.places().iter().zip(&found.missed).collect();
     let numbers = |of: &dyn Fn(&(f64, f64)) -> f64| -> Vec<f64> {
         rows.iter()

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use errsep_models::circle::{CircleError, CirclePoints, Point};
+use errsep_models::model::AnyModel;
 use serde::Deserialize;
 
 use super::Args;
@@ -62,7 +63,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     let circle = model.circle();
     Case {
         readings: format!("{} points", points.len()),
-        model,
+        model: AnyModel::new(&model),
         along: "angle",
         notes: vec![format!(
             "Centre and radius are given as they move from the circle of all points: centre ({:.6}, {:.6}) mm, radius {:.6} mm.",

@@ -1,6 +1,7 @@
 //! Outputs of four sensors.
 
 use errsep_models::four_sensor::FourSensors;
+use errsep_models::model::AnyModel;
 
 use super::Args;
 use super::case::Case;
@@ -43,7 +44,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
             measured.outputs.readings().len(),
             measured.repeats
         ),
-        model,
+        model: AnyModel::new(&model),
         along: "slide position",
         notes: vec!["Surface, straightness and tilt are free at every position: what all sensors share in pairs of them cannot be seen.".to_owned()],
         inputs: Vec::new(),

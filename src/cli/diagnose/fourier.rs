@@ -1,6 +1,7 @@
 //! Scans of the Fourier three-sensor method.
 
 use errsep_models::fourier::{Compensation, FourierScans, Scan, Section};
+use errsep_models::model::AnyModel;
 
 use super::Args;
 use super::case::Case;
@@ -48,7 +49,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         .map_err(|e| told(&e).in_file(&args.data))?;
     Case {
         readings: format!("{} scans of {} probe spacings", scans.len(), model.spacings().len()),
-        model,
+        model: AnyModel::new(&model),
         along: "slide position",
         notes: vec!["The readings are differences of two probes, free of the slide; their noise is that of two readings. A step at the joint that all spacings share is the slope of the workpiece.".to_owned()],
         inputs: Vec::new(),

@@ -3,7 +3,6 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use errsep_models::model::FittedModel;
 use serde_json::Value;
 
 use super::case::{Case, catalogue, residuals};
@@ -16,7 +15,7 @@ use crate::io::{CsvTable, Message, Status};
 use crate::report::diagnosis as sheet;
 use crate::report::number::probability;
 
-impl<M: FittedModel + 'static> Case<M> {
+impl Case {
     /// The fit with the effects that are given.
     pub(super) fn with_effects(self, args: &Args) -> Result<(Answer, Joined), Message> {
         let options = Options {

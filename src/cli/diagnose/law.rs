@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use serde_json::{Value, json};
 
 use super::Args;
@@ -35,8 +35,8 @@ pub(super) struct Sought {
 ///
 /// # Errors
 /// The verdict is not `unknown`, or there are no repeats to hold out; the file cannot be written.
-pub(super) fn sought<M: FittedModel + 'static>(
-    model: &M,
+pub(super) fn sought(
+    model: &AnyModel,
     args: &Args,
     file: Option<(&Path, OutFile)>,
     diagnosis: &Diagnosis,
@@ -91,7 +91,7 @@ fn formula(law: &Law) -> &str {
     law.effect.formula.as_ref().map_or("", |f| f.text())
 }
 
-fn as_json<M: FittedModel + 'static>(model: &M, law: &Law) -> Value {
+fn as_json(model: &AnyModel, law: &Law) -> Value {
     json!({
         "found": true,
         "effect": law.effect.name,
@@ -124,7 +124,7 @@ fn forms(tried: [usize; 2]) -> String {
     )
 }
 
-fn in_words<M: FittedModel + 'static>(model: &M, law: &Law) -> String {
+fn in_words(model: &AnyModel, law: &Law) -> String {
     let unit = for_people(model.reading_unit());
     let mut text = format!(
         "Law `{}`: {}{}, {} {unit} RMS.",

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 use serde_json::{Value, json};
 
 use super::Args;
@@ -24,8 +24,8 @@ use crate::report::number::{percent, plain, probability};
 /// # Errors
 /// The verdict is not `unknown`, or the readings do not tell what the gap is bound to; the file cannot be
 /// written.
-pub(super) fn learnt<M: FittedModel + 'static>(
-    model: &M,
+pub(super) fn learnt(
+    model: &AnyModel,
     args: &Args,
     (place, file): (&Path, OutFile),
     diagnosis: &Diagnosis,
@@ -111,7 +111,7 @@ pub(super) fn only_unknown(
 }
 
 /// The effect's name: that of its file.
-pub(super) fn named<M: FittedModel + 'static>(place: &Path, model: &M) -> Result<String, Message> {
+pub(super) fn named(place: &Path, model: &AnyModel) -> Result<String, Message> {
     let stem = place.file_stem().map(|stem| stem.to_string_lossy());
     let name = stem.unwrap_or_default().trim().to_owned();
     let known = model.effects();
@@ -129,7 +129,7 @@ pub(super) fn named<M: FittedModel + 'static>(place: &Path, model: &M) -> Result
 ///
 /// # Errors
 /// The file changed while it was read.
-pub(super) fn seen<M: FittedModel + 'static>(model: &M, args: &Args) -> Result<Seen, Message> {
+pub(super) fn seen(model: &AnyModel, args: &Args) -> Result<Seen, Message> {
     let (mut files, mut digests) = (Vec::new(), Vec::new());
     for file in args.files() {
         let Read256::Digest(sha256) = digest_of(file) else {
@@ -188,7 +188,7 @@ fn refused(why: &NotLearnt, data: &Path) -> Message {
     })
 }
 
-fn in_words<M: FittedModel + 'static>(model: &M, learnt: &Learnt) -> String {
+fn in_words(model: &AnyModel, learnt: &Learnt) -> String {
     let others: Vec<&HeldOutAlong> = learnt.ways.iter().skip(1).collect();
     let mut text = format!(
         "Learnt as `{}`: a smooth function of {}, {} {} RMS.",
@@ -234,8 +234,8 @@ fn in_words<M: FittedModel + 'static>(model: &M, learnt: &Learnt) -> String {
 }
 
 /// How the learnt effects of a file fare on readings that they were not learnt from.
-pub(super) fn all_tested<M: FittedModel + 'static>(
-    model: &M,
+pub(super) fn all_tested(
+    model: &AnyModel,
     args: &Args,
     effects: &[Tabulated],
     options: &Options,

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use errsep_models::machine::{Alignment, MeasuredParts};
+use errsep_models::model::AnyModel;
 
 use super::Args;
 use super::case::Case;
@@ -44,7 +45,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         along: "coordinate",
         notes,
         inputs: args.more.iter().chain(&args.points).cloned().collect(),
-        model,
+        model: AnyModel::new(&model),
     }
     .answer(args)
 }

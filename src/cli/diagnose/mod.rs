@@ -24,7 +24,7 @@ pub(super) mod words;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use errsep_models::model::{FittedModel, Place};
+use errsep_models::model::{AnyModel, FittedModel, Place};
 
 use super::{Answer, ColumnArgs, CommonArgs};
 use crate::io::Message;
@@ -267,11 +267,7 @@ fn within_reach(what: &str, value: f64, at: &str, args: &Args) -> Result<(), Mes
 }
 
 /// The same for every reading, position and time of a model; `along`: name of the positions.
-pub(super) fn within_reach_of<M: FittedModel>(
-    model: &M,
-    along: &str,
-    file: &Path,
-) -> Result<(), Message> {
+pub(super) fn within_reach_of(model: &AnyModel, along: &str, file: &Path) -> Result<(), Message> {
     let at = |place: &Place| format!("{along} = {:e}", place.x);
     for (reading, place) in model.observed().iter().zip(model.places()) {
         within_reach_in("a reading", *reading, &at(place), file)?;

@@ -1,6 +1,6 @@
 //! The page of a diagnosis of any model.
 
-use errsep_models::model::{FittedModel, Place};
+use errsep_models::model::{AnyModel, FittedModel, Place};
 
 use super::words::{harm_in_words, moved, shown};
 use crate::diagnosis::{
@@ -8,12 +8,7 @@ use crate::diagnosis::{
 };
 use crate::report::diagnosis as sheet;
 
-pub fn view<M: FittedModel>(
-    data: String,
-    model: &M,
-    along: &str,
-    diagnosis: &Diagnosis,
-) -> sheet::View {
+pub fn view(data: String, model: &AnyModel, along: &str, diagnosis: &Diagnosis) -> sheet::View {
     let size = |s: crate::diagnosis::Size| sheet::Size {
         rms: s.rms,
         ci95: s.ci95,
@@ -63,12 +58,7 @@ pub fn view<M: FittedModel>(
 }
 
 /// What the page shows of a fit that effects have joined; the statement is the caller's.
-pub(super) fn of_fit<M: FittedModel>(
-    data: String,
-    model: &M,
-    along: &str,
-    fit: &Joined,
-) -> sheet::View {
+pub(super) fn of_fit(data: String, model: &AnyModel, along: &str, fit: &Joined) -> sheet::View {
     let size = |s: crate::diagnosis::Size| sheet::Size {
         rms: s.rms,
         ci95: s.ci95,
@@ -119,7 +109,7 @@ fn fitted(effect: &JoinedEffect) -> sheet::Candidate {
     }
 }
 
-fn residuals<M: FittedModel>(model: &M, before: &[f64], after: &[f64]) -> Vec<sheet::Residual> {
+fn residuals(model: &AnyModel, before: &[f64], after: &[f64]) -> Vec<sheet::Residual> {
     let channels = model.channel_names();
     let rows = RowNames::of(model.places());
     let pairs = before.iter().zip(after);

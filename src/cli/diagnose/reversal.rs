@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use errsep_models::model::{FittedModel, Place};
+use errsep_models::model::{AnyModel, FittedModel, Place};
 use errsep_models::reversal::Direction;
 use errsep_models::reversal::designs::{self, DesignFit};
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised, NotDiagnosable};
@@ -50,7 +50,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     let notes = notes(&model);
     let gathered = readings_of_one(&model);
     let mut answer = Case {
-        model,
+        model: AnyModel::new(&model),
         readings: data.in_words(),
         along: ALONG,
         notes,
@@ -66,6 +66,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
 fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<Answer, Message> {
     let model = design_model(setup, data, None).map_err(|why| refusal(&why).in_file(&args.data))?;
     let design = &data.observations.design;
+    let gathered = readings_of_one(&model);
     let case = Case {
         readings: format!(
             "{}; {} channels of {} indicators in {} positions of the spindle",
@@ -75,11 +76,10 @@ fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<An
             design.positions().len()
         ),
         notes: with_crest(setup, notes(&model)),
-        model,
+        model: AnyModel::new(&model),
         along: ALONG,
         inputs: Vec::new(),
     };
-    let gathered = readings_of_one(&case.model);
     let mut answer = case.answer_with(args, |plan| Some(planned(plan, setup, gathered)))?;
     let names = named(&answer.json);
     if args.with.is_empty() && !names.is_empty() {
@@ -105,7 +105,7 @@ fn readings_of_one(model: &Linearised) -> f64 {
 const ALIKE: f64 = 0.1;
 
 /// The model of a plan; `gathered`: how many readings of the measurement stand for one.
-fn planned(plan: &Args, setup: &ReversalSetup, gathered: f64) -> Result<Linearised, Message> {
+fn planned(plan: &Args, setup: &ReversalSetup, gathered: f64) -> Result<AnyModel, Message> {
     let model = match read_any(&plan.data, setup)? {
         Readings::Four(data) => Linearised::new(&data.observations, assumptions(setup)),
         Readings::Other(data) => design_model(setup, &data, None),
@@ -128,7 +128,7 @@ fn planned(plan: &Args, setup: &ReversalSetup, gathered: f64) -> Result<Linearis
         .in_file(&plan.data)
         .remedy("plan the positions that were measured"));
     }
-    Ok(model)
+    Ok(AnyModel::new(&model))
 }
 
 /// The fitted model of a design, with the fit of its readings where there is one.
@@ -179,16 +179,16 @@ pub fn design_with(
 ) -> Result<(Answer, Option<Vec<f64>>), Message> {
     let model =
         design_model(setup, data, Some(fit)).map_err(|why| refusal(&why).in_file(given.data))?;
-    within_reach_of(&model, ALONG, given.data)?;
     let places = Arc::clone(&model.record().places);
     let whole = model.gathered.is_none() && model.left_out == 0;
     let case = Case {
         readings: data.in_words(),
         notes: notes(&model),
-        model,
+        model: AnyModel::new(&model),
         along: ALONG,
         inputs: Vec::new(),
     };
+    within_reach_of(&case.model, ALONG, given.data)?;
     let (joined, fitted) = case.with_effects(&given.args())?;
     let changes = whole.then(|| by_reading(data, &places, &fitted.change));
     Ok((followed_by(answer, joined), changes))

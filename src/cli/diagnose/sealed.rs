@@ -5,7 +5,7 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::AnyModel;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -149,21 +149,21 @@ fn text_of(place: &Path) -> Result<String, Message> {
 }
 
 /// A seal that is begun: its file can be written, its plan is read.
-pub(super) struct Seal<M> {
+pub(super) struct Seal {
     place: PathBuf,
     file: OutFile,
-    plan: M,
+    plan: AnyModel,
     planned: Digested,
 }
 
-impl<M: FittedModel + 'static> Seal<M> {
+impl Seal {
     /// Begins a seal where one is asked for.
     ///
     /// # Errors
     /// The file cannot be written, the plan is bad, or the model cannot be sealed.
     pub fn begun(
         args: &Args,
-        plan: impl Fn(&Args) -> Option<Result<M, Message>>,
+        plan: impl Fn(&Args) -> Option<Result<AnyModel, Message>>,
     ) -> Result<Option<Self>, Message> {
         let (Some(place), Some(next)) = (&args.seal, &args.next) else {
             return Ok(None);
@@ -205,7 +205,7 @@ impl<M: FittedModel + 'static> Seal<M> {
     /// Nothing explains the gap, or what is planned does not follow from the readings.
     pub fn written(
         self,
-        model: &M,
+        model: &AnyModel,
         args: &Args,
         diagnosis: &Diagnosis,
         options: &Options,

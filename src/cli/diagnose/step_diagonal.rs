@@ -1,7 +1,7 @@
 //! Step-diagonal readings.
 
 use errsep_models::diagonal::DiagonalRuns;
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, FittedModel};
 
 use super::Args;
 use super::case::Case;
@@ -27,7 +27,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
             readings.len(),
             model.traces().len()
         ),
-        model,
+        model: AnyModel::new(&model),
         along: "along the diagonal",
         notes,
         inputs: Vec::new(),

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use errsep_models::model::AnyModel;
 use errsep_models::reversal::designs::DesignFit;
 use errsep_models::reversal::diagnosable::Linearised;
 use errsep_models::reversal::simultaneous::Simultaneous;
@@ -19,7 +20,7 @@ const HEADING: &str = "Where and why model and readings disagree";
 
 /// A diagnosis with the model that it is of.
 pub struct Diagnosed {
-    model: Linearised,
+    model: AnyModel,
     diagnosis: Diagnosis,
     data: String,
 }
@@ -54,14 +55,16 @@ impl Diagnosed {
     }
 
     fn made(file: &Path, model: Linearised, seed: u64) -> Result<Self, Message> {
-        within_reach_of(&model, reversal::ALONG, file)?;
         let options = Options {
             seed,
             severity: RIVALS,
             ..Options::default()
         };
+        let notes = reversal::notes(&model);
+        let model = AnyModel::new(&model);
+        within_reach_of(&model, reversal::ALONG, file)?;
         let mut diagnosis = diagnose(&model, &options);
-        diagnosis.notes.extend(reversal::notes(&model));
+        diagnosis.notes.extend(notes);
         Ok(Self {
             model,
             diagnosis,

@@ -138,7 +138,7 @@ impl NoiseLaw {
     }
 
     /// A law that is known from elsewhere.
-    pub(in crate::diagnosis) fn stated(parts: Components) -> Self {
+    pub fn stated(parts: Components) -> Self {
         Self {
             white: parts.white,
             correlated: parts.correlated,

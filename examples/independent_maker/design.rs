@@ -120,6 +120,26 @@ impl Schedule {
     }
 }
 
+impl Schedule {
+    /// The ends of what all traces have, where their positions differ.
+    pub fn common_ends(&self) -> Option<[f64; 2]> {
+        let read = |trace: &Trace| {
+            let mut at: Vec<f64> = trace.moments().map(|moment| moment.x).collect();
+            at.sort_by(f64::total_cmp);
+            at
+        };
+        let grids: Vec<Vec<f64>> = self.traces.iter().map(read).collect();
+        let one = grids.windows(2).all(|pair| pair[0] == pair[1]);
+        let low = grids.iter().filter_map(|at| at.first().copied());
+        let high = grids.iter().filter_map(|at| at.last().copied());
+        let ends = [
+            low.fold(f64::NEG_INFINITY, f64::max),
+            high.fold(f64::INFINITY, f64::min),
+        ];
+        (!one && ends[0] < ends[1]).then_some(ends)
+    }
+}
+
 fn first(traces: &[Trace], position: usize) -> f64 {
     times(traces, position).fold(f64::INFINITY, f64::min)
 }

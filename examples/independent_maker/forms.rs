@@ -11,6 +11,9 @@ pub struct Form {
     line: [f64; 2],
 }
 
+/// Rounds in which ends are laid on the line that they move.
+const ROUNDS: usize = 4;
+
 /// Distance of the grid's points, mm.
 const PITCH: f64 = 0.05;
 /// How far a form reaches beyond the measured travel at either end, mm.
@@ -71,6 +74,21 @@ impl Form {
         self.line[0] -= level - slope * middle;
         self.line[1] -= slope;
         self
+    }
+
+    /// The same with both ends on that line, by polynomials of the second and third degree that have none.
+    pub fn ended_on_line(mut self, touched: &[[f64; 2]], ends: [f64; 2]) -> Self {
+        let [middle, half] = [(ends[0] + ends[1]) / 2.0, (ends[1] - ends[0]) / 2.0];
+        for _ in 0..ROUNDS {
+            self = self.without_line(touched);
+            let [low, high] = ends.map(|x| self.at(x));
+            let (even, odd) = ((low + high) / 2.0, (high - low) / 2.0);
+            for (k, value) in self.values.iter_mut().enumerate() {
+                let t = (place(k) - middle) / half;
+                *value -= even * (1.5 * t * t - 0.5) + odd * (2.5 * t * t - 1.5) * t;
+            }
+        }
+        self.without_line(touched)
     }
 
     /// The form with a texture finer than most spacings of readings.

@@ -164,6 +164,8 @@ pub struct Rig {
 impl Rig {
     /// The rig with forms that have no straight line as they are touched in the first spindle position:
     /// where the slide or the artefact is shifted, a line would come in that is a cone of no one's making.
+    /// Where traces have positions of their own, of those that all have within their ends, and the forms begin and
+    /// end on it: a line beneath them is then the same however the ends and what lies between count.
     pub fn levelled(&self, schedule: &Schedule, sources: &[Disturbance]) -> Self {
         let mut touched = Vec::new();
         let read = schedule.traces.iter().flat_map(Trace::moments);
@@ -183,7 +185,13 @@ impl Rig {
             touched.push([moment.x, moment.x + place - axial]);
         }
         let mut rig = self.clone();
-        rig.surfaces = rig.surfaces.map(|form| form.without_line(&touched));
+        rig.surfaces = match schedule.common_ends() {
+            None => rig.surfaces.map(|form| form.without_line(&touched)),
+            Some(ends) => {
+                touched.retain(|pair| (ends[0]..=ends[1]).contains(&pair[0]));
+                rig.surfaces.map(|form| form.ended_on_line(&touched, ends))
+            }
+        };
         rig
     }
 

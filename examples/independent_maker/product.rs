@@ -115,11 +115,14 @@ pub fn ask(case: &Case, without: &[&str], (severity, seed): (usize, u64)) -> Res
     Ok(said)
 }
 
+/// Positions with values.
+type Profile = Vec<(f64, f64)>;
+
 /// What is said of the model's readings, at those of the case: for each that of the same channel, repeat and direction
 /// at the nearest position.
 fn at_moments(schedule: &Schedule, model: &Linearised, said: &[f64]) -> Vec<Vec<f64>> {
     let names = model.channel_names();
-    let mut traces: HashMap<(&str, u32, bool), Vec<(f64, f64)>> = HashMap::new();
+    let mut traces: HashMap<(&str, u32, bool), Profile> = HashMap::new();
     for (place, value) in model.places().iter().zip(said) {
         let key = (
             names[place.channel].as_str(),

@@ -233,3 +233,58 @@ fn traces_without_a_common_stretch_are_told() {
         Err(NotDiagnosable::RangesDiffer | NotDiagnosable::NoFit(_))
     ));
 }
+
+/// A channel with fewer repeats than another costs no name: how smooth the forms are is asked of repeats that all
+/// channels have. Cycles along the reading are seen wrongly by forms that are taken for smoother than they are.
+#[test]
+fn channels_may_have_unequal_repeats() {
+    let mut random = ChaCha8Rng::seed_from_u64(16);
+    let noise = Normal::new(0.0, 0.01).unwrap();
+    let (alpha, beta, gamma) = (31e-6, -12e-6, 45e-6);
+    let mut readings = Vec::new();
+    for (channel, repeats) in [
+        (Channel::C1A, 2),
+        (Channel::C1B, 3),
+        (Channel::C2A, 3),
+        (Channel::C2B, 2),
+    ] {
+        let (i, spindle) = (channel.indicator_sign(), channel.spindle_sign());
+        let side = if channel.is_side_a() { 1.0 } else { -1.0 };
+        for repeat in 1..=repeats {
+            for direction in [Direction::Forward, Direction::Backward] {
+                for x in (0..60).map(|k| 4.0 * f64::from(k)) {
+                    let m = 0.9 * ((x - 130.0) / 35.0f64).tanh() + 0.3 * (x / 19.0f64).sin();
+                    let s = side * 0.5 * (-((x - 70.0) / 25.0f64).powi(2)).exp();
+                    let slope = i * alpha + spindle * beta + i * spindle * gamma;
+                    let mut value = 1e3 * slope * x + i * m + s + 2.0 * i;
+                    if i > 0.0 {
+                        value += 0.15 * (value / 0.5).cos();
+                    }
+                    readings.push(Reading {
+                        channel,
+                        repeat,
+                        direction,
+                        time: None,
+                        x,
+                        value: value + noise.sample(&mut random),
+                    });
+                }
+            }
+        }
+    }
+    let diagnosis = diagnosed(&Observations { readings });
+    let verdict = &diagnosis.verdict;
+    assert_eq!(verdict.effects, ["cyclic-error"], "{}", verdict.statement);
+    let cycles = diagnosis
+        .candidates
+        .iter()
+        .find(|c| c.effect == "cyclic-error");
+    let found = &cycles.unwrap().parameters[0];
+    // Statistical: four standard uncertainties of one seed.
+    assert!(
+        (found.value - 0.15).abs() < 4.0 * found.std,
+        "{} ± {}",
+        found.value,
+        found.std
+    );
+}

@@ -159,11 +159,7 @@ impl Linearised {
     fn roughness(&self) -> Vec<Vec<f64>> {
         let n = self.positions.len();
         let nothing = vec![vec![0.0; n - 1]; self.forms.len()];
-        let of = |repeat: &u32| {
-            let means = self.channel_means(&self.record.observed, Some(*repeat));
-            self.arrangement.forms(&means, n)
-        };
-        let repeats: Vec<Vec<DVector<f64>>> = self.repeats.iter().filter_map(of).collect();
+        let repeats = self.forms_of_repeats();
         if repeats.len() < 2 || n < 2 * WINDOW {
             return nothing;
         }

@@ -60,8 +60,8 @@ pub fn least_squares<'py>(
     let raised = Raised::default();
     let stop = Arc::new(AtomicBool::new(false));
     let options = options(py, &asked, jacobian.is_some(), &stop)?;
-    let at_start = residuals_of(py, &residuals, &start)?;
     let interrupts = Arc::new(Interrupts::watch(py)?);
+    let at_start = residuals_of(py, &residuals, &start)?;
     let problem = Stated {
         names: asked.names.clone(),
         residuals,

@@ -152,7 +152,7 @@ IN_A_THREAD = """
     import os, signal, sys, threading
     import errsep
 
-    ended, over, other = [], threading.Event(), threading.Event()
+    ended, over, other, pressed = [], *(threading.Event() for _ in range(3))
     def work():
         try:
             {call}
@@ -166,6 +166,7 @@ IN_A_THREAD = """
         {wait}
     except KeyboardInterrupt:
         ended.append("the main thread")
+    pressed.set()
     over.wait()
     print(sorted(ended), flush=True)
     sys.exit(3)
@@ -182,8 +183,8 @@ def test_ctrl_c_ends_a_call_from_another_thread(call: str, tmp_path: Path) -> No
         # Opens when the call reads, and never writes.
         wait = 'end = os.open(sys.argv[1], os.O_WRONLY); print("at work", flush=True); over.wait()'
     else:
-        # Fits without end.
-        call = "while True: errsep.least_squares(lambda p: [other.set() or p[0], 1.0], [1.0])"
+        # The function answers when Ctrl-C has been pressed, in the midst of the fit.
+        call = "errsep.least_squares(lambda p: [p[0], other.set() or pressed.wait()], [1.0])"
         wait = 'other.wait(); print("at work", flush=True); over.wait()'
     told = interrupted(python(IN_A_THREAD.format(call=call, wait=wait), pipe))
     assert told == "['the call', 'the main thread']\n"

@@ -126,6 +126,9 @@ impl Held {
     }
 
     fn statistic(&self, seen: &Seen<'_>) -> f64 {
+        if !self.part.is_visible(&seen.context.space) {
+            return 0.0;
+        }
         let gram = self.part.product(&self.part, &seen.context.space) - self.along.norm_squared();
         statistic(
             &DMatrix::from_element(1, 1, gram),

@@ -4,6 +4,8 @@
 //! of the noise: no other effect, no place. All causes that pass are the confidence set (the
 //! inversion of the test); significance alone names nothing. Of several each must earn its place.
 
+use std::ops::Range;
+
 use errsep_models::model::Shape;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -12,7 +14,7 @@ use crate::diagnosis::attribution::context::{Cause, Context, Remainder, raw_sign
 use crate::diagnosis::attribution::limits::is_beyond_limit;
 use crate::diagnosis::attribution::outweighed::{Member, drop_outweighed};
 use crate::diagnosis::attribution::shrink::held_out_square;
-use crate::diagnosis::attribution::sizes::Sizes;
+use crate::diagnosis::attribution::sizes::{Sizes, first_amplitude};
 use crate::diagnosis::detection::space::{Space, orthonormal};
 use crate::diagnosis::levels::{
     BENT, EARNED, EQUAL_EVIDENCE, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, STANDS, WEIGHTY,
@@ -86,7 +88,8 @@ pub(in crate::diagnosis) fn confidence_set(
     }
 }
 
-/// Whether each of some causes is needed beside the others, is no other effect at its limit, and has a size.
+/// Whether each of some causes is needed beside the others, is no other effect at its limit, and has a size
+/// that is possible.
 pub(in crate::diagnosis) fn stand_together(
     context: &Context<'_>,
     readings: &DVector<f64>,
@@ -100,6 +103,7 @@ pub(in crate::diagnosis) fn stand_together(
             })
             && predicts(context, readings, causes);
     needed
+        && has_possible_sizes(context, readings, causes, 0..causes.len())
         && (0..causes.len()).all(|k| is_beyond_limit(context, readings, causes, k))
         && sized(context, readings, causes)
 }
@@ -225,7 +229,8 @@ fn alternatives(
             };
             let left = context.judged(readings, &trial);
             let misfit = left.square;
-            let passes = context.adequate(&trial, &left)
+            let passes = has_possible_sizes(context, readings, &trial, k..k + 1)
+                && context.adequate(&trial, &left)
                 && is_beyond_limit(context, readings, &trial, k)
                 && Sizes::fitted(context, readings, &trial)
                     .is_some_and(|sizes| stands(context, &trial, &sizes, k));
@@ -342,20 +347,31 @@ pub(in crate::diagnosis) fn possible(
 ) -> bool {
     let mut all = others.to_vec();
     all.push(cause.clone());
-    let Some((amplitudes, covariance)) = context.amplitudes(readings, &all) else {
+    has_possible_sizes(context, readings, &all, others.len()..all.len())
+}
+
+/// Whether some of several causes, all fitted together, have physically possible sizes.
+pub(in crate::diagnosis) fn has_possible_sizes(
+    context: &Context<'_>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    mut which: Range<usize>,
+) -> bool {
+    let Some((amplitudes, covariance)) = context.amplitudes(readings, causes) else {
         return false;
     };
-    let own = cause.projected.ncols();
-    let from = amplitudes.len() - own;
-    let stds: Vec<f64> = (from..amplitudes.len())
-        .map(|k| covariance[(k, k)].max(0.0).sqrt())
-        .collect();
-    context.plausible(
-        cause.effect,
-        &cause.shape,
-        &amplitudes.as_slice()[from..],
-        &stds,
-    )
+    let stds = covariance.diagonal().map(|v| v.max(0.0).sqrt());
+    which.all(|k| {
+        let cause = &causes[k];
+        let from = first_amplitude(causes, k);
+        let own = from..from + cause.projected.ncols();
+        context.plausible(
+            cause.effect,
+            &cause.shape,
+            &amplitudes.as_slice()[own.clone()],
+            &stds.as_slice()[own],
+        )
+    })
 }
 
 /// The causes but one.

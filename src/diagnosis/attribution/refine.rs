@@ -151,17 +151,24 @@ impl<'s> Seen<'s> {
         }
     }
 
-    /// Statistic, EᵀPE and score of a shape.
+    /// Statistic, EᵀPE and score of a shape; nothing stands out of one that the fit takes up whole.
     pub fn value(&self, shape: &Shape) -> (f64, DMatrix<f64>, DVector<f64>) {
         let columns = self.effect.columns(self.state, shape);
-        let mut gram = self.context.space.gram(&columns).matrix;
+        let gram = self.context.space.gram(&columns);
+        let visible = gram.is_visible();
+        let mut gram = gram.matrix;
         for direction in &self.directions {
             let along = products(&columns, direction);
             gram -= &along * along.transpose();
         }
         let score = products(&columns, &self.adjoint);
         let positive = is_positive(self.effect, shape);
-        (statistic(&gram, &score, positive), gram, score)
+        let statistic = if visible {
+            statistic(&gram, &score, positive)
+        } else {
+            0.0
+        };
+        (statistic, gram, score)
     }
 
     /// The best shape from a start, settled, and its statistic; one that settles to another variant is

@@ -6,6 +6,7 @@ use std::borrow::Cow;
 use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 
+use crate::diagnosis::attribution::confidence::has_possible_sizes;
 use crate::diagnosis::attribution::context::{Cause, Context, finer};
 use crate::diagnosis::attribution::mixing::Mixing;
 
@@ -59,6 +60,10 @@ impl Context<'_> {
             let misfit = self.misfit(readings, &causes);
             let gained = best.0 - misfit;
             if round > 0 && gained < 0.2 * (misfit - hopeless) {
+                break;
+            }
+            // A size that nothing bounds grows with the state that it bends.
+            if !has_possible_sizes(self, readings, &causes, 0..causes.len()) {
                 break;
             }
             if misfit < best.0 {

@@ -7,6 +7,7 @@ use errsep_models::model::Column;
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::detection::space::Space;
+use crate::diagnosis::levels::INVISIBLE;
 
 impl Space {
     /// EᵀPE of sparse signatures without ever making P L⁻¹E: the cost is that of the traces in
@@ -157,6 +158,13 @@ pub(in crate::diagnosis) struct Gram {
     pub whole: f64,
 }
 
+impl Gram {
+    /// Whether the fit leaves of the signatures more than rounding.
+    pub fn is_visible(&self) -> bool {
+        self.matrix.trace() > INVISIBLE * self.whole
+    }
+}
+
 /// A whitened column and what the fit absorbs of it.
 #[derive(Clone)]
 pub(in crate::diagnosis) struct Part {
@@ -169,6 +177,11 @@ pub(in crate::diagnosis) struct Part {
 }
 
 impl Part {
+    /// Whether the fit leaves more than rounding of it.
+    pub fn is_visible(&self, space: &Space) -> bool {
+        self.product(self, space) > INVISIBLE * self.square
+    }
+
     /// Eᵢᵀ L⁻ᵀ P L⁻¹ Eⱼ.
     pub fn product(&self, other: &Self, space: &Space) -> f64 {
         let whole: f64 = if std::ptr::eq(self, other) {

@@ -291,19 +291,20 @@ impl Seen {
 /// M, `S_A` and `S_B` from the channels' residuals; with fewer channels the part that they show.
 fn forms_of_four(residual: &[Option<DVector<f64>>; 4], n: usize) -> [DVector<f64>; 3] {
     let [a1, b1, a2, b2] = residual;
-    let mean = |first: &Option<DVector<f64>>, second: &Option<DVector<f64>>| match (first, second) {
-        (Some(p), Some(q)) => (p + q) / 2.0,
-        (Some(p), None) | (None, Some(p)) => p.clone(),
-        (None, None) => DVector::zeros(n),
-    };
-    let s_a = mean(a1, a2);
-    let s_b = mean(b1, b2);
     let m = match (a1, b1, a2, b2) {
         (Some(a1), Some(b1), Some(a2), Some(b2)) => (a1 - b1 - a2 + b2) / 4.0,
         (Some(a1), _, Some(a2), _) => (a1 - a2) / 2.0,
         (_, Some(b1), _, Some(b2)) => (b2 - b1) / 2.0,
         _ => DVector::zeros(n),
     };
+    // Two channels of a side see M with opposite signs, one alone has it still.
+    let side = |plus: &Option<DVector<f64>>, minus: &Option<DVector<f64>>| match (plus, minus) {
+        (Some(p), Some(q)) => (p + q) / 2.0,
+        (Some(p), None) => p - &m,
+        (None, Some(q)) => q + &m,
+        (None, None) => DVector::zeros(n),
+    };
+    let (s_a, s_b) = (side(a1, a2), side(b2, b1));
     [m, s_a, s_b]
 }
 
@@ -333,4 +334,31 @@ pub fn indicator_name(angle: f64) -> String {
         || format!("{}°", angle_name(angle)),
         |(_, name)| (*name).to_owned(),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::forms_of_four;
+
+    /// Any three of the channels show all forms, as the four do.
+    #[test]
+    fn three_channels_show_the_forms() {
+        let of = |values: [f64; 3]| DVector::from_row_slice(&values);
+        let (m, s_a, s_b) = (
+            of([1.0, -2.0, 1.0]),
+            of([0.3, 0.0, -0.3]),
+            of([-0.5, 1.0, -0.5]),
+        );
+        let all = [&s_a + &m, &s_b - &m, &s_a - &m, &s_b + &m];
+        for missing in 0..4 {
+            let read = [0, 1, 2, 3].map(|c| (c != missing).then(|| all[c].clone()));
+            let found = forms_of_four(&read, 3);
+            for (form, truth) in found.iter().zip([&m, &s_a, &s_b]) {
+                // Rounding.
+                assert!((form - truth).amax() < 1e-15, "{missing}: {form}");
+            }
+        }
+    }
 }

@@ -234,3 +234,50 @@ impl<'s> Seen<'s> {
         (shape, t)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use errsep_models::model::{AnyModel, FittedModel};
+    use errsep_models::reversal::Channel;
+    use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
+    use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::Seen;
+    use crate::diagnosis::attribution::context::Context;
+    use crate::diagnosis::detection::estimate::estimate;
+
+    /// *Exact*: a bump in all repeats of one of three channels is a form, of which the fit leaves rounding; the same bump
+    /// in one repeat is seen.
+    #[test]
+    fn nothing_stands_out_of_what_the_fit_takes_up() {
+        let noise = SceneNoise {
+            white: 0.1,
+            correlated: 0.0,
+            length: 20.0,
+            shift: 0.0,
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(2);
+        let scene = Scene::random(40, 3, 1e-5, 2.0, noise, &mut random);
+        let mut observations = scene.measured(4);
+        observations.readings.retain(|r| r.channel != Channel::C2A);
+        let fitted = Linearised::new(&observations, Assumptions::default()).unwrap();
+        let model = AnyModel::new(&fitted);
+        let catalogue = model.effects();
+        let readings = model.linearised();
+        let law = estimate(&model, &readings);
+        let context = Context::new(&model, &catalogue, law, 40, 1);
+        let name = "local-contamination";
+        let effect = catalogue.iter().position(|e| e.name() == name).unwrap();
+        let seen = Seen::of(&context, &model, &readings, effect, &[]);
+        let in_words = |shape: &_| catalogue[effect].variant_name(&model, shape).unwrap();
+        let bumps = catalogue[effect].grid(&model).into_iter();
+        let statistics: Vec<(bool, f64)> = bumps
+            .map(|shape| (in_words(&shape).contains("repeat"), seen.value(&shape).0))
+            .collect();
+        assert!(statistics.iter().any(|(repeat, t)| *repeat && *t > 0.0));
+        assert!(statistics.iter().any(|(repeat, _)| !repeat));
+        assert!(statistics.iter().all(|(repeat, t)| *repeat || *t == 0.0));
+    }
+}

@@ -307,8 +307,8 @@ fn channels_may_have_unequal_repeats() {
     );
 }
 
-/// Three channels show what differs between repeats and directions, whatever side one channel alone has seen. A chip in
-/// all repeats of a channel is a form there: what is sought about one that came later must not end at it.
+/// Three channels show what differs between repeats and directions, on the side too that one channel alone has seen: a play
+/// of the slide, and a chip that came between two repeats.
 #[test]
 fn three_channels_show_what_differs() {
     let three = [Channel::C1A, Channel::C1B, Channel::C2B].map(|c| (c, 4));
@@ -328,8 +328,8 @@ fn three_channels_show_what_differs() {
         let diagnosis = diagnosed(&observations);
         let verdict = &diagnosis.verdict;
         assert_eq!(verdict.effects, [name], "{}", verdict.statement);
-        // The readings themselves have no more.
-        assert!(diagnosis.gap.before.rms < 0.2, "{}", verdict.statement);
+        // Limit: neither changes a reading by more than 0.12 µm.
+        assert!(diagnosis.gap.before.rms < 0.12, "{}", verdict.statement);
         let own = diagnosis.candidates.iter().find(|c| c.effect == name);
         let found = &own.unwrap().parameters[0];
         // Statistical: four standard uncertainties of one seed.

@@ -126,10 +126,10 @@ impl Held {
     }
 
     fn statistic(&self, seen: &Seen<'_>) -> f64 {
-        if !self.part.is_visible(&seen.context.space) {
+        let Some(square) = self.part.visible_square(&seen.context.space) else {
             return 0.0;
-        }
-        let gram = self.part.product(&self.part, &seen.context.space) - self.along.norm_squared();
+        };
+        let gram = square - self.along.norm_squared();
         statistic(
             &DMatrix::from_element(1, 1, gram),
             &DVector::from_element(1, self.score),

@@ -159,7 +159,7 @@ pub(in crate::diagnosis) struct Gram {
 }
 
 impl Gram {
-    /// Whether the fit leaves of the signatures more than rounding.
+    /// Whether the fit leaves enough of the signatures to be looked for.
     pub fn is_visible(&self) -> bool {
         self.matrix.trace() > INVISIBLE * self.whole
     }
@@ -177,9 +177,10 @@ pub(in crate::diagnosis) struct Part {
 }
 
 impl Part {
-    /// Whether the fit leaves more than rounding of it.
-    pub fn is_visible(&self, space: &Space) -> bool {
-        self.product(self, space) > INVISIBLE * self.square
+    /// What the fit leaves of its square; nothing where that is too little to be looked for.
+    pub fn visible_square(&self, space: &Space) -> Option<f64> {
+        let left = self.product(self, space);
+        (left > INVISIBLE * self.square).then_some(left)
     }
 
     /// Eᵢᵀ L⁻ᵀ P L⁻¹ Eⱼ.

@@ -121,7 +121,7 @@ impl Schedule {
 }
 
 impl Schedule {
-    /// The ends of what all traces have, where their positions differ.
+    /// The ends of what all traces have, where their positions are not those of one grid.
     pub fn common_ends(&self) -> Option<[f64; 2]> {
         let read = |trace: &Trace| {
             let mut at: Vec<f64> = trace.moments().map(|moment| moment.x).collect();
@@ -129,7 +129,11 @@ impl Schedule {
             at
         };
         let grids: Vec<Vec<f64>> = self.traces.iter().map(read).collect();
-        let one = grids.windows(2).all(|pair| pair[0] == pair[1]);
+        let mut distinct = grids.concat();
+        distinct.sort_by(f64::total_cmp);
+        // The same position is worked out from either end.
+        distinct.dedup_by(|a, b| (*a - *b).abs() < 1e-6 * self.spacing);
+        let one = distinct.len() <= POSITIONS;
         let low = grids.iter().filter_map(|at| at.first().copied());
         let high = grids.iter().filter_map(|at| at.last().copied());
         let ends = [

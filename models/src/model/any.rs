@@ -77,6 +77,7 @@ trait Behind: Send + Sync {
     fn expected_scatter(&self) -> &[Column];
     fn rounding(&self) -> f64;
     fn stated_noise(&self) -> Option<f64>;
+    fn noise_allowance(&self) -> f64;
     fn refit(&self, observed: DVector<f64>) -> Box<dyn Behind>;
     fn refit_as_smooth(&self, observed: DVector<f64>) -> Box<dyn Behind>;
     fn as_read(&self) -> Box<dyn Behind>;
@@ -151,6 +152,9 @@ impl<M: FittedModel + 'static> Behind for M {
     }
     fn stated_noise(&self) -> Option<f64> {
         FittedModel::stated_noise(self)
+    }
+    fn noise_allowance(&self) -> f64 {
+        FittedModel::noise_allowance(self)
     }
     fn refit(&self, observed: DVector<f64>) -> Box<dyn Behind> {
         Box::new(FittedModel::refit(self, observed))
@@ -239,6 +243,9 @@ impl FittedModel for AnyModel {
     }
     fn stated_noise(&self) -> Option<f64> {
         self.0.stated_noise()
+    }
+    fn noise_allowance(&self) -> f64 {
+        self.0.noise_allowance()
     }
     fn refit(&self, observed: DVector<f64>) -> Self {
         Self(self.0.refit(observed))

@@ -271,6 +271,12 @@ pub trait FittedModel: Clone + Send + Sync {
         None
     }
 
+    /// By how much the white variance of what traces have in common exceeds what their differences show:
+    /// more than one where readings are not each of their own.
+    fn noise_allowance(&self) -> f64 {
+        1.0
+    }
+
     /// The same model fitted to other values of the same readings.
     fn refit(&self, observed: DVector<f64>) -> Self;
 

@@ -285,7 +285,11 @@ pub fn notes(model: &Linearised) -> Vec<String> {
             if channels.len() == 1 { "is" } else { "are" }
         ));
     }
-    if let Some(gathered) = &model.gathered {
+    let carried = model
+        .gathered
+        .as_ref()
+        .filter(|gathered| gathered.filled == 0);
+    if let Some(gathered) = carried {
         notes.push(format!(
             "The traces have {}: their readings were carried to {} common places by the simultaneous fit, {} readings to each; noise is that of their mean.",
             if gathered.readings_per_cell > 1.5 {
@@ -295,6 +299,15 @@ pub fn notes(model: &Linearised) -> Vec<String> {
             },
             gathered.cells,
             number::plain(gathered.readings_per_cell, 2)
+        ));
+    }
+    let filled = model
+        .gathered
+        .as_ref()
+        .map_or(0, |gathered| gathered.filled);
+    if filled > 0 {
+        notes.push(format!(
+            "{filled} readings that single traces lack at places which the others have were put in, by what the traces of their channel have in common; they bring nothing of their own, so the noise is told greater than the repeats show it, and uncertainties with it."
         ));
     }
     if model.left_out > 0 {

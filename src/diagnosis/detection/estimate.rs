@@ -21,6 +21,11 @@ const NEIGHBOUR_DRAWS: usize = 64;
 /// The law that is stated, or that the repeats of a model's readings follow, or what stands in
 /// for it.
 pub(in crate::diagnosis) fn estimate(model: &AnyModel, readings: &DVector<f64>) -> NoiseLaw {
+    shown(model, readings).whiter(model.noise_allowance())
+}
+
+/// The same as the differences of traces show it.
+fn shown(model: &AnyModel, readings: &DVector<f64>) -> NoiseLaw {
     if let Some(sigma) = model.stated_noise() {
         return NoiseLaw::white(sigma, f64::INFINITY, NoiseSource::Stated);
     }
@@ -123,9 +128,10 @@ pub(in crate::diagnosis) fn neighbour_scatter(
     // Variance of (e₋ − 2e₀ + e₊)/√6 under the law; the fit has taken its part of the white noise.
     let correlated = law.correlated * (6.0 - 8.0 * along + 2.0 * along * along) / 6.0;
     let kept = space.degrees_of_freedom() as f64 / space.readings().max(1) as f64;
+    let white = law.white / model.noise_allowance();
     Some(Scatter {
         seen,
-        expected: (kept * (law.white + correlated)).sqrt(),
+        expected: (kept * (white + correlated)).sqrt(),
         relative_std: (0.5 / freedom + 0.5 / law.freedom.max(1.0)).sqrt(),
     })
 }

@@ -187,6 +187,17 @@ impl NoiseLaw {
         }
     }
 
+    /// The law with another white variance, by a factor.
+    pub(in crate::diagnosis) fn whiter(mut self, factor: f64) -> Self {
+        if factor != 1.0 {
+            self.white *= factor;
+            let mut laws = self.possible.to_vec();
+            laws.iter_mut().for_each(|law| law.white *= factor);
+            self.possible = Arc::new(laws);
+        }
+        self
+    }
+
     /// The law with heavy tails of the single readings.
     pub(in crate::diagnosis) fn with_tails(mut self, tails: Option<Tails>) -> Self {
         self.tails = tails;

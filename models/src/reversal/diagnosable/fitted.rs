@@ -158,6 +158,15 @@ impl FittedModel for Linearised {
         self.assumptions.noise.map(|noise| noise / readings.sqrt())
     }
 
+    /// Of n readings of a mean a part f was put in: (1 − f)n tell it, and those put in add a remainder each,
+    /// σ²(1/((1 − f)n) + f/n) in place of σ²/n.
+    fn noise_allowance(&self) -> f64 {
+        self.gathered.as_ref().map_or(1.0, |gathered| {
+            let share = gathered.filled as f64 / self.record.places.len() as f64;
+            1.0 / (1.0 - share) + share
+        })
+    }
+
     fn refit(&self, observed: DVector<f64>) -> Self {
         let mut fitted = self.clone();
         fitted.record.observed = observed;

@@ -3,12 +3,15 @@
 //! The diagnosis compares traces position by position. Where traces have positions of their own, or
 //! more of them than can be told apart, the mean of what the simultaneous fit leaves of the readings
 //! in a cell, beside what that fit makes of the cell's centre, stands for one reading there: the fit
-//! carries readings over the distance from where they were taken, whatever the slope. Cost is linear in readings.
+//! carries readings over the distance from where they were taken, whatever the slope. Effects act where they were
+//! taken. Where most traces have most positions in common, the readings that single traces lack are put in
+//! (`filling.rs`) and every position stays. Cost is linear in readings.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::arrangement::Arrangement;
-use super::sorting::{TraceKey, trace_key};
+use super::filling::{self, Lane};
+use super::sorting::{TraceKey, position_key, trace_key};
 use super::{Assumptions, NotDiagnosable};
 use crate::reversal::designs::{self, DesignFit, DesignObservations, DesignOptions, DesignReading};
 use crate::reversal::simultaneous::{self, Knots, Noise, Options, Simultaneous, Thickness};
@@ -20,6 +23,10 @@ const MOST_READINGS: usize = 5000;
 const CELLS: (usize, usize) = (150, 400);
 /// Positions are gathered for want of speed only where that is worth their detail.
 const WORTH: f64 = 1.5;
+/// Readings that are lacking are put in where that keeps so many times the cells.
+const WORTH_FILLING: f64 = 1.2;
+/// Part of a spacing that readings may be off a cell's centre and count as taken there.
+const CENTRED: f64 = 1e-3;
 /// Least share of the readings at positions that all traces have for the rest to be left out.
 const SHARED: f64 = 0.95;
 
@@ -32,8 +39,15 @@ pub struct Gathered {
     pub readings_per_cell: f64,
     /// Readings that no cell holds: outside the range that all traces have.
     pub beyond: usize,
+    /// Readings that single traces lack, which were put in.
+    pub filled: usize,
     /// Time that the readings of each cell of each trace took, s, in the order of the readings made.
     pub(super) spans: Vec<f64>,
+    /// The readings made that were put in, ascending.
+    pub(super) lacking: Vec<usize>,
+    /// How far from the centres of their cells the readings made were taken in the mean, mm; empty where
+    /// all were taken there.
+    pub(super) away: Vec<f64>,
 }
 
 impl Gathered {
@@ -41,6 +55,8 @@ impl Gathered {
     pub(super) fn planned(self) -> Self {
         Self {
             spans: Vec::new(),
+            lacking: Vec::new(),
+            away: Vec::new(),
             ..self
         }
     }
@@ -158,71 +174,133 @@ pub(super) fn gather(
     for rows in traces.values_mut() {
         rows.sort_by(|a, b| readings[*a].x.total_cmp(&readings[*b].x));
     }
-    drop_short(&mut traces, readings);
-    let edges = edges(&traces, readings).ok_or(NotDiagnosable::RangesDiffer)?;
+    let mut kept = traces.clone();
+    drop_short(&mut kept, readings);
+    let strict = edges(&kept, readings);
+    let cells = strict.as_ref().map_or(0, |edges| edges.len() - 1);
+    let edges = match edges_to_fill(&traces, readings) {
+        Some(edges) if (edges.len() - 1) as f64 > WORTH_FILLING * cells as f64 => edges,
+        _ => {
+            traces = kept;
+            strict.ok_or(NotDiagnosable::RangesDiffer)?
+        }
+    };
+    let members: Vec<(TraceKey, Vec<&[usize]>)> = (traces.iter())
+        .map(|(key, rows)| (*key, by_cell(rows, readings, &edges)))
+        .collect();
     let cells = edges.len() - 1;
     let mut sums = vec![(0.0, 0.0); cells];
-    let mut members: Vec<(TraceKey, Vec<&[usize]>)> = Vec::new();
-    for (key, rows) in &traces {
-        let inside = by_cell(rows, readings, &edges);
-        for (sum, own) in sums.iter_mut().zip(&inside) {
+    for (_, inside) in &members {
+        for (sum, own) in sums.iter_mut().zip(inside) {
             sum.0 += own.iter().map(|k| readings[*k].x).sum::<f64>();
             sum.1 += own.len() as f64;
         }
-        members.push((*key, inside));
     }
     let centres: Vec<f64> = sums.iter().map(|(sum, count)| sum / count).collect();
-    let names = observations.design.channels();
     let residuals = fit.residuals();
+    let lanes: Vec<Lane> = (members.iter())
+        .map(|(key, inside)| {
+            let left = |own: &&[usize]| mean(own, |k| residuals[k]);
+            (*key, inside.iter().map(left).collect())
+        })
+        .collect();
+    let left = filling::filled(&lanes);
+    let names = observations.design.channels();
     let mut made = Vec::new();
-    let mut spans = Vec::new();
-    for ((channel, repeat, backward), inside) in &members {
-        for (own, centre) in inside.iter().zip(&centres) {
-            let count = own.len() as f64;
-            let mean =
-                |value: &dyn Fn(usize) -> f64| own.iter().map(|k| value(*k)).sum::<f64>() / count;
-            let there = fit.predict(*channel, &names[*channel].name, *centre)?;
-            let times: Option<Vec<f64>> = own.iter().map(|k| readings[*k].time).collect();
+    let (mut spans, mut away) = (Vec::new(), Vec::new());
+    for ((key, inside), left) in members.iter().zip(&left) {
+        let (channel, repeat, backward) = *key;
+        let times = times_of(inside, readings);
+        for (k, own) in inside.iter().enumerate() {
+            let there = fit.predict(channel, &names[channel].name, centres[k])?;
             made.push(DesignReading {
-                channel: *channel,
-                repeat: *repeat,
-                direction: if *backward {
+                channel,
+                repeat,
+                direction: if backward {
                     Direction::Backward
                 } else {
                     Direction::Forward
                 },
-                time: times.as_ref().map(|t| t.iter().sum::<f64>() / count),
-                x: *centre,
-                value: there + mean(&|k| residuals[k]),
+                time: times.as_ref().map(|times| times[k]),
+                x: centres[k],
+                value: there + left[k],
             });
-            let (first, last) = times
-                .iter()
-                .flatten()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| {
-                    (low.min(*t), high.max(*t))
-                });
-            // Readings that follow each other evenly take one interval more than lies between the
-            // first and the last; without times each cell takes a second.
-            let span = match times {
-                Some(_) if count > 1.0 => (last - first) * count / (count - 1.0),
-                None if count > 1.0 => 1.0,
-                _ => 0.0,
-            };
-            spans.push(span.max(0.0));
+            spans.push(span_of(own, readings));
+            away.push(mean(own, |k| readings[k].x).map_or(0.0, |x| x - centres[k]));
         }
     }
+    let spacing = (edges[cells] - edges[0]) / cells as f64;
+    if away.iter().all(|off| off.abs() < CENTRED * spacing) {
+        away.clear();
+    }
     let held: f64 = sums.iter().map(|(_, count)| count).sum();
+    let own = members.iter().flat_map(|(_, inside)| inside).enumerate();
+    let lacking: Vec<usize> = (own.filter(|(_, own)| own.is_empty()))
+        .map(|(k, _)| k)
+        .collect();
+    let filled = lacking.len();
     let gathered = Gathered {
         cells,
-        readings_per_cell: held / (cells * traces.len()) as f64,
+        readings_per_cell: held / (made.len() - filled) as f64,
         beyond: readings.len() - held as usize,
+        filled,
         spans,
+        lacking,
+        away,
     };
     let made = DesignObservations {
         design: observations.design.clone(),
         readings: made,
     };
     Ok((made, gathered))
+}
+
+/// The mean over rows, where there are any.
+fn mean(rows: &[usize], value: impl Fn(usize) -> f64) -> Option<f64> {
+    let sum: f64 = rows.iter().map(|k| value(*k)).sum();
+    (!rows.is_empty()).then(|| sum / rows.len() as f64)
+}
+
+/// The mean time of each cell of a trace, s, where all readings have one; of a cell without readings that
+/// between its neighbours.
+fn times_of(inside: &[&[usize]], readings: &[DesignReading]) -> Option<Vec<f64>> {
+    let timed = |own: &&[usize]| own.iter().all(|k| readings[*k].time.is_some());
+    if !inside.iter().all(timed) {
+        return None;
+    }
+    let known: Vec<(f64, f64)> = (inside.iter().enumerate())
+        .filter_map(|(k, own)| {
+            let time = mean(own, |k| readings[k].time.unwrap_or(f64::NAN))?;
+            Some((k as f64, time))
+        })
+        .collect();
+    let at = |k: usize| {
+        let k = k as f64;
+        let next = known.partition_point(|(cell, _)| *cell < k);
+        if let Some((_, time)) = known.get(next).filter(|(cell, _)| *cell == k) {
+            return *time;
+        }
+        // Beyond the ends on the line of the two nearest.
+        let from = next.clamp(1, known.len() - 1);
+        let ((a, s), (b, t)) = (known[from - 1], known[from]);
+        s + (t - s) * (k - a) / (b - a)
+    };
+    (known.len() > 1).then(|| (0..inside.len()).map(at).collect())
+}
+
+/// The time that the readings of a cell took, s: readings that follow each other evenly take one interval more than
+/// lies between the first and the last; without times each cell takes a second.
+fn span_of(own: &[usize], readings: &[DesignReading]) -> f64 {
+    let count = own.len() as f64;
+    if count < 2.0 {
+        return 0.0;
+    }
+    let times: Option<Vec<f64>> = own.iter().map(|k| readings[*k].time).collect();
+    times.map_or(1.0, |times| {
+        let first = times.iter().copied().fold(f64::INFINITY, f64::min);
+        let last = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        ((last - first) * count / (count - 1.0)).max(0.0)
+    })
 }
 
 /// Leaves out traces so short that the others together lose more readings by them than they bring;
@@ -328,6 +406,42 @@ fn edges(traces: &Traces, readings: &[DesignReading]) -> Option<Vec<f64>> {
         even
     };
     (best.len() > super::FEWEST_POSITIONS).then_some(best)
+}
+
+/// Edges of cells about the positions that at least half of the traces have, where there are few and what
+/// single traces lack can be put in.
+fn edges_to_fill(traces: &Traces, readings: &[DesignReading]) -> Option<Vec<f64>> {
+    let mut read: BTreeMap<i64, (f64, usize)> = BTreeMap::new();
+    for k in traces.values().flatten() {
+        let x = readings[*k].x;
+        read.entry(position_key(x)).or_insert((x, 0)).1 += 1;
+    }
+    if read.len() > most_cells(traces.len()) {
+        return None;
+    }
+    let kept: Vec<(i64, f64)> = (read.into_iter())
+        .filter(|(_, (_, count))| 2 * count >= traces.len())
+        .map(|(key, (x, _))| (key, x))
+        .collect();
+    if kept.len() <= super::FEWEST_POSITIONS {
+        return None;
+    }
+    let present = |rows: &Vec<usize>| {
+        let own: BTreeSet<i64> = rows.iter().map(|k| position_key(readings[*k].x)).collect();
+        kept.iter().map(|(key, _)| own.contains(key)).collect()
+    };
+    let by_trace: Vec<(TraceKey, Vec<bool>)> = (traces.iter())
+        .map(|(key, rows)| (*key, present(rows)))
+        .collect();
+    if !filling::can_be_told(&by_trace) {
+        return None;
+    }
+    let half = |a: usize, b: usize| 0.5 * (kept[a].1 + kept[b].1);
+    let last = kept.len() - 1;
+    let mut edges = vec![2.0 * kept[0].1 - half(0, 1)];
+    edges.extend((0..last).map(|k| half(k, k + 1)));
+    edges.push(2.0 * kept[last].1 - half(last - 1, last));
+    Some(edges)
 }
 
 /// Edges without those that leave a trace without readings in a cell.

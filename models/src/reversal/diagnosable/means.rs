@@ -1,5 +1,6 @@
 //! Means of the traces of each channel, and the forms of single repeats.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use nalgebra::DVector;
@@ -44,11 +45,41 @@ impl Linearised {
         }
         let own: Vec<Vec<u32>> = own.into_iter().map(|r| r.into_iter().collect()).collect();
         let fewest = own.iter().map(Vec::len).min().unwrap_or(0);
+        let observed = self.each_by_itself();
         let of = |k: usize| {
             let repeats: Vec<u32> = own.iter().map(|repeats| repeats[k]).collect();
-            let means = self.channel_means(&self.record.observed, Some(&repeats));
+            let means = self.channel_means(&observed, Some(&repeats));
             self.arrangement.forms(&means, self.positions.len())
         };
         (0..fewest).filter_map(of).collect()
+    }
+
+    /// The readings, those that were put in by the cubic through what the trace itself has on either side: what
+    /// other repeats told would be noise that repeats have in common.
+    fn each_by_itself(&self) -> Cow<'_, DVector<f64>> {
+        let lacking = self.gathered.as_ref().map_or(&[][..], |g| &g.lacking);
+        if lacking.is_empty() {
+            return Cow::Borrowed(&self.record.observed);
+        }
+        let mut own = self.record.observed.clone();
+        let n = self.positions.len();
+        let there = |row: &usize| lacking.binary_search(row).is_err();
+        for &row in lacking {
+            let start = row - row % n;
+            let before = (start..row).rev().filter(there).take(2);
+            let after = (row + 1..start + n).filter(there).take(2);
+            let nodes: Vec<usize> = before.chain(after).collect();
+            let x = |row: usize| self.positions[row % n];
+            let weight = |j: usize| {
+                let others = nodes.iter().filter(|i| **i != j);
+                others
+                    .map(|i| (x(row) - x(*i)) / (x(j) - x(*i)))
+                    .product::<f64>()
+            };
+            own[row] = (nodes.iter())
+                .map(|j| weight(*j) * self.record.observed[*j])
+                .sum();
+        }
+        Cow::Owned(own)
     }
 }

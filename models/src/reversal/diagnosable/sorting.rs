@@ -109,7 +109,7 @@ pub(super) fn trace_key(reading: &DesignReading) -> TraceKey {
 }
 
 /// Positions closer than 0.1 µm are the same.
-fn position_key(x: f64) -> i64 {
+pub(super) fn position_key(x: f64) -> i64 {
     (x * 1e4).round() as i64
 }
 

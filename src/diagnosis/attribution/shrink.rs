@@ -56,6 +56,8 @@ pub(in crate::diagnosis) struct GapMeter {
 impl GapMeter {
     pub fn new(model: &AnyModel, law: &NoiseLaw, seed: u64) -> Self {
         let space = Space::new(model, &unit_noise());
+        // Nearly all of a residual is differences of traces.
+        let law = &law.clone().whiter(1.0 / model.noise_allowance());
         let noise = draws(model, law, seed);
         let scatter = scatter_draws(model, seed);
         let freedom = space.degrees_of_freedom().max(1) as f64;

@@ -103,13 +103,6 @@ impl Spot {
             ],
         }
     }
-
-    /// The position again, mm.
-    pub fn position(&self, positions: &[f64]) -> f64 {
-        // A line has its own slope everywhere.
-        let Self { left, right, of } = *self;
-        of[0] * positions[left] + of[1] * positions[right] + of[2] + of[3]
-    }
 }
 
 impl Smoother {

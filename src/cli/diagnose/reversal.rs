@@ -288,7 +288,7 @@ pub fn notes(model: &Linearised) -> Vec<String> {
     let carried = model
         .gathered
         .as_ref()
-        .filter(|gathered| gathered.filled == 0);
+        .filter(|gathered| gathered.filled() == 0);
     if let Some(gathered) = carried {
         notes.push(format!(
             "The traces have {}: their readings were carried to {} common places by the simultaneous fit, {} readings to each; noise is that of their mean.",
@@ -304,7 +304,7 @@ pub fn notes(model: &Linearised) -> Vec<String> {
     let filled = model
         .gathered
         .as_ref()
-        .map_or(0, |gathered| gathered.filled);
+        .map_or(0, |gathered| gathered.filled());
     if filled > 0 {
         notes.push(format!(
             "{filled} readings that single traces lack at places which the others have were put in, by what the traces of their channel have in common; they bring nothing of their own, so the noise is told greater than the repeats show it, and uncertainties with it."

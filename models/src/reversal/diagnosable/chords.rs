@@ -3,6 +3,7 @@
 
 use super::super::smooth_profile::{SmoothProfile, Spot};
 use super::Linearised;
+use crate::model::Place;
 
 impl Linearised {
     /// What the exact geometry makes of a channel's reading at its k-th position beyond its first order
@@ -24,29 +25,23 @@ impl Linearised {
 
     /// Change of the artefact's form under a channel when the probed point moves along it by
     /// `shift` mm, per mm.
-    pub fn side_chord(&self, reading: usize, shift: f64) -> f64 {
-        let place = &self.record.places[reading];
+    pub fn side_chord(&self, place: &Place, shift: f64) -> f64 {
         if shift.abs() < 1e-9 * self.travel() {
             return self.side_slope(place);
         }
         let side = self.side(place.channel);
-        let spot = self.spot_beside(reading, shift);
-        (side.at(&spot) - self.form_at(side, reading)) / shift
-    }
-
-    /// The spot that lies so far, mm, from where a reading was taken.
-    fn spot_beside(&self, reading: usize, shift: f64) -> Spot {
-        let k = self.at(&self.record.places[reading]);
-        Spot::new(&self.positions, k, self.taken_at(reading) + shift)
+        let k = self.at(place);
+        let spot = Spot::new(&self.positions, k, place.x + shift);
+        (side.at(&spot) - side.values[k]) / shift
     }
 
     /// Change of the smooth value of a reading when the slide stands `shift` mm further, per mm.
     pub fn reading_chord(&self, reading: usize, shift: f64) -> f64 {
         let place = &self.record.places[reading];
         let shift = self.chord_length(shift);
-        let channel = place.channel;
-        let spot = self.spot_beside(reading, shift);
-        let moved = |form: &SmoothProfile| (form.at(&spot) - self.form_at(form, reading)) / shift;
+        let (channel, k) = (place.channel, self.at(place));
+        let spot = Spot::new(&self.positions, k, place.x + shift);
+        let moved = |form: &SmoothProfile| (form.at(&spot) - form.values[k]) / shift;
         self.lines[channel].slope
             + self.slide_sum(channel, moved)
             + moved(self.side(channel))
@@ -56,7 +51,7 @@ impl Linearised {
     /// Change of a reading when the probed point moves `shift` mm along the artefact, per mm.
     pub fn probed_chord(&self, reading: usize, shift: f64) -> f64 {
         let shift = self.chord_length(shift);
-        self.side_chord(reading, shift) + self.beneath_chord(reading, shift)
+        self.side_chord(&self.record.places[reading], shift) + self.beneath_chord(reading, shift)
     }
 
     /// A slope is a chord too short to matter.

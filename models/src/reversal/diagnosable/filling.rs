@@ -6,7 +6,6 @@
 //! (imputation by a hot deck: Little and Rubin, Statistical Analysis with Missing Data, chapter 4).
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -59,6 +58,13 @@ pub(super) fn filled(lanes: &[Lane]) -> Vec<Vec<f64>> {
     let mut random = ChaCha8Rng::seed_from_u64(0);
     let mut full: Vec<Vec<f64>> = vec![Vec::new(); lanes.len()];
     for group in groups(lanes) {
+        let whole = |t: &usize| lanes[*t].1.iter().all(Option::is_some);
+        if group.iter().all(whole) {
+            for t in group {
+                full[t] = lanes[t].1.iter().flatten().copied().collect();
+            }
+            continue;
+        }
         let own: Vec<&[Option<f64>]> = group.iter().map(|t| lanes[*t].1.as_slice()).collect();
         let (profile, lines) = told_apart(&own);
         for (t, line) in group.iter().zip(&lines) {
@@ -109,13 +115,10 @@ fn told_apart(traces: &[&[Option<f64>]]) -> (Vec<f64>, Vec<Vec<f64>>) {
                 .map(|(v, m)| Some((*v)? - m))
                 .collect();
             if round < ROUNDS.0 {
-                let (offset, _) = line_over(&left, 0..places, 0);
-                line.fill(offset);
+                line.fill(mean(&left));
             } else {
-                for k in 0..places {
-                    let near = k.saturating_sub(NEAR)..(k + NEAR + 1).min(places);
-                    let (offset, slope) = line_over(&left, near, k);
-                    line[k] = if slope.is_finite() { offset } else { 0.0 };
+                for (k, height) in line.iter_mut().enumerate() {
+                    *height = line_at(&left, k);
                 }
             }
         }
@@ -131,23 +134,25 @@ fn told_apart(traces: &[&[Option<f64>]]) -> (Vec<f64>, Vec<Vec<f64>>) {
     (profile, lines)
 }
 
-/// The line through the values of a range: its height at a place, and its slope per place. Over the whole of a trace
-/// (at the place 0) it is level.
-fn line_over(values: &[Option<f64>], range: Range<usize>, at: usize) -> (f64, f64) {
-    let whole = range.len() == values.len();
-    let there = || range.clone().filter_map(|k| Some((k as f64, values[k]?)));
-    let count = there().count() as f64;
-    if count == 0.0 {
-        return (0.0, 0.0);
+/// The mean of the values that are there.
+fn mean(values: &[Option<f64>]) -> f64 {
+    let there = values.iter().flatten();
+    there.clone().sum::<f64>() / there.count().max(1) as f64
+}
+
+/// The height, at a place, of the line through the values of the places near it; level through a single one.
+fn line_at(values: &[Option<f64>], at: usize) -> f64 {
+    let from = at.saturating_sub(NEAR);
+    let near = &values[from..(at + NEAR + 1).min(values.len())];
+    let height = mean(near);
+    let there = || (near.iter().zip(from..)).filter_map(|(v, k)| Some((k as f64, (*v)?)));
+    let centre = there().map(|(k, _)| k).sum::<f64>() / there().count().max(1) as f64;
+    let spread: f64 = there().map(|(k, _)| (k - centre).powi(2)).sum();
+    if spread == 0.0 {
+        return height;
     }
-    let mean_k = there().map(|(k, _)| k).sum::<f64>() / count;
-    let mean = there().map(|(_, v)| v).sum::<f64>() / count;
-    let spread: f64 = there().map(|(k, _)| (k - mean_k).powi(2)).sum();
-    if whole || spread == 0.0 {
-        return (mean, 0.0);
-    }
-    let slope = there().map(|(k, v)| (k - mean_k) * v).sum::<f64>() / spread;
-    (mean + slope * (at as f64 - mean_k), slope)
+    let slope = there().map(|(k, v)| (k - centre) * v).sum::<f64>() / spread;
+    height + slope * (at as f64 - centre)
 }
 
 /// A trace with what it lacks put in.

@@ -162,7 +162,7 @@ impl FittedModel for Linearised {
     /// σ²(1/((1 − f)n) + f/n) in place of σ²/n.
     fn noise_allowance(&self) -> f64 {
         self.gathered.as_ref().map_or(1.0, |gathered| {
-            let share = gathered.filled as f64 / self.record.places.len() as f64;
+            let share = gathered.filled() as f64 / self.record.places.len() as f64;
             1.0 / (1.0 - share) + share
         })
     }

@@ -3,9 +3,9 @@
 //! The diagnosis compares traces position by position. Where traces have positions of their own, or
 //! more of them than can be told apart, the mean of what the simultaneous fit leaves of the readings
 //! in a cell, beside what that fit makes of the cell's centre, stands for one reading there: the fit
-//! carries readings over the distance from where they were taken, whatever the slope. Effects act where they were
-//! taken. Where most traces have most positions in common, the readings that single traces lack are put in
-//! (`filling.rs`) and every position stays. Cost is linear in readings.
+//! carries readings over the distance from where they were taken, whatever the slope. Where most traces have most
+//! positions in common, the readings that single traces lack are put in (`filling.rs`) and every position stays.
+//! Cost is linear in readings.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,8 +25,6 @@ const CELLS: (usize, usize) = (150, 400);
 const WORTH: f64 = 1.5;
 /// Readings that are lacking are put in where that keeps so many times the cells.
 const WORTH_FILLING: f64 = 1.2;
-/// Part of a spacing that readings may be off a cell's centre and count as taken there.
-const CENTRED: f64 = 1e-3;
 /// Least share of the readings at positions that all traces have for the rest to be left out.
 const SHARED: f64 = 0.95;
 
@@ -39,24 +37,23 @@ pub struct Gathered {
     pub readings_per_cell: f64,
     /// Readings that no cell holds: outside the range that all traces have.
     pub beyond: usize,
-    /// Readings that single traces lack, which were put in.
-    pub filled: usize,
     /// Time that the readings of each cell of each trace took, s, in the order of the readings made.
     pub(super) spans: Vec<f64>,
     /// The readings made that were put in, ascending.
     pub(super) lacking: Vec<usize>,
-    /// How far from the centres of their cells the readings made were taken in the mean, mm; empty where
-    /// all were taken there.
-    pub(super) away: Vec<f64>,
 }
 
 impl Gathered {
+    /// Readings that single traces lack, which were put in.
+    pub fn filled(&self) -> usize {
+        self.lacking.len()
+    }
+
     /// The same of a measurement that is not made yet.
     pub(super) fn planned(self) -> Self {
         Self {
             spans: Vec::new(),
             lacking: Vec::new(),
-            away: Vec::new(),
             ..self
         }
     }
@@ -207,7 +204,7 @@ pub(super) fn gather(
     let left = filling::filled(&lanes);
     let names = observations.design.channels();
     let mut made = Vec::new();
-    let (mut spans, mut away) = (Vec::new(), Vec::new());
+    let mut spans = Vec::new();
     for ((key, inside), left) in members.iter().zip(&left) {
         let (channel, repeat, backward) = *key;
         let times = times_of(inside, readings);
@@ -226,27 +223,19 @@ pub(super) fn gather(
                 value: there + left[k],
             });
             spans.push(span_of(own, readings));
-            away.push(mean(own, |k| readings[k].x).map_or(0.0, |x| x - centres[k]));
         }
-    }
-    let spacing = (edges[cells] - edges[0]) / cells as f64;
-    if away.iter().all(|off| off.abs() < CENTRED * spacing) {
-        away.clear();
     }
     let held: f64 = sums.iter().map(|(_, count)| count).sum();
     let own = members.iter().flat_map(|(_, inside)| inside).enumerate();
     let lacking: Vec<usize> = (own.filter(|(_, own)| own.is_empty()))
         .map(|(k, _)| k)
         .collect();
-    let filled = lacking.len();
     let gathered = Gathered {
         cells,
-        readings_per_cell: held / (made.len() - filled) as f64,
+        readings_per_cell: held / (made.len() - lacking.len()) as f64,
         beyond: readings.len() - held as usize,
-        filled,
         spans,
         lacking,
-        away,
     };
     let made = DesignObservations {
         design: observations.design.clone(),
@@ -415,9 +404,9 @@ fn edges_to_fill(traces: &Traces, readings: &[DesignReading]) -> Option<Vec<f64>
     for k in traces.values().flatten() {
         let x = readings[*k].x;
         read.entry(position_key(x)).or_insert((x, 0)).1 += 1;
-    }
-    if read.len() > most_cells(traces.len()) {
-        return None;
+        if read.len() > most_cells(traces.len()) {
+            return None;
+        }
     }
     let kept: Vec<(i64, f64)> = (read.into_iter())
         .filter(|(_, (_, count))| 2 * count >= traces.len())

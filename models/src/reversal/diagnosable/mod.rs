@@ -17,11 +17,9 @@ mod fitted;
 mod further;
 mod gathering;
 mod means;
-mod seen;
 mod sorting;
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 use nalgebra::DVector;
 use thiserror::Error;
@@ -31,7 +29,7 @@ use super::designs::{DesignFit, DesignObservations, DesignReading, Zero};
 use super::simultaneous::Simultaneous;
 use super::smooth_profile::{SmoothProfile, Smoother, Spot};
 use super::{Convention, Observations};
-use crate::model::{FittedModel, Place, Record};
+use crate::model::{Column, FittedModel, Place, Record};
 pub use arrangement::{Arrangement, Seat, indicator_name};
 use gathering::Carrier;
 pub use gathering::Gathered;
@@ -103,10 +101,6 @@ pub struct Linearised {
     forms: Vec<SmoothProfile>,
     /// The smooth reading of every cell.
     smooth: Vec<f64>,
-    /// By reading where it was taken, where that is not the middle of its cell.
-    spots: Option<Arc<[Spot]>>,
-    /// The smooth value where each reading was taken; empty where all were taken in the middle of their cells.
-    seen: Vec<f64>,
     /// What effects add to the smooth reading before it is seen, by reading.
     beneath: Option<DVector<f64>>,
     span: f64,
@@ -200,7 +194,7 @@ impl Linearised {
         let positions: Vec<usize> = arrangement.seats().iter().map(|s| s.position).collect();
         if !gathering::is_needed(traces.len(), shared.len(), observations.readings.len()) {
             let sorted = Sorted::new(observations, &positions, &shared);
-            return Self::sorted(sorted, arrangement, assumptions);
+            return Self::sorted(sorted, arrangement, assumptions, None);
         }
         let (four, design);
         let fit = match fit {
@@ -217,17 +211,14 @@ impl Linearised {
         let (made, gathered) = gathering::gather(observations, traces, &fit)?;
         let shared = sorting::shared(&made, gathering::traces_of(&made).len());
         let sorted = Sorted::new(&made, &positions, &shared);
-        let mut model = Self::sorted(sorted, arrangement, assumptions)?;
-        model.left_out = gathered.beyond;
-        model.take_where_read(&gathered.away);
-        model.gathered = Some(gathered);
-        Ok(model)
+        Self::sorted(sorted, arrangement, assumptions, Some(gathered))
     }
 
     fn sorted(
         sorted: Sorted,
         arrangement: Arrangement,
         assumptions: Assumptions,
+        gathered: Option<Gathered>,
     ) -> Result<Self, NotDiagnosable> {
         if sorted.positions.len() < FEWEST_POSITIONS {
             return Err(NotDiagnosable::RangesDiffer);
@@ -271,12 +262,10 @@ impl Linearised {
             forms: vec![nothing; arrangement.form_names().len()],
             arrangement,
             smooth: Vec::new(),
-            spots: None,
-            seen: Vec::new(),
             beneath: None,
             timed: sorted.timed,
-            left_out: sorted.left_out,
-            gathered: None,
+            left_out: (gathered.as_ref()).map_or(sorted.left_out, |gathered| gathered.beyond),
+            gathered,
         }
         .refit(DVector::from_vec(sorted.values)))
     }
@@ -331,7 +320,6 @@ impl Linearised {
         self.smooth = (0..n * self.present().len())
             .map(|cell| self.smooth_at(cell / n, cell % n))
             .collect();
-        self.see();
         let middle = Spot::new(&self.positions, n / 2, self.middle);
         self.mid_readings = (0..self.present().len())
             .map(|channel| {
@@ -389,6 +377,12 @@ impl Linearised {
         place.cell % self.positions.len()
     }
 
+    /// The smooth value of a reading, µm.
+    pub fn smooth_reading(&self, reading: usize) -> f64 {
+        let added = self.beneath.as_ref().map_or(0.0, |b| b[reading]);
+        self.smooth[self.record.places[reading].cell] + added
+    }
+
     /// The share of a reading that was taken after a moment, s: none or all of it, or of the readings
     /// that were gathered into it.
     pub(super) fn share_after(&self, reading: usize, time: f64) -> f64 {
@@ -409,6 +403,27 @@ impl Linearised {
     /// Whether effects add to the smooth reading before it is seen.
     pub fn lies_beneath(&self) -> bool {
         self.beneath.is_some()
+    }
+
+    /// A function of the smooth reading, for every reading.
+    pub(super) fn of_reading(&self, value: impl Fn(f64) -> f64) -> Column {
+        if self.beneath.is_some() {
+            return Column::from_places(&self.record.places, |k, _| value(self.smooth_reading(k)));
+        }
+        let values: Vec<f64> = self.smooth.iter().map(|reading| value(*reading)).collect();
+        Column::from_places(&self.record.places, |_, place| values[place.cell])
+    }
+
+    /// A function that is the same for all readings of a cell in one direction, for every reading.
+    pub(super) fn of_cell(&self, value: impl Fn(usize, &Place) -> f64) -> Column {
+        let slot = |place: &Place| 2 * place.cell + usize::from(place.direction < 0.0);
+        let mut values = vec![None; 2 * self.smooth.len()];
+        for (k, place) in self.record.places.iter().enumerate() {
+            values[slot(place)].get_or_insert_with(|| value(k, place));
+        }
+        Column::from_places(&self.record.places, |_, place| {
+            values[slot(place)].unwrap_or(0.0)
+        })
     }
 
     fn smooth_at(&self, channel: usize, k: usize) -> f64 {

@@ -37,7 +37,7 @@ impl Effect<Linearised> for CommonGain {
 
     fn columns(&self, model: &Linearised, _shape: &Shape) -> Vec<Column> {
         vec![Column::from_places(model.places(), |k, place| {
-            model.seen_reading(k) - model.mid_reading(place)
+            model.smooth_reading(k) - model.mid_reading(place)
         })]
     }
 }

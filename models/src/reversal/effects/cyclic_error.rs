@@ -144,9 +144,9 @@ impl Effect<Linearised> for CyclicError {
             let first = model.positions().first().copied().unwrap_or(0.0);
             let per_mm = turn / model.travel();
             let wave = |function: fn(f64) -> f64| {
-                Column::from_places(model.places(), |k, place| {
+                Column::from_places(model.places(), |_, place| {
                     let seen = model.seat(place).position == position % self.positions.len();
-                    f64::from(seen) * function(per_mm * (model.taken_at(k) - first))
+                    f64::from(seen) * function(per_mm * (place.x - first))
                 })
             };
             let mut columns = vec![wave(f64::cos), wave(f64::sin)];

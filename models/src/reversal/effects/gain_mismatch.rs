@@ -67,7 +67,7 @@ impl Effect<Linearised> for GainMismatch {
                 (true, 0) => 0.5,
                 (true, _) => -0.5,
             };
-            share * (model.seen_reading(k) - model.mid_reading(place))
+            share * (model.smooth_reading(k) - model.mid_reading(place))
         });
         if two {
             return vec![all];

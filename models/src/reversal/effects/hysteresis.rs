@@ -192,14 +192,14 @@ fn lag(model: &Linearised, shape: &Shape, first: usize, indicator: usize, width:
             .copied()
             .unwrap_or(0.0);
         let forward = places[trace.start].direction > 0.0;
-        let mut pointer = model.seen_reading(first_of(model, trace)) + begins * half;
+        let mut pointer = model.smooth_reading(first_of(model, trace)) + begins * half;
         for step in 0..trace.len() {
             let k = if forward {
                 trace.start + step
             } else {
                 trace.end - 1 - step
             };
-            let stylus = model.seen_reading(k);
+            let stylus = model.smooth_reading(k);
             // Not `clamp`, which ends the program where a state has no number.
             pointer = pointer.max(stylus - half).min(stylus + half);
             column.rows.push(k);

@@ -265,9 +265,8 @@ impl Effect<Linearised> for LocalContamination {
             let partly = comes.filter(|_| scope.first() == Some(order));
             for k in trace.filter(|_| met) {
                 let place = &model.places()[k];
-                let at = model.taken_at(k);
-                let away = (at - position) / width;
-                let there = partly.is_none_or(|comes| place.direction * (at - comes) >= 0.0);
+                let away = (place.x - position) / width;
+                let there = partly.is_none_or(|comes| place.direction * (place.x - comes) >= 0.0);
                 if there && away.abs() < 5.0 {
                     column.rows.push(k);
                     column.values.push(section(away));

@@ -97,9 +97,9 @@ impl Effect<Linearised> for ReversalShift {
     fn columns(&self, model: &Linearised, shape: &Shape) -> Vec<Column> {
         let of = |(k, position): (usize, usize)| {
             let shift = shape.values.get(k).copied().unwrap_or(0.0);
-            model.of_cell(|k, place| {
+            model.of_cell(|_, place| {
                 if model.seat(place).position == position {
-                    -model.side_chord(k, -shift)
+                    -model.side_chord(place, -shift)
                 } else {
                     0.0
                 }

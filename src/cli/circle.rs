@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use super::diagnose::joined::{self, Given};
 use super::quantity::{measured_words, quantity_json, unexpandable};
 use super::{Answer, ColumnArgs, CommonArgs};
-use crate::io::circle::read_points;
+use crate::io::circle::{not_converged, read_points};
 use crate::io::{CsvTable, Message, Status};
 use crate::report::circle::{CircleView, page, zones};
 use crate::report::number;
@@ -132,8 +132,8 @@ fn refused(error: &CircleError, args: &Args) -> Message {
         CircleError::StraighterThanAnyCircle => {
             Message::not_determined(error.to_string()).remedy("measure a longer arc")
         }
-        CircleError::NotConverged { .. } => {
-            Message::not_converged(error.to_string()).remedy("measure a longer arc")
+        CircleError::NotConverged { reason, reached } => {
+            not_converged(error, reason, reached.as_ref()).remedy("measure a longer arc")
         }
         CircleError::NoRedundancy => {
             Message::bad_input(error.to_string()).remedy("add points, or give --noise")

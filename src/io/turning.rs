@@ -6,6 +6,7 @@ use errsep_models::reversal::turning_bar::{
     Along, HIGHEST_HARMONIC, Plan, Setting, TurningError, TurningReading,
 };
 use serde::Deserialize;
+use serde_json::json;
 use toml::Spanned;
 
 use super::units::LengthUnit;
@@ -137,6 +138,17 @@ impl TurningFile {
         } else {
             Message::bad_input(what)
         };
+        if let TurningError::NotConverged {
+            ending,
+            residual_rms_um,
+            iterations,
+        } = why
+        {
+            message = message.reaching(json!({
+                "residual": {"rms": residual_rms_um, "unit": "um"},
+                "convergence": {"converged": false, "reason": ending, "iterations": iterations},
+            }));
+        }
         message = match index.and_then(|i| self.lines.get(i)) {
             Some(line) => message.at(super::message::Place {
                 file: path.to_owned(),

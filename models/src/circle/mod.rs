@@ -26,6 +26,6 @@ pub use diagnosable::CirclePoints;
 pub use effects::amplitude;
 pub use nistir::{NistirEnding, NistirFit, nistir_fit};
 pub use orthogonal::{CircleFit, OrthogonalCircle, orthogonal_fit};
-pub use points::{Circle, CircleError, LARGEST, Point, SMALLEST, check_points};
+pub use points::{Circle, CircleError, LARGEST, Point, ReachedCircle, SMALLEST, check_points};
 pub use simulate::{CircleSimulation, Disturbance, simulate, simulate_disturbed};
 pub use zone::{Circularity, Reference, Zone, circularity, reference_zone};

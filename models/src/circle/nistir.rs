@@ -76,6 +76,7 @@ pub fn nistir_fit(points: &[Point], start: Circle) -> Result<NistirFit, CircleEr
         let Some(step) = damped_step(&hessian, &gradient, &mut lambda) else {
             return Err(CircleError::NotConverged {
                 reason: "the damped normal equations of appendix F stay singular".to_owned(),
+                reached: None,
             });
         };
         previous = Some(p);

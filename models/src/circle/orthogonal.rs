@@ -1,7 +1,7 @@
 //! The circle of least squared orthogonal distances.
 
 use super::algebraic::{AlgebraicFit, algebraic};
-use super::points::{Circle, CircleError, FLAT, Frame, Point, check_points};
+use super::points::{Circle, CircleError, FLAT, Frame, Point, ReachedCircle, check_points};
 use crate::uncertainty::{DegreesOfFreedom, Quantity, UncertaintyError};
 use errsep_solvers::{Fit, NoValue, Options, Problem};
 use nalgebra::{DMatrix, DVector, Matrix3};
@@ -123,6 +123,14 @@ impl CircleFit {
 /// to a line; [`CircleError::NotConverged`]; [`CircleError::NoRedundancy`] for three points without a
 /// given noise.
 pub fn orthogonal_fit(points: &[Point], noise_um: Option<f64>) -> Result<CircleFit, CircleError> {
+    fit_within(points, noise_um, &Options::default())
+}
+
+fn fit_within(
+    points: &[Point],
+    noise_um: Option<f64>,
+    options: &Options,
+) -> Result<CircleFit, CircleError> {
     check_points(points)?;
     let degrees_of_freedom = points.len() - 3;
     if degrees_of_freedom == 0 && noise_um.is_none() {
@@ -133,19 +141,38 @@ pub fn orthogonal_fit(points: &[Point], noise_um: Option<f64>) -> Result<CircleF
     let local: Vec<Point> = points.iter().map(|&p| frame.to_local(p)).collect();
     let centre = frame.to_local(seed.centre);
     let start = DVector::from_vec(vec![centre.x, centre.y, seed.radius / frame.scale]);
-    let fit = errsep_solvers::fit(&OrthogonalCircle::new(local), start, &Options::default())
-        .map_err(|e| CircleError::NotConverged {
+    let fit = errsep_solvers::fit(&OrthogonalCircle::new(local), start, options).map_err(|e| {
+        CircleError::NotConverged {
             reason: e.to_string(),
-        })?;
+            reached: None,
+        }
+    })?;
     if fit.parameters[2].abs() > FLAT {
         return Err(CircleError::StraighterThanAnyCircle);
     }
     if !fit.ending.is_converged() {
         return Err(CircleError::NotConverged {
             reason: fit.ending.to_string(),
+            reached: Some(reached(&fit, frame)),
         });
     }
     Ok(assemble(&fit, frame, seed, noise_um, degrees_of_freedom))
+}
+
+fn circle_of(p: &DVector<f64>, frame: Frame) -> Circle {
+    frame.to_world(Circle {
+        centre: Point::new(p[0], p[1]),
+        radius: p[2].abs(),
+    })
+}
+
+fn reached(fit: &Fit, frame: Frame) -> ReachedCircle {
+    let mean_square = fit.residuals.norm_squared() / fit.residuals.len() as f64;
+    ReachedCircle {
+        circle: circle_of(&fit.parameters, frame),
+        residual_rms_um: 1e3 * frame.scale * mean_square.sqrt(),
+        iterations: fit.iterations,
+    }
 }
 
 fn assemble(
@@ -159,12 +186,8 @@ fn assemble(
     let estimated = um * (fit.residuals.norm_squared() / degrees_of_freedom.max(1) as f64).sqrt();
     let sigma = noise_um.unwrap_or(estimated);
     let unit = fit.covariance().matrix;
-    let p = &fit.parameters;
     CircleFit {
-        circle: frame.to_world(Circle {
-            centre: Point::new(p[0], p[1]),
-            radius: p[2].abs(),
-        }),
+        circle: circle_of(&fit.parameters, frame),
         covariance: Matrix3::from_fn(|i, j| unit[(i, j)] * (1e-3 * sigma).powi(2)),
         noise_um: sigma,
         noise_given: noise_um.is_some(),
@@ -174,5 +197,45 @@ fn assemble(
         seed,
         ending: fit.ending.to_string(),
         iterations: fit.iterations,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An oval on a third of a turn, from which one step does not reach the minimum.
+    #[test]
+    fn a_fit_without_a_minimum_tells_how_far_it_got() {
+        let points: Vec<Point> = (0..24)
+            .map(|i| {
+                let angle = f64::from(i) * 0.09;
+                let radius = 20.0 + 0.4 * (2.0 * angle).sin();
+                Point::new(5.0 + radius * angle.cos(), radius * angle.sin() - 3.0)
+            })
+            .collect();
+        let best = orthogonal_fit(&points, None).expect("a circle");
+        let options = Options {
+            max_iterations: 1,
+            ..Options::default()
+        };
+        let stopped = fit_within(&points, None, &options);
+        let Err(CircleError::NotConverged {
+            reason,
+            reached: Some(reached),
+        }) = stopped
+        else {
+            panic!("one step is no fit: {stopped:?}");
+        };
+        assert!(reason.contains("iteration"), "{reason}");
+        assert_eq!(reached.iterations, 1);
+        // Kind: limit. From the algebraic fit one step comes within 1 % of the radius.
+        let apart = reached.circle.radius / best.circle.radius - 1.0;
+        assert!(apart != 0.0 && apart.abs() < 0.01, "{apart}");
+        let deviation = |p: &Point| p.distance(reached.circle.centre) - reached.circle.radius;
+        let squares: f64 = points.iter().map(|p| deviation(p).powi(2)).sum();
+        let rms_um = 1e3 * (squares / points.len() as f64).sqrt();
+        // Kind: rounding.
+        assert!((reached.residual_rms_um / rms_um - 1.0).abs() < 1e-10);
     }
 }

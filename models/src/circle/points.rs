@@ -49,6 +49,17 @@ pub struct Circle {
     pub radius: f64,
 }
 
+/// Where a fit stood that ended without a minimum: no estimate, for which there is no uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReachedCircle {
+    /// The circle of the last step.
+    pub circle: Circle,
+    /// Root mean square of the radial deviations from it, µm.
+    pub residual_rms_um: f64,
+    /// Iterations made.
+    pub iterations: u64,
+}
+
 /// Why no circle can be given.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CircleError {
@@ -141,6 +152,8 @@ pub enum CircleError {
     NotConverged {
         /// The solver's own words.
         reason: String,
+        /// How far it got, if it made a step.
+        reached: Option<ReachedCircle>,
     },
 }
 

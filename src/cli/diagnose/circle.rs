@@ -9,6 +9,7 @@ use serde::Deserialize;
 use super::Args;
 use super::case::Case;
 use crate::cli::Answer;
+use crate::io::circle::not_converged;
 use crate::io::{ColumnMap, Message, SetupFile, TableReader};
 
 /// The set-up.
@@ -53,7 +54,10 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     let model = CirclePoints::new(&points, noise).map_err(|e| {
         let message = match e {
             CircleError::StraighterThanAnyCircle => Message::not_determined(e.to_string()),
-            CircleError::NotConverged { .. } => Message::not_converged(e.to_string()),
+            CircleError::NotConverged {
+                ref reason,
+                ref reached,
+            } => not_converged(&e, reason, reached.as_ref()),
             _ => Message::bad_input(e.to_string()),
         };
         message

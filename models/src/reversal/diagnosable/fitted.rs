@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::Linearised;
 use super::arrangement::Seat;
-use super::{Gauge, Linearised, Smoothing};
+use super::state::{Gauge, Smoothing};
 use crate::model::{Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record};
 use crate::reversal::designs::{Determined, SLOPES, Zero};
 use crate::reversal::effects;

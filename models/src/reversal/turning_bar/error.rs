@@ -102,5 +102,9 @@ pub enum TurningError {
     NotConverged {
         /// How it ended, in words.
         ending: String,
+        /// Root mean square of the residuals where it stood, µm.
+        residual_rms_um: f64,
+        /// Steps made.
+        iterations: u64,
     },
 }

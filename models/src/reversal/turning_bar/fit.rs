@@ -195,19 +195,34 @@ pub(super) fn fit<'a>(
     hold: Held,
     start: &Begin,
 ) -> Result<TurningFit<'a>, TurningError> {
+    fit_within(run, survey, setting, hold, start, MOST_STEPS)
+}
+
+fn fit_within<'a>(
+    run: &'a Run,
+    survey: &'a Survey,
+    setting: &Setting,
+    hold: Held,
+    start: &Begin,
+    most_steps: u64,
+) -> Result<TurningFit<'a>, TurningError> {
     setting.check()?;
     let problem = TurningProblem::new(run, setting, &survey.frame, hold)?;
     let mut at = Parameters::zeros(problem.band_count(), problem.border_count());
     start(&problem, &mut at);
     let options = Minimisation {
-        max_iterations: MOST_STEPS,
+        max_iterations: most_steps,
         ..Minimisation::structured()
     };
     let result = fit_structured(&problem, at, &options)?;
+    let residuals = problem.residuals(&result.parameters);
+    let squares: f64 = residuals.iter().map(|r| r * r).sum();
     let covariance = result
         .covariance()
         .ok_or_else(|| TurningError::NotConverged {
             ending: result.ending.to_string(),
+            residual_rms_um: (squares / residuals.len() as f64).sqrt(),
+            iterations: result.iterations,
         })?;
     let (n, q) = (problem.band_count(), problem.border_count());
     let mut inverse = DMatrix::zeros(n + q, n + q);
@@ -222,10 +237,9 @@ pub(super) fn fit<'a>(
         }
     }
     let at = result.parameters.clone();
-    let residuals = problem.residuals(&at);
     Ok(TurningFit {
         psi: problem.seen(&at),
-        squares: residuals.iter().map(|r| r * r).sum(),
+        squares,
         unknowns: problem.free_count(),
         iterations: result.iterations,
         across_held: hold.across,
@@ -254,5 +268,40 @@ fn put_turn(
         for (j, value) in unknowns.iter().zip(coefficients(basis)) {
             at.band[*j] = value;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::simulate::{TurningPlan, simulate};
+    use super::*;
+
+    #[test]
+    fn a_fit_without_a_minimum_tells_how_far_it_got() {
+        let plan = TurningPlan {
+            readings: 1200,
+            turns: 20.0,
+            ..TurningPlan::default()
+        };
+        let run = Run::new(&simulate(&plan).0).expect("a run");
+        let setting = Setting::default();
+        let survey = Survey::new(&run, 0.0, 1.0, None).expect("a bar that turns");
+        let begin: &Begin = &|_, at| {
+            at.border[THETA] = survey.steady.theta;
+            at.border[SPEED] = survey.steady.speed;
+        };
+        let within = |steps| fit_within(&run, &survey, &setting, Held::default(), begin, steps);
+        let best = within(MOST_STEPS).expect("a fit");
+        let Err(TurningError::NotConverged {
+            ending,
+            residual_rms_um,
+            iterations,
+        }) = within(1)
+        else {
+            panic!("one step from a bar that runs true is no fit");
+        };
+        assert!(ending.contains("iteration"), "{ending}");
+        assert_eq!(iterations, 1);
+        assert!(residual_rms_um > best.rms() && residual_rms_um.is_finite());
     }
 }

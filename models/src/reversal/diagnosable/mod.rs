@@ -27,7 +27,7 @@ use thiserror::Error;
 
 use super::designs::{DesignFit, DesignObservations, DesignReading, Zero};
 use super::simultaneous::Simultaneous;
-use super::smooth_profile::{SmoothProfile, Smoother, Spot};
+use super::smooth_profile::{SmoothProfile, Smoother};
 use super::{Convention, Observations};
 use crate::model::{Column, FittedModel, Place, Record};
 pub use arrangement::{Arrangement, Seat, indicator_name};

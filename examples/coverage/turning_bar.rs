@@ -274,7 +274,11 @@ fn judged(made: Made) -> Option<Found> {
     ];
     let mut tallies = [Tally::default(); 3];
     for ((tally, value), truth) in tallies.iter_mut().zip(values).zip(truth) {
-        tally.add(value.value - truth, value.std, f64::INFINITY);
+        tally.add(
+            value.value - truth,
+            value.std,
+            chosen.turns.freedom.max(1.0),
+        );
     }
     Some(Found {
         tallies,

@@ -61,6 +61,7 @@ pub(super) fn json(all: &Told) -> Json {
         "noise": {
             "white": law.white.sqrt(), "correlated": law.correlated.sqrt(), "length": law.length,
             "source": "neighbours", "factor": all.analysis.factor,
+            "degrees_of_freedom": all.degrees_of_freedom(),
         },
         "where": places(all),
         "candidates": candidates,

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use errsep_models::reversal::turning_bar::{
     Analysis, Bar, Harmonic, Pairs, Rival, Run, Slow, Spread, Survey, Told as Value, TurnCurve,
 };
+use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
 
 use crate::diagnosis::Kind;
 use crate::diagnosis::turning::{BAR_BEND, RECORDED_ANGLE, Weighed};
@@ -114,6 +115,18 @@ impl<'a, 'b> Told<'a, 'b> {
         let law = errsep_models::noise::Law::of_white(variance);
         let spread = Spread::new(&self.chosen.fit, &law, Slow::default());
         self.chosen.fit.slope(&spread).std
+    }
+
+    /// Degrees of freedom to which the law of the noise is known, and with it every standard uncertainty.
+    pub(super) fn degrees_of_freedom(&self) -> f64 {
+        self.chosen.turns.freedom
+    }
+
+    /// Half a 95 % interval in standard uncertainties.
+    pub(super) fn half_interval(&self) -> f64 {
+        DegreesOfFreedom::new(self.degrees_of_freedom().max(1.0))
+            .and_then(|freedom| coverage_factor(0.95, freedom))
+            .unwrap_or(f64::INFINITY)
     }
 
     /// The sentence a person acts on.
@@ -243,9 +256,11 @@ impl<'a, 'b> Told<'a, 'b> {
             let readings = (3.0 * law.length / mean_step).ceil();
             let slower = correlated_over(&self.chosen.fit.residuals);
             all.push(format!(
-                "Noise of one reading: {} µm, of which {} µm is correlated over about {readings} readings. Uncertainties take that into account{}; were the readings independent, u of {} would be {} µrad.",
+                "Noise of one reading: {} µm, of which {} µm is correlated over about {readings} readings. Uncertainties take that into account, and are known to {} degrees of freedom (95 % intervals: {} u){}; were the readings independent, u of {} would be {} µrad.",
                 plain(self.weighed.noise, 2),
                 plain(law.correlated.sqrt(), 2),
+                self.degrees_of_freedom().round(),
+                plain(self.half_interval(), 3),
                 if self.analysis.factor > 1.0 {
                     format!(
                         ". What is slower, within two turns or more, is not counted as noise (all that is left stays together over about {slower} readings): from turn to turn levels scatter by {} µm and waves by {} µm beyond it, which is added",

@@ -10,11 +10,9 @@ use crate::report::turning_bar as sheet;
 const URAD: f64 = 1e6;
 /// Points of a section.
 const AROUND: usize = 181;
-/// Half a 95 % interval in standard uncertainties.
-const WIDE: f64 = 1.96;
-
 pub(super) fn view(data: String, all: &Told) -> sheet::View {
     let weighed = all.weighed;
+    let wide = all.half_interval();
     let named = !std::ptr::eq(all.chosen, &all.analysis.steady);
     let mut answers = vec![(
         all.combination.clone(),
@@ -75,7 +73,7 @@ pub(super) fn view(data: String, all: &Told) -> sheet::View {
         form: (
             all.places.clone(),
             all.form.iter().map(|f| f.value).collect(),
-            all.form.iter().map(|f| WIDE * f.std).collect(),
+            all.form.iter().map(|f| wide * f.std).collect(),
         ),
         rivals: weighed
             .weights
@@ -107,7 +105,7 @@ fn turn(all: &Told) -> Option<sheet::Turn> {
         clock: (quantity.to_owned(), unit.to_owned()),
         time: curve.time.clone(),
         lag: degrees(&curve.lag_rad, 1.0),
-        half: degrees(&curve.lag_std, WIDE),
+        half: degrees(&curve.lag_std, all.half_interval()),
         speed: all.per_minute(&curve.speed),
         speed_unit: all.speed_unit().to_owned(),
         mean: all.per_minute(&[all.speed.value])[0],

@@ -20,6 +20,7 @@ mod law;
 mod learn;
 mod machine;
 mod measured_reversals;
+mod packaging;
 mod parts_of_nistir;
 mod plan_of_designs;
 mod plates;

@@ -1,10 +1,11 @@
-//! Slope, eccentricity and inclination of a bar that turns while the slide feeds, in noise that is correlated
-//! over several readings; and how often a steady turn is told to be unsteady.
+//! Slope, eccentricity and inclination of a bar that turns while the slide feeds, its form and the lag of its
+//! turn at several places, in noise that is correlated over several readings; and how often a steady turn is
+//! told to be unsteady.
 
 use errsep::diagnosis::Kind;
 use errsep::diagnosis::turning::{UNSTEADY_TURN, weigh};
 use errsep_models::noise::Law;
-use errsep_models::reversal::turning_bar::simulate::{TurningPlan, simulate};
+use errsep_models::reversal::turning_bar::simulate::{TurningPlan, TurningTruth, simulate};
 use errsep_models::reversal::turning_bar::{Plan, Run, Setting, Survey, TurningReading, analyse};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -15,6 +16,9 @@ use super::tally::{Row, Tally};
 
 /// Levels of the false alarms.
 const LEVELS: [f64; 2] = [0.01, 0.05];
+
+/// Where form and lag are compared with the truth: shares of travel and time.
+const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 
 /// The part of the noise that is correlated, over how many readings, and by how much the turn strays, rad.
 const CASES: [(&str, f64, f64, f64); 4] = [
@@ -67,7 +71,13 @@ fn of(
     seeds: u64,
 ) -> Vec<Row> {
     let found: Vec<Found> = (0..seeds).into_par_iter().filter_map(one).collect();
-    let names = ["alpha_h + cone", "eccentricity", "inclination"];
+    let names = [
+        "alpha_h + cone",
+        "eccentricity",
+        "inclination",
+        "form at five places",
+        "lag at five times",
+    ];
     let row = |quantity: &str, tally: Tally| Row {
         case: name.to_owned(),
         quantity: quantity.to_owned(),
@@ -83,6 +93,7 @@ fn of(
         .iter()
         .enumerate()
         .map(|(k, n)| row(n, together(k)))
+        .filter(|row| row.tally.any())
         .collect();
     for (k, level) in LEVELS.into_iter().enumerate() {
         let (mut quiet, mut named) = (Tally::default(), Tally::default());
@@ -100,7 +111,7 @@ fn of(
 }
 
 struct Found {
-    tallies: [Tally; 3],
+    tallies: [Tally; 5],
     /// Whether anything is told, and whether that is an unsteady turn, by level.
     alarm: [bool; 2],
     unsteady: [bool; 2],
@@ -122,13 +133,8 @@ fn one(seed: u64, share: f64, readings: f64, stray: f64) -> Option<Found> {
         seed,
         ..TurningPlan::default()
     };
-    let (all, _) = simulate(&made);
-    judged(Made {
-        readings: all,
-        slope: made.slope_rad,
-        eccentricity: made.eccentricity_um,
-        inclination: made.gamma_rad[0].hypot(made.gamma_rad[1]),
-    })
+    let (all, truth) = simulate(&made);
+    judged(Made::of(&made, all, truth))
 }
 
 /// Turns that are steady, in noise that no law of the fit has: a running mean.
@@ -140,7 +146,7 @@ fn running_mean(seed: u64) -> Made {
         seed,
         ..TurningPlan::default()
     };
-    let (mut all, _) = simulate(&made);
+    let (mut all, truth) = simulate(&made);
     let mut random = ChaCha8Rng::seed_from_u64(0x0e4d_0000 + seed);
     let white: Vec<f64> = (0..all.len() + 4)
         .map(|_| StandardNormal.sample(&mut random))
@@ -148,20 +154,31 @@ fn running_mean(seed: u64) -> Made {
     for (reading, window) in all.iter_mut().zip(white.windows(5)) {
         reading.value += 0.1 * window.iter().sum::<f64>();
     }
-    Made {
-        readings: all,
-        slope: made.slope_rad,
-        eccentricity: made.eccentricity_um,
-        inclination: made.gamma_rad[0].hypot(made.gamma_rad[1]),
-    }
+    Made::of(&made, all, truth)
 }
 
-/// A run with what is true of it: α + τ (rad), |e| at mid travel (µm), |γ| (rad).
+/// A run with what is true of it: α + τ (rad), |e| at mid travel (µm), |γ| (rad); at each reading the form
+/// without its line (µm) and by how much the spindle is behind a steady turn (rad).
 struct Made {
     readings: Vec<TurningReading>,
     slope: f64,
     eccentricity: f64,
     inclination: f64,
+    form: Vec<f64>,
+    lag: Vec<f64>,
+}
+
+impl Made {
+    fn of(plan: &TurningPlan, readings: Vec<TurningReading>, truth: TurningTruth) -> Self {
+        Self {
+            readings,
+            slope: plan.slope_rad,
+            eccentricity: plan.eccentricity_um,
+            inclination: plan.gamma_rad[0].hypot(plan.gamma_rad[1]),
+            form: truth.form_um,
+            lag: truth.lag_rad,
+        }
+    }
 }
 
 /// A run by other physics than the simulator's. The spindle follows a drive that is loaded anew every few
@@ -216,6 +233,13 @@ fn another(seed: u64) -> Made {
     };
     let (mx, mf) = (mean(&place), mean(&|i| form[i]));
     let line = mean(&|i| (place(i) - mx) * (form[i] - mf)) / mean(&|i| (place(i) - mx).powi(2));
+    let bent = (0..n).map(|i| form[i] - mf - line * (place(i) - mx));
+    // A steady turn is the least-squares line of the angles over the times.
+    let even = |f: &dyn Fn(usize) -> f64| (0..n).map(f).sum::<f64>() / n as f64;
+    let (mt, ma) = (even(&|i| places[i].0), even(&|i| places[i].2));
+    let since = |i: usize| places[i].0 - mt;
+    let speed = even(&|i| since(i) * places[i].2) / even(&|i| since(i).powi(2));
+    let lag = (0..n).map(|i| ma + speed * since(i) - places[i].2);
     let middle = f64::midpoint(places[0].1, places[n - 1].1);
     let readings = (0..n)
         .map(|i| {
@@ -244,6 +268,8 @@ fn another(seed: u64) -> Made {
         slope: slope + 1e-3 * line,
         eccentricity,
         inclination,
+        form: bent.collect(),
+        lag: lag.collect(),
     }
 }
 
@@ -272,13 +298,22 @@ fn judged(made: Made) -> Option<Found> {
         bar.eccentricity_um,
         bar.inclination_rad,
     ];
-    let mut tallies = [Tally::default(); 3];
+    let mut tallies = [Tally::default(); 5];
+    let freedom = chosen.turns.freedom.max(1.0);
     for ((tally, value), truth) in tallies.iter_mut().zip(values).zip(truth) {
-        tally.add(
-            value.value - truth,
-            value.std,
-            chosen.turns.freedom.max(1.0),
-        );
+        tally.add(value.value - truth, value.std, freedom);
+    }
+    let at = |share: f64| (share * (all.len() - 1) as f64).round() as usize;
+    let places = PLACES.map(|share| all[at(share)].x);
+    let form = chosen.fit.form(&places, &spread);
+    for (value, share) in form.iter().zip(PLACES) {
+        tallies[3].add(value.value - made.form[at(share)], value.std, freedom);
+    }
+    // One point of the curve a reading.
+    if let Some(curve) = chosen.fit.curve(all.len(), survey.base_hz, &spread) {
+        for i in PLACES.map(at) {
+            tallies[4].add(curve.lag_rad[i] - made.lag[i], curve.lag_std[i], freedom);
+        }
     }
     Some(Found {
         tallies,

@@ -107,8 +107,8 @@ fn turn(view: &View) -> Section {
         .figure(Figure::new(
             "Angle of the spindle against a steady turn",
             "The line of least squares through the angle is taken out: above zero the spindle is behind, where \
-             the curve falls it turns faster than on average. Band: 95 % by the noise of the readings; in \
-             simulated runs it held the truth at 85 to 89 of 100 times.",
+             the curve falls it turns faster than on average. Band: 95 % by the noise of the readings; a change \
+             of speed within a turn is not in it.",
             lag,
         ))
         .figure(Figure::new(
@@ -213,7 +213,7 @@ fn form(view: &View) -> Section {
     Section::new("Form").figure(Figure::new(
         "Form of slide and bar together",
         "Their least-squares line is taken out: its slope is the answer above. Band: 95 % by the noise of the \
-         readings; in simulated runs it held the truth at 85 to 89 of 100 places.",
+         readings; what changes within a turn is not in it.",
         Chart::new(
             Axis::new("slide position x", "mm"),
             Axis::new("deviation", "µm"),

@@ -128,6 +128,19 @@ impl CirclePoints {
         self.record.traces.first().map_or(0, Range::len)
     }
 
+    /// Angle from point to point of a pass, on average, degrees.
+    pub(super) fn spacing_of_a_pass(&self) -> f64 {
+        let places = self
+            .record
+            .traces
+            .first()
+            .map(|t| &self.record.places[t.clone()]);
+        match places {
+            Some([first, .., last]) => (last.x - first.x) / (self.points_of_a_pass() - 1) as f64,
+            _ => 360.0,
+        }
+    }
+
     /// Part of the test at which a point was taken, 0 to 1.
     pub(super) fn moment(&self, place: &Place) -> f64 {
         place.time / (self.record.places.len().max(2) - 1) as f64

@@ -19,8 +19,6 @@ const TURNS_A_CELL: f64 = 1.0;
 /// Levels or waves of single turns are taken to hold more than noise where noise alone makes as much less often
 /// than this: what were always added, and never taken away, would make uncertainties too large on average.
 const SLOW_SEEN: f64 = 0.05;
-/// Steps of the ladder of cells without a better one after which it ends.
-const PATIENCE: usize = 2;
 /// Cells from which the law of the noise is first taken, at most.
 const FIRST_CELLS: (usize, usize) = (20, 40);
 
@@ -158,8 +156,12 @@ fn slow_of(rivals: [Option<&Rival>; 3]) -> (Slow, f64) {
     (slow, ratio(levels).max(ratio(waves)))
 }
 
-/// The cells that describe the run best: of the form, then of the turn, up a ladder each, by the
+/// The cells that describe the run: of the turn, then of the form, one rung of a ladder above those of greatest
 /// likelihood under the law less ½ ln n for each unknown (Schwarz).
+///
+/// At the best rung what the cells do not follow is as great as the noise that one more rung would take up, and no
+/// covariance counts it. A rung above, the error of a cubic spline, which falls by the fourth power of the length
+/// of its cells, is a quarter of that.
 fn chosen(
     run: &Run,
     survey: &Survey,
@@ -169,17 +171,16 @@ fn chosen(
     noise: &Law,
     most: usize,
 ) -> Setting {
-    let across = from.at.border[super::problem::ACROSS_E];
     let hold = Held {
         across: from.across_held,
         ..Held::default()
     };
-    let bar = [survey.bar[0], survey.bar[1], across];
     let score = |setting: &Setting| {
         let fitted = fit(run, survey, setting, hold, &|problem, at| {
             at.border.clone_from(&from.at.border);
             if let (Some(basis), Some(unknowns)) = (&problem.wave, problem.wave_unknowns.first()) {
-                for (j, value) in unknowns.iter().zip(survey.turn(basis, bar)) {
+                let turn = from.turn_on(basis, false).unwrap_or_default();
+                for (j, value) in unknowns.iter().zip(turn) {
                     at.band[*j] = value;
                 }
             }
@@ -194,43 +195,31 @@ fn chosen(
             wave: Wave::Unsteady { cells },
             ..setting.clone()
         };
-        setting = best_of(most, with, &score).unwrap_or(setting);
+        setting = above_best_of(most, with, &score).unwrap_or(setting);
     }
     if plan.form_cells.is_none() {
         let with = |form_cells| Setting {
             form_cells,
             ..setting.clone()
         };
-        setting = best_of(most, with, &score).unwrap_or(setting);
+        setting = above_best_of(most, with, &score).unwrap_or(setting);
     }
     setting
 }
 
-/// Goes up a ladder of cells until it no longer gets better.
-fn best_of(
+/// The rung above the best of a ladder of cells. All are tried: with few cells a fit may end in a minimum far from
+/// the best one, and the next rungs too.
+fn above_best_of(
     most: usize,
     with: impl Fn(usize) -> Setting,
     score: &impl Fn(&Setting) -> Option<f64>,
 ) -> Option<Setting> {
-    let mut best: Option<(f64, Setting)> = None;
-    let mut since = 0;
-    let mut cells = 1;
-    while since <= PATIENCE {
-        let setting = with(cells);
-        if let Some(value) = score(&setting) {
-            if best.as_ref().is_none_or(|b| value < b.0) {
-                best = Some((value, setting));
-                since = 0;
-            } else {
-                since += 1;
-            }
-        }
-        if cells == most {
-            break;
-        }
-        cells = (cells + 1).max(cells * 7 / 5).min(most);
-    }
-    best.map(|b| b.1)
+    let above = |cells: usize| (cells + 1).max(cells * 7 / 5).min(most);
+    let next = |cells: &usize| (*cells < most).then(|| above(*cells));
+    let rungs = std::iter::successors(Some(1), next);
+    let scored = rungs.filter_map(|cells| Some((score(&with(cells))?, cells)));
+    let best = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(with(above(best.1)))
 }
 
 impl Rival<'_> {

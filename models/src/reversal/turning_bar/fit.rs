@@ -2,13 +2,14 @@
 
 use errsep_solvers::options::Options as Minimisation;
 use errsep_solvers::structured::{Parameters, StructuredProblem, fit_structured};
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 
 use super::error::TurningError;
 use super::problem::{ACROSS_E, ALONG_E, ECCENTRICITY, Held, SPEED, THETA, TurningProblem};
 use super::run::Run;
 use super::setting::{Setting, Wave};
-use super::start::Survey;
+use super::start::{Survey, TurnSample, turn_near};
+use crate::basis::bspline::CubicBSpline;
 
 /// γ across the eccentricity is held at zero where it is below so many of its standard deviations: of
 /// its square alone a run without recorded angle tells, and at zero nothing.
@@ -16,6 +17,9 @@ const ACROSS_SEEN: f64 = 5.0;
 
 /// Steps at most: a steady turn fitted to one that is not leaves much, and then they come slowly.
 const MOST_STEPS: u64 = 2000;
+
+/// Readings for each coefficient of a spline that takes over the turn of a fit.
+const SAMPLES: usize = 8;
 
 /// Puts the unknowns where a fit begins.
 type Begin<'b> = dyn Fn(&TurningProblem, &mut Parameters) + 'b;
@@ -62,6 +66,29 @@ impl TurningFit<'_> {
     pub(super) fn across(&self) -> f64 {
         self.at.border[ACROSS_E]
     }
+
+    /// Coefficients of another spline in time that follows its turn, rad; `mirrored`: the turn by which the bar
+    /// with γ across of the other sign makes the same wave.
+    pub(super) fn turn_on(&self, basis: &CubicBSpline, mirrored: bool) -> Option<Vec<f64>> {
+        let problem = &self.problem;
+        let [e, along, across] = [ECCENTRICITY, ALONG_E, ACROSS_E].map(|j| self.at.border[j]);
+        let step = (self.psi.len() / (SAMPLES * basis.coefficient_count())).max(1);
+        let readings = (0..self.psi.len()).step_by(step);
+        let samples: Vec<TurnSample> = readings
+            .map(|i| {
+                let seen_rad = problem.setting.indicator_rad - problem.frame.base[i];
+                let xi = problem.frame.xi(problem.run.x[i]);
+                let own = Complex::new(e + along * xi, across * xi);
+                let turned = if mirrored { 2.0 * own.arg() } else { 0.0 };
+                TurnSample {
+                    time: problem.run.time[i],
+                    stray: seen_rad - self.psi[i] + turned,
+                    weight: step as f64 / self.psi.len() as f64,
+                }
+            })
+            .collect();
+        turn_near(basis, &samples)
+    }
 }
 
 /// Fits a steady turn, or the recorded one: of the starts that the turns tell one by one.
@@ -85,7 +112,8 @@ pub fn steady<'a>(
 }
 
 /// Fits a turn that strays, from three starts: the bar inclined to either side across its eccentricity,
-/// each with the turn that the waves then tell, and the steady turn. Returns the fits with γ across
+/// each with the turn that the waves then tell, and the steady turn; then from the mirror of the best of them,
+/// as all three may end on the side that is not the best. Returns the fits with γ across
 /// positive and negative, the better first; one where both come to the same.
 ///
 /// # Errors
@@ -118,28 +146,44 @@ pub fn unsteady<'a>(
     let mut failed = TurningError::NoWave;
     for start in starts {
         match fit_seen(run, survey, setting, start) {
-            Ok(fit) => {
-                let twin = found
-                    .iter()
-                    .position(|f| (f.across() < 0.0) == (fit.across() < 0.0));
-                match twin {
-                    Some(k) if fit.squares < found[k].squares => found[k] = fit,
-                    Some(_) => {}
-                    None => found.push(fit),
-                }
-            }
+            Ok(fit) => keep_better(&mut found, fit),
             Err(why) => failed = why,
         }
+    }
+    let mirrored = found.first().filter(|best| !best.across_held);
+    let mirrored = mirrored.and_then(|best| {
+        let start: &Begin = &|problem, at| {
+            put_turn(problem, at, &|basis| {
+                best.turn_on(basis, true)
+                    .unwrap_or_else(|| survey.turn(basis, [e, along, -best.across()]))
+            });
+            let [e, along] = [ECCENTRICITY, ALONG_E].map(|j| best.at.border[j]);
+            put_bar(problem, at, [e, along, -best.across()]);
+        };
+        fit_seen(run, survey, setting, start).ok()
+    });
+    if let Some(fit) = mirrored {
+        keep_better(&mut found, fit);
     }
     if found.is_empty() {
         return Err(failed);
     }
-    found.sort_by(|a, b| a.squares.total_cmp(&b.squares));
     // Of a bar that is not seen to incline across there is one answer.
     if found.iter().any(|f| f.across_held) {
         found.truncate(1);
     }
     Ok(found)
+}
+
+/// Adds a fit to those found, one for either sign of γ across, the better first.
+fn keep_better<'a>(found: &mut Vec<TurningFit<'a>>, fit: TurningFit<'a>) {
+    let same = |f: &TurningFit| (f.across() < 0.0) == (fit.across() < 0.0);
+    match found.iter().position(same) {
+        Some(k) if fit.squares < found[k].squares => found[k] = fit,
+        Some(_) => {}
+        None => found.push(fit),
+    }
+    found.sort_by(|a, b| a.squares.total_cmp(&b.squares));
 }
 
 /// Fits a bar of any axis that turns as the steady fit found.
@@ -262,7 +306,7 @@ fn put_bar(problem: &TurningProblem, at: &mut Parameters, bar: [f64; 3]) {
 fn put_turn(
     problem: &TurningProblem,
     at: &mut Parameters,
-    coefficients: &dyn Fn(&crate::basis::bspline::CubicBSpline) -> Vec<f64>,
+    coefficients: &dyn Fn(&CubicBSpline) -> Vec<f64>,
 ) {
     if let (Some(basis), Some(unknowns)) = (&problem.wave, problem.wave_unknowns.first()) {
         for (j, value) in unknowns.iter().zip(coefficients(basis)) {

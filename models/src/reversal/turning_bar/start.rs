@@ -124,34 +124,53 @@ impl Survey {
             let before = strays.last().copied().unwrap_or(here);
             strays.push(here + TAU * ((before - here) / TAU).round());
         }
-        let n = basis.coefficient_count();
-        let mut normal = DMatrix::zeros(n, n);
-        let mut right = DVector::zeros(n);
         let whole: f64 = self.waves.iter().map(|w| w.z.norm_sqr()).sum();
-        for (wave, stray) in self.waves.iter().zip(&strays) {
-            let weight = wave.z.norm_sqr() / whole;
-            let (first, values) = basis.values(wave.time);
-            for (i, a) in values.iter().enumerate() {
-                right[first + i] += weight * a * stray;
-                for (j, b) in values.iter().enumerate() {
-                    normal[(first + i, first + j)] += weight * a * b;
-                }
+        let weighed = |(wave, stray): (&TurnWave, &f64)| TurnSample {
+            time: wave.time,
+            stray: *stray,
+            weight: wave.z.norm_sqr() / whole,
+        };
+        let samples: Vec<TurnSample> = self.waves.iter().zip(&strays).map(weighed).collect();
+        turn_near(basis, &samples).unwrap_or_else(|| basis.line(self.steady.theta, 0.0))
+    }
+}
+
+/// How far the turn strays at a time.
+#[derive(Debug, Clone, Copy)]
+pub struct TurnSample {
+    /// s.
+    pub time: f64,
+    /// rad.
+    pub stray: f64,
+    /// Its share of the whole.
+    pub weight: f64,
+}
+
+/// Coefficients of the spline in time that comes nearest to samples, rad.
+pub fn turn_near(basis: &CubicBSpline, samples: &[TurnSample]) -> Option<Vec<f64>> {
+    let n = basis.coefficient_count();
+    let mut normal = DMatrix::zeros(n, n);
+    let mut right = DVector::zeros(n);
+    for sample in samples {
+        let (first, values) = basis.values(sample.time);
+        for (i, a) in values.iter().enumerate() {
+            right[first + i] += sample.weight * a * sample.stray;
+            for (j, b) in values.iter().enumerate() {
+                normal[(first + i, first + j)] += sample.weight * a * b;
             }
-        }
-        // Where no turn has its middle in a cell the curve goes on as it was.
-        let stiff = 1e-6 / n as f64;
-        for k in 0..n.saturating_sub(2) {
-            for (i, a) in [1.0, -2.0, 1.0].into_iter().enumerate() {
-                for (j, b) in [1.0, -2.0, 1.0].into_iter().enumerate() {
-                    normal[(k + i, k + j)] += stiff * a * b;
-                }
-            }
-        }
-        match normal.cholesky() {
-            Some(factor) => factor.solve(&right).iter().copied().collect(),
-            None => basis.line(self.steady.theta, 0.0),
         }
     }
+    // Where a cell has no sample the curve goes on as it was.
+    let stiff = 1e-6 / n as f64;
+    for k in 0..n.saturating_sub(2) {
+        for (i, a) in [1.0, -2.0, 1.0].into_iter().enumerate() {
+            for (j, b) in [1.0, -2.0, 1.0].into_iter().enumerate() {
+                normal[(k + i, k + j)] += stiff * a * b;
+            }
+        }
+    }
+    let factor = normal.cholesky()?;
+    Some(factor.solve(&right).iter().copied().collect())
 }
 
 /// Turns in a second at which a wave on a slow background is highest.

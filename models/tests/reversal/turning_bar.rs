@@ -235,7 +235,7 @@ fn a_stray_of_zero_is_a_steady_turn() {
         ..Setting::default()
     };
     let even = steady(&run, &survey, &setting).unwrap();
-    let strays = unsteady(&run, &survey, &setting, &even).unwrap();
+    let strays = unsteady(&run, &survey, &setting, &even, None).unwrap();
     let law = Law::of_white(1e-6);
     let spread = Spread::new(&strays[0], &law, Slow::default());
     let curve = strays[0].curve(50, survey.base_hz, &spread).unwrap();

@@ -77,15 +77,8 @@ pub fn analyse<'a>(
 ) -> Result<Analysis<'a>, TurningError> {
     let (noise, setting) = described(run, survey, plan)?;
     let even = steady(run, survey, &setting)?;
-    let strays = unsteady(run, survey, &setting, &even).unwrap_or_default();
-    let Wave::Unsteady { cells } = setting.wave else {
-        return Err(TurningError::NoWave);
-    };
-    let bend = Setting {
-        wave: Wave::Bent { cells },
-        ..setting.clone()
-    };
-    let bend = bent(run, survey, &bend, &even).ok();
+    let bend = bent(run, survey, &setting, &even).ok();
+    let strays = unsteady(run, survey, &setting, &even, bend.as_ref()).unwrap_or_default();
     // The law is that of whatever leaves least.
     let least = strays.first().into_iter().chain(&bend).chain([&even]);
     let least = least.min_by(|a, b| {
@@ -130,7 +123,8 @@ fn described(run: &Run, survey: &Survey, plan: &Plan) -> Result<(Law, Setting), 
         ..plan.setting.clone()
     };
     let even = steady(run, survey, &first)?;
-    let Ok(fits) = unsteady(run, survey, &first, &even) else {
+    let bend = bent(run, survey, &first, &even).ok();
+    let Ok(fits) = unsteady(run, survey, &first, &even, bend.as_ref()) else {
         return Ok((laws(run, &even.psi, &even.residuals).mean(), first));
     };
     let noise = laws(run, &fits[0].psi, &fits[0].residuals).mean();

@@ -8,7 +8,7 @@ use super::error::TurningError;
 use super::problem::{ACROSS_E, ALONG_E, ECCENTRICITY, Held, SPEED, THETA, TurningProblem};
 use super::run::Run;
 use super::setting::{Setting, Wave};
-use super::start::{Survey, TurnSample, turn_near};
+use super::start::{Survey, TurnSample, TurnWave, turn_near};
 use crate::basis::bspline::CubicBSpline;
 
 /// γ across the eccentricity is held at zero where it is below so many of its standard deviations: of
@@ -67,6 +67,25 @@ impl TurningFit<'_> {
         self.at.border[ACROSS_E]
     }
 
+    /// The once-per-turn wave of a bar of any axis, along the run.
+    fn waves(&self) -> Option<Vec<TurnWave>> {
+        let problem = &self.problem;
+        let (Wave::Bent { .. }, Some(basis)) = (problem.setting.wave, &problem.wave) else {
+            return None;
+        };
+        let [cos, sin] = [0, 1].map(|which| problem.wave_of(&self.at, which));
+        let step = (self.psi.len() / (SAMPLES * basis.coefficient_count())).max(1);
+        let readings = (0..self.psi.len()).step_by(step);
+        let wave = |i: usize| {
+            let (x, time) = (problem.run.x[i], problem.run.time[i]);
+            let seen_rad = problem.setting.indicator_rad - problem.frame.base[i];
+            let own = Complex::new(basis.evaluate(&cos, x).0, basis.evaluate(&sin, x).0);
+            let z = own * Complex::from_polar(1.0, seen_rad - self.psi[i]);
+            TurnWave { time, x, z }
+        };
+        Some(readings.map(wave).collect())
+    }
+
     /// Coefficients of another spline in time that follows its turn, rad; `mirrored`: the turn by which the bar
     /// with γ across of the other sign makes the same wave.
     pub(super) fn turn_on(&self, basis: &CubicBSpline, mirrored: bool) -> Option<Vec<f64>> {
@@ -113,7 +132,8 @@ pub fn steady<'a>(
 
 /// Fits a turn that strays, from three starts: the bar inclined to either side across its eccentricity,
 /// each with the turn that the waves then tell, and the steady turn; then from the mirror of the best of them,
-/// as all three may end on the side that is not the best. Returns the fits with γ across
+/// as all three may end on the side that is not the best. Where a bent bar leaves less, also from the turn that a
+/// straight one would need to show the same wave. Returns the fits with γ across
 /// positive and negative, the better first; one where both come to the same.
 ///
 /// # Errors
@@ -123,6 +143,7 @@ pub fn unsteady<'a>(
     survey: &'a Survey,
     setting: &Setting,
     steady: &TurningFit,
+    bent: Option<&TurningFit>,
 ) -> Result<Vec<TurningFit<'a>>, TurningError> {
     let [e, along, across] = survey.bar;
     let from_steady = |problem: &TurningProblem, at: &mut Parameters| {
@@ -134,14 +155,11 @@ pub fn unsteady<'a>(
         let bar = [ECCENTRICITY, ALONG_E, ACROSS_E].map(|j| steady.at.border[j]);
         put_bar(problem, at, bar);
     };
-    let of_side = |across: f64| {
-        move |problem: &TurningProblem, at: &mut Parameters| {
-            let bar = [e, along, across];
-            put_turn(problem, at, &|basis| survey.turn(basis, bar));
-            put_bar(problem, at, bar);
-        }
-    };
-    let starts: [&Begin; 3] = [&of_side(across), &of_side(-across), &from_steady];
+    let starts: [&Begin; 3] = [
+        &seen_in(survey, [e, along, across]),
+        &seen_in(survey, [e, along, -across]),
+        &from_steady,
+    ];
     let mut found: Vec<TurningFit<'a>> = Vec::new();
     let mut failed = TurningError::NoWave;
     for start in starts {
@@ -165,6 +183,16 @@ pub fn unsteady<'a>(
     if let Some(fit) = mirrored {
         keep_better(&mut found, fit);
     }
+    let better = |bent: &&TurningFit| found.first().is_none_or(|f| bent.squares < f.squares);
+    if let Some(waves) = bent.filter(better).and_then(TurningFit::waves) {
+        let shown = survey.with_waves(waves);
+        let [e, along, across] = shown.bar;
+        for across in [across, -across] {
+            if let Ok(fit) = fit_seen(run, survey, setting, &seen_in(&shown, [e, along, across])) {
+                keep_better(&mut found, fit);
+            }
+        }
+    }
     if found.is_empty() {
         return Err(failed);
     }
@@ -173,6 +201,14 @@ pub fn unsteady<'a>(
         found.truncate(1);
     }
     Ok(found)
+}
+
+/// A start with a bar, and the turn by which it makes the waves of a survey.
+fn seen_in(survey: &Survey, bar: [f64; 3]) -> impl Fn(&TurningProblem, &mut Parameters) {
+    move |problem, at| {
+        put_turn(problem, at, &|basis| survey.turn(basis, bar));
+        put_bar(problem, at, bar);
+    }
 }
 
 /// Adds a fit to those found, one for either sign of γ across, the better first.
@@ -186,7 +222,7 @@ fn keep_better<'a>(found: &mut Vec<TurningFit<'a>>, fit: TurningFit<'a>) {
     found.sort_by(|a, b| a.squares.total_cmp(&b.squares));
 }
 
-/// Fits a bar of any axis that turns as the steady fit found.
+/// Fits a bar of any axis that turns as the steady fit found, with as many cells as the setting has.
 ///
 /// # Errors
 /// [`TurningError`]: a fit that has no answer.
@@ -196,7 +232,15 @@ pub fn bent<'a>(
     setting: &Setting,
     steady: &TurningFit,
 ) -> Result<TurningFit<'a>, TurningError> {
-    fit(run, survey, setting, Held::default(), &|_, at| {
+    let cells = match setting.wave {
+        Wave::Unsteady { cells } | Wave::Bent { cells } => cells,
+        Wave::Steady => setting.form_cells,
+    };
+    let setting = Setting {
+        wave: Wave::Bent { cells },
+        ..setting.clone()
+    };
+    fit(run, survey, &setting, Held::default(), &|_, at| {
         at.border[THETA] = steady.at.border[THETA];
         at.border[SPEED] = steady.at.border[SPEED];
     })

@@ -113,6 +113,15 @@ impl Survey {
         })
     }
 
+    /// The same with the once-per-turn wave as another fit has it.
+    pub fn with_waves(&self, waves: Vec<TurnWave>) -> Self {
+        Self {
+            bar: straight(&waves, &self.frame),
+            waves,
+            ..self.clone()
+        }
+    }
+
     /// Coefficients of a spline in time that the angle of the spindle follows where the bar has these
     /// e, γ₁, γ₂, rad.
     pub fn turn(&self, basis: &CubicBSpline, bar: [f64; 3]) -> Vec<f64> {

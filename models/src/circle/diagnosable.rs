@@ -259,12 +259,6 @@ impl FittedModel for CirclePoints {
         true
     }
 
-    /// The passes follow each other at one zero of the probe: what makes one larger is an effect of the catalogue,
-    /// and four passes could not tell it from noise that shifts each.
-    fn noise_shifts_traces(&self) -> bool {
-        false
-    }
-
     fn stated_noise(&self) -> Option<f64> {
         self.noise
     }

@@ -72,7 +72,6 @@ trait Behind: Send + Sync {
     fn quantities(&self) -> Vec<Quantity>;
     fn profiles(&self) -> Vec<Profile>;
     fn correlated_noise(&self) -> bool;
-    fn noise_shifts_traces(&self) -> bool;
     fn zero_may_jump(&self) -> bool;
     fn names_single_readings(&self) -> bool;
     fn expected_scatter(&self) -> &[Column];
@@ -138,9 +137,6 @@ impl<M: FittedModel + 'static> Behind for M {
     }
     fn correlated_noise(&self) -> bool {
         FittedModel::correlated_noise(self)
-    }
-    fn noise_shifts_traces(&self) -> bool {
-        FittedModel::noise_shifts_traces(self)
     }
     fn zero_may_jump(&self) -> bool {
         FittedModel::zero_may_jump(self)
@@ -232,9 +228,6 @@ impl FittedModel for AnyModel {
     }
     fn correlated_noise(&self) -> bool {
         self.0.correlated_noise()
-    }
-    fn noise_shifts_traces(&self) -> bool {
-        self.0.noise_shifts_traces()
     }
     fn zero_may_jump(&self) -> bool {
         self.0.zero_may_jump()

@@ -242,12 +242,6 @@ pub trait FittedModel: Clone + Send + Sync {
         true
     }
 
-    /// Whether noise, where it may be correlated, may shift whole traces. Where it may not, what shifts a trace is
-    /// gap.
-    fn noise_shifts_traces(&self) -> bool {
-        true
-    }
-
     /// Whether a zero that jumps between two traces and stays is an effect of the catalogue, and no
     /// shift of a trace by its noise.
     fn zero_may_jump(&self) -> bool {

@@ -37,7 +37,7 @@ fn shown(model: &AnyModel, readings: &DVector<f64>) -> NoiseLaw {
     }
     let (variance, freedom) = contrasts.scatter();
     if variance > floor * floor && model.correlated_noise() {
-        let laws = possible_laws(&contrasts, model.noise_shifts_traces(), SEED);
+        let laws = possible_laws(&contrasts, SEED);
         if !laws.is_empty() {
             return NoiseLaw::mean_of(laws);
         }

@@ -60,19 +60,15 @@ struct Proposal {
     weight: f64,
 }
 
-/// Laws of noise drawn from what the contrasts allow; `shifts`: whether it may shift whole traces.
-pub(in crate::diagnosis) fn possible_laws(
-    contrasts: &Contrasts,
-    shifts: bool,
-    seed: u64,
-) -> Vec<Components> {
+/// Laws of noise drawn from what the contrasts allow.
+pub(in crate::diagnosis) fn possible_laws(contrasts: &Contrasts, seed: u64) -> Vec<Components> {
     let Some((spacing, travel)) = contrasts.reach() else {
         return Vec::new();
     };
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let range = (spacing.ln(), travel.max(2.0 * spacing).ln());
     let mut proposals: Vec<Proposal> = Vec::new();
-    for kind in KINDS.into_iter().filter(|kind| shifts || !kind.shift) {
+    for kind in KINDS {
         proposals.extend(proposed(contrasts, kind, range, &mut random));
     }
     resampled(&proposals, contrasts.count() as f64, &mut random)
@@ -381,7 +377,7 @@ mod tests {
             ];
             let mut held = [0; 3];
             for seed in 0..40 {
-                let laws = possible_laws(&contrasts(&law, seed), true, seed);
+                let laws = possible_laws(&contrasts(&law, seed), seed);
                 assert_eq!(laws.len(), LAWS);
                 for (count, measure) in held.iter_mut().zip(measures) {
                     let mut values: Vec<f64> = laws.iter().map(measure).collect();

@@ -9,7 +9,7 @@ const X: usize = 0;
 /// At the reversal itself the axis has not moved back yet: a point stands as the place does that lies so far
 /// before it, or a quarter of the way to its neighbour where that is less. Which side of the reversal noise has
 /// put the point on does not count.
-const JUST_BEFORE_DEG: f64 = 1.0;
+const JUST_BEFORE_DEG: f64 = 0.1;
 
 /// See the head of the file.
 pub(super) struct AxisBacklash;

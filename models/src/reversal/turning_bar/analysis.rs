@@ -19,6 +19,12 @@ const TURNS_A_CELL: f64 = 1.0;
 /// Levels or waves of single turns are taken to hold more than noise where noise alone makes as much less often
 /// than this: what were always added, and never taken away, would make uncertainties too large on average.
 const SLOW_SEEN: f64 = 0.05;
+/// Rungs of the ladder of cells up to here are all tried: with few cells a fit may end in a minimum far from the
+/// best one, and the next rungs too.
+const ALL_TRIED: usize = 40;
+/// Beyond that, rungs without a better one after which it ends: the covariance of a rung takes memory by the square
+/// of its cells, and a long run has thousands of turns.
+const PATIENCE: usize = 2;
 /// Cells from which the law of the noise is first taken, at most.
 const FIRST_CELLS: (usize, usize) = (20, 40);
 
@@ -201,19 +207,28 @@ fn chosen(
     setting
 }
 
-/// The rung above the best of a ladder of cells. All are tried: with few cells a fit may end in a minimum far from
-/// the best one, and the next rungs too.
+/// The rung above the best of a ladder of cells.
 fn above_best_of(
     most: usize,
     with: impl Fn(usize) -> Setting,
     score: &impl Fn(&Setting) -> Option<f64>,
 ) -> Option<Setting> {
     let above = |cells: usize| (cells + 1).max(cells * 7 / 5).min(most);
-    let next = |cells: &usize| (*cells < most).then(|| above(*cells));
-    let rungs = std::iter::successors(Some(1), next);
-    let scored = rungs.filter_map(|cells| Some((score(&with(cells))?, cells)));
-    let best = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(with(above(best.1)))
+    let mut best: Option<(f64, usize)> = None;
+    let (mut cells, mut since) = (1, 0);
+    loop {
+        let value = score(&with(cells)).unwrap_or(f64::INFINITY);
+        if value.is_finite() && best.is_none_or(|b| value < b.0) {
+            best = Some((value, cells));
+            since = 0;
+        } else if cells > ALL_TRIED {
+            since += 1;
+        }
+        if cells >= most || since > PATIENCE {
+            return best.map(|b| with(above(b.1)));
+        }
+        cells = above(cells);
+    }
 }
 
 impl Rival<'_> {

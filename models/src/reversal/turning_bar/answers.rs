@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use errsep_solvers::structured::StructuredProblem;
-use nalgebra::{Complex, DMatrix, DVector, RowVector3};
+use nalgebra::{Complex, DVector, RowVector3};
 
 use super::fit::TurningFit;
 use super::problem::{ACROSS_E, ALONG_E, ECCENTRICITY, HARMONICS, SPEED};
@@ -69,10 +69,6 @@ pub struct Harmonic {
 }
 
 impl TurningFit<'_> {
-    fn count(&self) -> usize {
-        self.inverse.nrows()
-    }
-
     fn border(&self, place: usize) -> usize {
         self.problem.band_count() + place
     }
@@ -302,7 +298,7 @@ impl TurningFit<'_> {
     }
 
     /// Height and slope (over half the time) of the stray's line, as combinations of the unknowns.
-    fn turn_line(&self) -> Option<(DVector<f64>, DVector<f64>)> {
+    pub(super) fn turn_line(&self) -> Option<(DVector<f64>, DVector<f64>)> {
         let basis = self.turn_basis()?;
         let frame = self.problem.frame;
         let axis = Axis {
@@ -321,7 +317,7 @@ impl TurningFit<'_> {
         Some((height, slope))
     }
 
-    fn turn_basis(&self) -> Option<&CubicBSpline> {
+    pub(super) fn turn_basis(&self) -> Option<&CubicBSpline> {
         match self.problem.setting.wave {
             Wave::Unsteady { .. } => self.problem.wave.as_ref(),
             _ => None,
@@ -365,32 +361,6 @@ impl TurningFit<'_> {
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
             .map_or(0, |(k, _)| k);
         Some(curve)
-    }
-
-    /// χ² of what the turn's spline holds beside a line, and its degrees of freedom: how surely the turn
-    /// is not steady.
-    pub fn strays(&self, spread: &Spread) -> Option<(f64, f64)> {
-        let (height, slope) = self.turn_line()?;
-        let basis = self.turn_basis()?;
-        let places = basis.line(0.0, 1.0);
-        let n = places.len();
-        let mut weights = DMatrix::zeros(self.count(), n);
-        for (k, place) in places.iter().enumerate() {
-            let mut row = -&height - &slope * self.problem.frame.tau(*place);
-            row[self.problem.wave_unknowns[0][k]] += 1.0;
-            weights.set_column(k, &row);
-        }
-        let values = DVector::from_fn(n, |k, _| self.dot(&weights.column(k).into_owned()));
-        let parts = spread.of(&weights).symmetric_eigen();
-        // Line and constant are gone: two combinations have neither value nor variance.
-        let largest = parts.eigenvalues.max();
-        let along = parts.eigenvectors.tr_mul(&values);
-        let seen = parts.eigenvalues.iter().zip(along.iter());
-        let seen: Vec<f64> = seen
-            .filter(|(v, _)| **v > 1e-9 * largest)
-            .map(|(v, a)| a * a / v)
-            .collect();
-        Some((seen.iter().sum(), seen.len() as f64))
     }
 }
 

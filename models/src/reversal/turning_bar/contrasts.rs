@@ -8,11 +8,12 @@
 
 use std::ops::Range;
 
-use nalgebra::{Complex, DVector, Matrix3, Vector3};
+use nalgebra::{Complex, Matrix3, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
 use super::fit::TurningFit;
+use super::left::{Leaves, Left};
 use super::noise::windows;
 use crate::noise::{Posterior, decays};
 
@@ -70,15 +71,6 @@ struct Look {
     of: [Vec<f64>; 3],
 }
 
-/// What the fit leaves of a level or an amplitude.
-#[derive(Clone, Copy)]
-struct Left {
-    /// Part of the variance under the mean of the laws.
-    of_noise: f64,
-    /// Part of a scatter from turn to turn.
-    of_turns: f64,
-}
-
 /// Level and wave of the residuals of each turn.
 pub fn turn_residuals(fit: &TurningFit, noise: &Posterior) -> TurnResiduals {
     let turns = windows(&fit.psi, 1.0);
@@ -87,7 +79,11 @@ pub fn turn_residuals(fit: &TurningFit, noise: &Posterior) -> TurnResiduals {
         .into_par_iter()
         .filter_map(|readings| look(fit, noise, readings))
         .collect();
-    let left = left_by(fit, noise, &turns, &looks);
+    let leaves = Leaves::new(fit, noise.mean(), &turns);
+    let left: Vec<[Left; 3]> = looks
+        .par_iter()
+        .map(|look| leaves.of(&look.readings, &look.weights))
+        .collect();
     let (mut least, mut count) = (1.0_f64, 0.0);
     let mut turns = Vec::with_capacity(looks.len());
     for (look, left) in looks.iter().zip(&left) {
@@ -183,51 +179,4 @@ fn look(fit: &TurningFit, noise: &Posterior, readings: Range<usize>) -> Option<L
         weights,
         of,
     })
-}
-
-/// What the fit leaves of each level and amplitude.
-fn left_by(
-    fit: &TurningFit,
-    noise: &Posterior,
-    turns: &[Range<usize>],
-    looks: &[Look],
-) -> Vec<[Left; 3]> {
-    let law = noise.mean();
-    let along = decays(&fit.problem.run.time, law.length);
-    let waves: Vec<[f64; 2]> = fit.psi.iter().map(|p| [p.cos(), p.sin()]).collect();
-    let mut rows: Vec<Vec<(usize, f64)>> = Vec::with_capacity(along.len());
-    fit.problem.rows(&fit.at, |_, row| rows.push(row.to_vec()));
-    let part = |readings: &Range<usize>, weights: &[f64], is_level: bool| {
-        let mut seen = DVector::zeros(fit.inverse.nrows());
-        for (row, w) in rows[readings.clone()].iter().zip(weights) {
-            for (j, a) in row {
-                seen[*j] += w * a;
-            }
-        }
-        let taken = &fit.inverse * seen;
-        let mut left: Vec<f64> = rows
-            .iter()
-            .map(|row| -row.iter().map(|(j, a)| a * taken[*j]).sum::<f64>())
-            .collect();
-        for (left, w) in left[readings.clone()].iter_mut().zip(weights) {
-            *left += w;
-        }
-        let own = law.form(&along[readings.clone()], weights, weights);
-        let of_turn = |turn: &Range<usize>| -> f64 {
-            let own = left[turn.clone()].iter().zip(&waves[turn.clone()]);
-            if is_level {
-                return own.map(|(w, _)| w).sum::<f64>().powi(2);
-            }
-            let (c, s) = own.fold((0.0, 0.0), |(c, s), (w, n)| (c + w * n[0], s + w * n[1]));
-            c * c + s * s
-        };
-        Left {
-            of_noise: law.form(&along, &left, &left) / own.max(f64::MIN_POSITIVE),
-            of_turns: turns.iter().map(of_turn).sum(),
-        }
-    };
-    looks
-        .par_iter()
-        .map(|look| [0, 1, 2].map(|k| part(&look.readings, &look.weights[k], k == 0)))
-        .collect()
 }

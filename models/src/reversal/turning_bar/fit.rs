@@ -1,8 +1,11 @@
 //! The fit of one model to a run, from starts that the run itself tells.
 
+use std::sync::Arc;
+
+use errsep_solvers::linear::bordered::BorderedCovariance;
 use errsep_solvers::options::Options as Minimisation;
 use errsep_solvers::structured::{Parameters, StructuredProblem, fit_structured};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::Complex;
 
 use super::error::TurningError;
 use super::problem::{ACROSS_E, ALONG_E, ECCENTRICITY, Held, SPEED, THETA, TurningProblem};
@@ -31,7 +34,7 @@ pub struct TurningFit<'a> {
     /// Where it is.
     pub(super) at: Parameters,
     /// (JᵀJ)⁻¹ over the unknowns of band and border; zero where held.
-    pub(super) inverse: DMatrix<f64>,
+    pub(super) covariance: Arc<BorderedCovariance>,
     /// Reading less model, µm.
     pub residuals: Vec<f64>,
     /// ψ of every reading, rad.
@@ -55,6 +58,11 @@ impl TurningFit<'_> {
     /// Readings beyond the unknowns.
     pub fn freedom(&self) -> f64 {
         (self.residuals.len() - self.unknowns) as f64
+    }
+
+    /// Unknowns of band and border, held or not.
+    pub(super) fn count(&self) -> usize {
+        self.problem.band_count() + self.problem.border_count()
     }
 
     /// What was fitted.
@@ -258,8 +266,8 @@ fn fit_seen<'a>(
         return free;
     }
     let seen = free.as_ref().is_ok_and(|fit| {
-        let j = fit.problem.band_count() + ACROSS_E;
-        let variance = fit.inverse[(j, j)] * fit.squares / fit.freedom();
+        let own = fit.covariance.border()[(ACROSS_E, ACROSS_E)];
+        let variance = own * fit.squares / fit.freedom();
         fit.across().powi(2) > ACROSS_SEEN.powi(2) * variance
     });
     if seen {
@@ -312,19 +320,7 @@ fn fit_within<'a>(
             residual_rms_um: (squares / residuals.len() as f64).sqrt(),
             iterations: result.iterations,
         })?;
-    let (n, q) = (problem.band_count(), problem.border_count());
-    let mut inverse = DMatrix::zeros(n + q, n + q);
-    for j in 0..n + q {
-        let (band, border) = match j.checked_sub(n) {
-            None => covariance.times(&[(j, 1.0)], &[]),
-            Some(k) if problem.held()[k] => continue,
-            Some(k) => covariance.times(&[], &[(k, 1.0)]),
-        };
-        for (i, value) in band.into_iter().chain(border).enumerate() {
-            inverse[(i, j)] = value;
-        }
-    }
-    let at = result.parameters.clone();
+    let at = result.parameters;
     Ok(TurningFit {
         psi: problem.seen(&at),
         squares,
@@ -332,7 +328,7 @@ fn fit_within<'a>(
         iterations: result.iterations,
         across_held: hold.across,
         residuals,
-        inverse,
+        covariance: Arc::new(covariance),
         at,
         problem,
     })

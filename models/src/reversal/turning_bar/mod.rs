@@ -14,8 +14,12 @@
 mod analysis;
 mod answers;
 mod contrasts;
+#[cfg(test)]
+mod dense;
 mod error;
 mod fit;
+mod left;
+mod meat;
 mod noise;
 mod once_a_turn;
 mod pairs;
@@ -25,6 +29,7 @@ mod setting;
 pub mod simulate;
 mod spread;
 mod start;
+mod strays;
 
 pub use analysis::{Analysis, Plan, Rival, analyse};
 pub use answers::{Bar, Harmonic, Told, TurnCurve};

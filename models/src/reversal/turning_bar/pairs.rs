@@ -65,7 +65,7 @@ impl TurningFit<'_> {
             1e-3 * found[2].hypot(found[3]) / self.problem.frame.half_mm
         };
         // As sure as the change of the oval section along the bar.
-        let mut row = DVector::zeros(self.inverse.nrows());
+        let mut row = DVector::zeros(self.count());
         if per > 2 {
             row[self.problem.band_count() + from + 2] = 1.0;
         } else {

@@ -1,15 +1,17 @@
 //! Covariance of the unknowns of a least-squares fit whose residuals are correlated.
 //!
 //! Least squares weighs all readings alike; under a covariance V of the readings its unknowns have
-//! (JᵀJ)⁻¹ JᵀVJ (JᵀJ)⁻¹. JᵀVJ takes one pass: with S_i = Σ_{j<i} e^{−(t_i − t_j)/ℓ} row_j the sum over
-//! all pairs is Σ (row_i row_iᵀ + row_i S_iᵀ + S_i row_iᵀ). What levels and waves of single turns scatter beyond
-//! the law is a further part of V: of each turn Σ row_i, Σ row_i cos ψ_i and Σ row_i sin ψ_i, squared. So a level
-//! makes the slope of the form less sure and not the eccentricity, and a wave the other way round.
+//! (JᵀJ)⁻¹ JᵀVJ (JᵀJ)⁻¹. A level that scatters from turn to turn makes the slope of the form less sure and not the
+//! eccentricity, and a wave the other way round. Neither the inverse nor the product is written out: a combination
+//! w of unknowns has the variance vᵀ JᵀVJ v, v = (JᵀJ)⁻¹w, by one solve along the band.
 
-use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
+
+use errsep_solvers::linear::bordered::{BorderedCovariance, BorderedSymmetric};
+use nalgebra::DVector;
 
 use super::fit::TurningFit;
-use super::noise::windows;
+use super::meat::meat;
 use crate::noise::Law;
 
 /// What is slow in the residuals and not in the law: variances from turn to turn, µm².
@@ -24,64 +26,45 @@ pub struct Slow {
 /// Covariance of the unknowns, band before border, µm² and what follows from the units of each.
 #[derive(Debug, Clone)]
 pub struct Spread {
-    covariance: DMatrix<f64>,
+    /// (JᵀJ)⁻¹.
+    covariance: Arc<BorderedCovariance>,
+    /// JᵀVJ.
+    meat: BorderedSymmetric,
 }
 
 impl Spread {
     /// Under a law of the noise and what is slower.
     pub fn new(fit: &TurningFit, law: &Law, slow: Slow) -> Self {
-        let p = fit.inverse.nrows();
-        let time = &fit.problem.run.time;
-        let mut before = DVector::<f64>::zeros(p);
-        let mut last = None;
-        let mut pairs = DMatrix::<f64>::zeros(p, p);
-        let mut own = DMatrix::<f64>::zeros(p, p);
-        let ends = windows(&fit.psi, 1.0).into_iter().map(|turn| turn.end - 1);
-        let mut ends = ends.peekable();
-        let mut turn = DMatrix::<f64>::zeros(p, 3);
-        let mut slowly = DMatrix::<f64>::zeros(p, p);
-        fit.problem.rows(&fit.at, |i, row| {
-            let decay = last.map_or(0.0, |t: f64| (-(time[i] - t) / law.length).exp());
-            before *= decay;
-            for (j, a) in row {
-                pairs.column_mut(*j).axpy(*a, &before, 1.0);
-                for (k, b) in row {
-                    own[(*j, *k)] += a * b;
-                }
-            }
-            for (j, a) in row {
-                before[*j] += a;
-            }
-            last = Some(time[i]);
-            let (sin, cos) = fit.psi[i].sin_cos();
-            for (j, a) in row {
-                for (k, wave) in [1.0, cos, sin].into_iter().enumerate() {
-                    turn[(*j, k)] += a * wave;
-                }
-            }
-            if ends.next_if_eq(&i).is_some() {
-                for (k, variance) in [slow.level, slow.wave, slow.wave].into_iter().enumerate() {
-                    slowly.syger(variance, &turn.column(k), &turn.column(k), 1.0);
-                }
-                turn.fill(0.0);
-            }
-        });
-        slowly.fill_upper_triangle_with_lower_triangle();
-        let meat = own * (law.white + law.correlated)
-            + (&pairs + pairs.transpose()) * law.correlated
-            + slowly;
         Self {
-            covariance: &fit.inverse * meat * &fit.inverse,
+            covariance: Arc::clone(&fit.covariance),
+            meat: meat(fit, law, slow),
         }
     }
 
     /// Variance of a combination of unknowns.
     pub fn variance(&self, weights: &DVector<f64>) -> f64 {
-        weights.dot(&(&self.covariance * weights)).max(0.0)
+        self.meat.form(&self.taken(weights.as_slice())).max(0.0)
     }
 
-    /// Covariance of several combinations, one a column.
-    pub fn of(&self, weights: &DMatrix<f64>) -> DMatrix<f64> {
-        weights.tr_mul(&(&self.covariance * weights))
+    /// What each unknown has in common with a combination of them.
+    pub(super) fn times(&self, weights: &[f64]) -> Vec<f64> {
+        self.taken(&self.meat.times(&self.taken(weights)))
+    }
+
+    /// JᵀVJ times a vector over the unknowns.
+    pub(super) fn meat_times(&self, vector: &[f64]) -> Vec<f64> {
+        self.meat.times(vector)
+    }
+
+    /// (JᵀJ)⁻¹ times a vector over the unknowns.
+    fn taken(&self, weights: &[f64]) -> Vec<f64> {
+        let sparse = |part: &[f64]| -> Vec<(usize, f64)> {
+            let weights = part.iter().copied().enumerate();
+            weights.filter(|(_, w)| *w != 0.0).collect()
+        };
+        let (band, border) = weights.split_at(self.meat.band_len());
+        let (mut taken, border) = self.covariance.times(&sparse(band), &sparse(border));
+        taken.extend(border);
+        taken
     }
 }

@@ -6,9 +6,11 @@ mod compress;
 mod fold;
 mod inverse;
 mod lanes;
+mod sandwich;
 mod triangle;
 
 pub use compress::{Tall, compress};
 pub use fold::RowStack;
 pub use inverse::{BandInverse, stencil_trace};
+pub use sandwich::BandSandwich;
 pub use triangle::BandTriangle;

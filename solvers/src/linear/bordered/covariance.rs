@@ -26,7 +26,7 @@ use crate::linear::banded::{BandInverse, BandTriangle};
 #[derive(Debug, Clone)]
 pub struct BorderedCovariance {
     /// R_cc with R_cy beside it.
-    triangle: BandTriangle,
+    pub(super) triangle: BandTriangle,
     /// Q, p columns.
     q: Vec<Vec<f64>>,
     /// B, p × q.
@@ -39,12 +39,12 @@ pub struct BorderedCovariance {
 
 /// What it takes for the unknowns of the band.
 #[derive(Debug, Clone)]
-struct OfBand {
+pub(super) struct OfBand {
     inverse: BandInverse,
     /// P, n rows of p values.
-    p: DMatrix<f64>,
+    pub(super) p: DMatrix<f64>,
     /// U, n rows of q values.
-    u: DMatrix<f64>,
+    pub(super) u: DMatrix<f64>,
     /// Row by row the q values of U·root and the p of P.
     beside: Vec<f64>,
 }
@@ -62,7 +62,7 @@ impl BorderedCovariance {
         }
     }
 
-    fn of_band(&self) -> &OfBand {
+    pub(super) fn of_band(&self) -> &OfBand {
         self.of_band.get_or_init(|| {
             let (n, q, p) = (self.triangle.len(), self.border.nrows(), self.q.len());
             let stride = q + p;

@@ -15,10 +15,14 @@ mod assemble;
 mod constraints;
 mod covariance;
 mod model;
+mod sandwich;
 mod solve;
+mod symmetric;
 
 pub use assemble::{Bordered, Group, Share};
 pub use constraints::Constraints;
 pub use covariance::BorderedCovariance;
 pub use model::BorderedModel;
+pub use sandwich::{Combination, Sandwich};
 pub use solve::{Solved, Undetermined};
+pub use symmetric::BorderedSymmetric;

@@ -246,12 +246,23 @@ impl<'a> TurningProblem<'a> {
 
     /// Hands out the derivatives of the model at every reading by the unknowns that it sees: the band's
     /// numbers first, those of the border after all of the band's.
-    pub fn rows(&self, at: &Parameters, mut take: impl FnMut(usize, &[(usize, f64)])) {
+    pub fn rows(&self, at: &Parameters, take: impl FnMut(usize, &[(usize, f64)])) {
+        self.rows_of(&(0..self.run.len()), at, take);
+    }
+
+    /// As [`rows`](Self::rows), of some readings.
+    pub fn rows_of(
+        &self,
+        readings: &Range<usize>,
+        at: &Parameters,
+        mut take: impl FnMut(usize, &[(usize, f64)]),
+    ) {
         let mut row = vec![0.0; self.columns()];
         let mut sparse = Vec::new();
         let (band, n) = (4 * (1 + self.wave_unknowns.len()), self.band_count());
-        for piece in &self.pieces {
-            for i in piece.readings.clone() {
+        for piece in self.pieces_of(readings) {
+            let (start, end) = (piece.readings.start, piece.readings.end);
+            for i in start.max(readings.start)..end.min(readings.end) {
                 self.local(i, piece, at, &mut row);
                 sparse.clear();
                 sparse.extend(piece.band.iter().map(|(j, l)| (*j, row[*l])));
@@ -260,6 +271,25 @@ impl<'a> TurningProblem<'a> {
                 take(i, &sparse);
             }
         }
+    }
+
+    /// The pieces that have any of these readings.
+    fn pieces_of(&self, readings: &Range<usize>) -> &[Piece] {
+        let from = self
+            .pieces
+            .partition_point(|p| p.readings.end <= readings.start);
+        let to = self
+            .pieces
+            .partition_point(|p| p.readings.start < readings.end);
+        &self.pieces[from..to]
+    }
+
+    /// From the lowest to the highest unknown of the band that these readings see.
+    pub fn span(&self, readings: &Range<usize>) -> usize {
+        let seen = || self.pieces_of(readings).iter().flat_map(|p| &p.band);
+        let low = seen().map(|(j, _)| *j).min();
+        let high = seen().map(|(j, _)| *j).max();
+        high.zip(low).map_or(0, |(high, low)| high + 1 - low)
     }
 
     /// Local columns: band, free border, residual.

@@ -22,8 +22,9 @@ const SLOW_SEEN: f64 = 0.05;
 /// Rungs of the ladder of cells up to here are all tried: with few cells a fit may end in a minimum far from the
 /// best one, and the next rungs too.
 const ALL_TRIED: usize = 40;
-/// Beyond that, rungs without a better one after which it ends: the covariance of a rung takes memory by the square
-/// of its cells, and a long run has thousands of turns.
+/// Beyond that, rungs without a better one after which it ends. A reading sees four coefficients of one spline, and
+/// between these stand all that the other has over as many cells: where one has few cells and the other one a turn
+/// of a long run, the band is as wide as a part of the run, and its memory goes by the square of the cells.
 const PATIENCE: usize = 2;
 /// Cells from which the law of the noise is first taken, at most.
 const FIRST_CELLS: (usize, usize) = (20, 40);

@@ -8,10 +8,11 @@ use errsep_solvers::structured::{Parameters, StructuredProblem, fit_structured};
 use nalgebra::Complex;
 
 use super::error::TurningError;
+use super::nearest::{TurnSample, turn_near};
 use super::problem::{ACROSS_E, ALONG_E, ECCENTRICITY, Held, SPEED, THETA, TurningProblem};
 use super::run::Run;
 use super::setting::{Setting, Wave};
-use super::start::{Survey, TurnSample, TurnWave, turn_near};
+use super::start::{Survey, TurnWave};
 use crate::basis::bspline::CubicBSpline;
 
 /// γ across the eccentricity is held at zero where it is below so many of its standard deviations: of

@@ -20,6 +20,7 @@ mod error;
 mod fit;
 mod left;
 mod meat;
+mod nearest;
 mod noise;
 mod once_a_turn;
 mod pairs;

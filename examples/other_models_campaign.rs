@@ -1,21 +1,22 @@
 //! Blind campaign for every model but the reversal: `cargo run --release --example
-//! other_models_campaign -- CASES SEED [MODEL | nulls]`. Prints, as tables, for each effect, how often it was named, how
-//! often its size was within two standard uncertainties (where no other sensor or channel is left open),
+//! other_models_campaign -- CASES SEED [MODEL] [nulls | sizes]`. Prints, as tables, for each effect, how often it was
+//! named, how often its size was within two standard uncertainties (where no other sensor or channel is left open),
 //! and what was said with the effect withheld; for each pair of effects whether both were named; and the
-//! alarms with nothing there.
+//! alarms with nothing there. `nulls`: the alarms only. `sizes`: how often an effect is seen in just the size that the
+//! same readings without it are said to show with 80 % probability.
 
 #[path = "../tests/other_models/mod.rs"]
 mod other_models;
 
 use std::collections::BTreeMap;
 
-use errsep::diagnosis::Options;
-use other_models::{MAKERS, Maker, judged, judged_pair, seen_from, within};
+use errsep::diagnosis::{Kind, Options};
+use other_models::{MAKERS, Maker, judged, judged_pair, put_in, seen_from, within};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// Data with nothing there for one case of an effect.
+/// Sets of readings with nothing there for one case of an effect.
 const NULLS: u64 = 40;
 
 fn options(without: &[&str]) -> Options {
@@ -30,15 +31,22 @@ fn main() {
     let given: Vec<String> = std::env::args().skip(1).collect();
     let number = |k: usize, usual| given.get(k).and_then(|a| a.parse().ok()).unwrap_or(usual);
     let (cases, first): (u64, u64) = (number(0, 20), number(1, 1));
-    let only_nulls = given.get(2).is_some_and(|word| word == "nulls");
-    let wanted = |maker: &&Maker| {
-        let model = given.get(2).filter(|_| !only_nulls);
-        model.is_none_or(|model| maker.model == model)
+    let words = given.get(2..).unwrap_or_default();
+    let asked = |word: &str| words.iter().any(|w| w == word);
+    let named: Vec<&Maker> = MAKERS.iter().filter(|m| asked(m.model)).collect();
+    let makers = if named.is_empty() {
+        MAKERS.iter().collect()
+    } else {
+        named
     };
-    println!("{cases} cases an effect, seed {first}; sizes 1.5 to 4 times what is seen with 80 %");
-    for maker in MAKERS.iter().filter(wanted) {
+    println!("{cases} cases an effect, seed {first}");
+    for maker in makers {
         println!("\n### {}\n", maker.model);
-        if !only_nulls {
+        if asked("sizes") {
+            smallest(maker, cases, first);
+            continue;
+        }
+        if !asked("nulls") {
             let seen: Vec<(&str, f64)> = maker
                 .effects
                 .iter()
@@ -60,6 +68,46 @@ fn main() {
             })
             .count();
         println!("\nNothing there: {alarms} alarms in {}.", NULLS * cases);
+    }
+}
+
+/// Each effect in the smallest size that readings without it are said to show.
+fn smallest(maker: &Maker, cases: u64, first: u64) {
+    let told: Vec<Vec<Option<(f64, bool, bool)>>> = (0..cases)
+        .into_par_iter()
+        .map(|case| {
+            let seed = first * 40_000 + case;
+            let own = Options {
+                seed,
+                ..options(&[])
+            };
+            let bare = (maker.diagnosed)(&[], seed, &own);
+            let of = |effect: &&str| {
+                let hidden = bare.hidden.iter().find(|h| h.effect == **effect)?;
+                let size = hidden.detectable?;
+                let put = put_in(effect, size);
+                let with = (maker.diagnosed)(&[(*effect, put)], seed, &own);
+                Some((size, with.verdict.kind != Kind::None, hidden.at_least))
+            };
+            maker.effects.iter().map(of).collect()
+        })
+        .collect();
+    println!(
+        "| effect | size told, median | told in | as the least | seen |\n|---|---|---|---|---|"
+    );
+    for (k, effect) in maker.effects.iter().enumerate() {
+        let own: Vec<(f64, bool, bool)> = told.iter().filter_map(|case| case[k]).collect();
+        let mut sizes: Vec<f64> = own.iter().map(|o| o.0).collect();
+        sizes.sort_by(f64::total_cmp);
+        let median = sizes
+            .get(sizes.len() / 2)
+            .map_or("none".to_owned(), |size| format!("{size:.3e}"));
+        let seen = own.iter().filter(|o| o.1).count();
+        let least = own.iter().filter(|o| o.2).count();
+        println!(
+            "| {effect} | {median} | {} of {cases} | {least} | {seen} |",
+            own.len()
+        );
     }
 }
 

@@ -1,7 +1,7 @@
 //! The diagnosis of every model but the reversal, against known truth put in by code that shares
 //! nothing with the signatures.
 
-use crate::other_models::{MAKERS, Maker, judged, seen_from};
+use crate::other_models::{MAKERS, Maker, judged, seen_from, told_of};
 use errsep::diagnosis::{Kind, Options, diagnose};
 use errsep_models::calibration_line::simulate::{CalibrationSimulation, Disturbance, simulate};
 use errsep_models::calibration_line::{CalibrationLine, CalibrationReading};
@@ -15,11 +15,13 @@ fn options(without: &[&str]) -> Options {
     }
 }
 
-/// Each effect, at four times the size that shows, is named alone or in its group, and most of the
-/// gap is gone; nothing there gives no name.
+/// Each effect, at four times the size that shows and at eight times one that is told as the least, is named alone or
+/// in its group, and most of the gap is gone; nothing there gives no name.
 fn found_blind(maker: &Maker) {
     for effect in maker.effects {
-        let size = 4.0 * seen_from(maker, effect, &options(&[]));
+        let told = told_of(maker, effect, &options(&[]));
+        let times = if told.at_least { 8.0 } else { 4.0 };
+        let size = times * told.detectable.unwrap();
         let diagnosis = (maker.diagnosed)(&[(effect, size)], 7, &options(&[]));
         let said = judged(&diagnosis, Some(effect));
         assert!(
@@ -307,4 +309,35 @@ fn the_quadratic_of_pontius_is_named_and_withheld_no_other_alone_is_blamed() {
         "{}",
         withheld.verdict.statement
     );
+}
+
+/// In the smallest size that readings are said to show with 80 % an effect is seen in as many; of what differs from
+/// repeat to repeat that size is told as the least. k·u: of 60, 48 expected, with a standard deviation of 3.1; four of
+/// them either way.
+#[test]
+fn what_is_put_in_at_the_size_told_is_seen_in_four_cases_of_five() {
+    for (model, effect, differs) in [
+        ("calibration-line", "cubic", false),
+        ("circle", "ovality", false),
+        ("circle", "part-moved", true),
+    ] {
+        let maker = maker(model);
+        let mut seen = 0;
+        for seed in 300..360 {
+            let bare = (maker.diagnosed)(&[], seed, &options(&[]));
+            // Readings that show it with nothing there, one in a hundred, tell no size.
+            let Some(own) = bare.hidden.iter().find(|h| h.effect == effect) else {
+                continue;
+            };
+            assert_eq!(own.at_least, differs, "{model} {effect}");
+            if differs {
+                break;
+            }
+            let put = [(effect, own.detectable.unwrap())];
+            let with = (maker.diagnosed)(&put, seed, &options(&[]));
+            seen += usize::from(with.verdict.kind != Kind::None);
+        }
+        let near = (36..=60).contains(&seen);
+        assert!(near || differs, "{model} {effect}: {seen} of 60");
+    }
 }

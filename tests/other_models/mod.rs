@@ -1,7 +1,7 @@
 //! Makers of data for every model but the reversal: known effects in exact form, noise, repeats.
 #![allow(dead_code, reason = "the campaign and the tests each use their part")]
 
-use errsep::diagnosis::{Diagnosis, Kind, Options, diagnose};
+use errsep::diagnosis::{Diagnosis, Hidden, Kind, Options, diagnose};
 use errsep_models::calibration_line::CalibrationLine;
 use errsep_models::calibration_line::simulate as line;
 use errsep_models::circle::{self, CirclePoints, CircleSimulation};
@@ -304,13 +304,26 @@ pub fn within(diagnosis: &Diagnosis, effect: &str, size: f64) -> Option<bool> {
     Some(right && (found.value.abs() - size).abs() <= 2.0 * found.std)
 }
 
+/// What the maker is to be given for an effect of a size: it puts a yaw in by the amplitude of a wave, and its size is
+/// told by the root mean square.
+pub fn put_in(effect: &str, size: f64) -> f64 {
+    match effect {
+        "yaw" => size * 2f64.sqrt(),
+        _ => size,
+    }
+}
+
 /// The smallest size of an effect that data without it would have shown with 80 % probability.
 pub fn seen_from(maker: &Maker, effect: &str, options: &Options) -> f64 {
+    let size = told_of(maker, effect, options).detectable;
+    size.unwrap_or_else(|| panic!("{} does not show {effect}", maker.model))
+}
+
+/// What data without an effect tell of it.
+pub fn told_of(maker: &Maker, effect: &str, options: &Options) -> Hidden {
     let bare = (maker.diagnosed)(&[], 1, options);
-    let hidden = bare.hidden.iter().find(|h| h.effect == effect);
-    hidden
-        .and_then(|h| h.detectable)
-        .unwrap_or_else(|| panic!("{} does not show {effect}", maker.model))
+    let own = bare.hidden.into_iter().find(|h| h.effect == effect);
+    own.unwrap_or_else(|| panic!("{} shows {effect} with nothing there", maker.model))
 }
 
 /// A verdict in one word against what was put in.

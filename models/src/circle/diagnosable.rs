@@ -26,6 +26,39 @@ pub struct CirclePoints {
     residuals: DVector<f64>,
     jacobian: DMatrix<f64>,
     noise: Option<f64>,
+    /// Of each trace.
+    passes: Vec<Pass>,
+}
+
+/// Where and when a pass was begun, and when it ended.
+#[derive(Debug, Clone, Copy)]
+struct Pass {
+    repeat: u32,
+    /// Degrees.
+    from: f64,
+    begun: f64,
+    ended: f64,
+}
+
+impl Pass {
+    fn of(places: &[Place]) -> Option<Self> {
+        let first = places.iter().min_by(|a, b| a.time.total_cmp(&b.time))?;
+        let last = places.iter().max_by(|a, b| a.time.total_cmp(&b.time))?;
+        Some(Self {
+            repeat: first.repeat,
+            from: first.x,
+            begun: first.time,
+            ended: last.time,
+        })
+    }
+
+    /// Degrees turned since the pass was begun. Noise may put a point behind the first one by less than `slack`; in the
+    /// second half of the pass it closes the turn.
+    fn turned(&self, place: &Place, slack: f64) -> f64 {
+        let on = (place.direction * (place.x - self.from) + slack).rem_euclid(360.0) - slack;
+        let late = 2.0 * place.time > self.begun + self.ended;
+        if on < slack && late { on + 360.0 } else { on }
+    }
 }
 
 impl CirclePoints {
@@ -98,8 +131,12 @@ impl CirclePoints {
             })
             .collect();
         let own = orthogonal_fit(&ordered, noise)?;
+        let record = Record::new(places, traces, observed);
+        let passes = record.traces.iter();
+        let passes = passes.filter_map(|t| Pass::of(&record.places[t.clone()]));
         Ok(Self {
-            record: Record::new(places, traces, observed),
+            passes: passes.collect(),
+            record,
             fixed,
             directions,
             fitted: own.circle,
@@ -146,12 +183,15 @@ impl CirclePoints {
         place.time / (self.record.places.len().max(2) - 1) as f64
     }
 
-    /// Angle turned since the first pass began, rad: the passes follow each other without stopping.
+    /// Angle turned since the first pass began, rad: the passes follow each other without stopping. From the point at
+    /// which a pass was begun, wherever it is cut open.
     pub(super) fn turned(&self, place: &Place) -> f64 {
-        let start = |t: &Range<usize>| self.record.places[t.start].repeat;
-        let passes = self.record.traces.iter().map(start);
-        let before = passes.filter(|repeat| *repeat < place.repeat).count();
-        Self::angle(place) + std::f64::consts::TAU * place.direction * before as f64
+        let before = self.passes.iter().filter(|p| p.repeat < place.repeat);
+        let before = 360.0 * before.count() as f64;
+        let own = self.passes.iter().find(|p| p.repeat == place.repeat);
+        let slack = 0.5 * self.spacing_of_a_pass();
+        let on = own.map_or(0.0, |pass| pass.turned(place, slack));
+        place.direction * (before + on).to_radians()
     }
 
     /// Angle of a place, rad.

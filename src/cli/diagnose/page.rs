@@ -249,6 +249,7 @@ fn hidden(hidden: &crate::diagnosis::Hidden) -> sheet::Hidden {
             let (value, unit) = shown(d, &hidden.unit);
             (value, unit.to_owned())
         }),
+        at_least: hidden.at_least,
         harm: hidden
             .harm
             .as_ref()

@@ -5,6 +5,9 @@ use std::fmt::Write;
 use crate::diagnosis::{Bias, Diagnosis, Harm, Hidden, Told, Trials, for_people, scaled};
 use crate::report::number::{plain, probability};
 
+/// What "at least" means beside the size of an effect.
+const AT_LEAST: &str = "  At least: what differs from repeat to repeat is taken for noise in part, and may have to be several times as great.";
+
 /// µrad for people; other units as they are.
 pub(super) fn shown(value: f64, unit: &str) -> (f64, &str) {
     let (scale, unit) = scaled(unit);
@@ -122,7 +125,8 @@ pub fn in_words(diagnosis: &Diagnosis) -> String {
             },
             |d| {
                 let (value, unit) = shown(d, &hidden.unit);
-                format!("would show from {} {unit}", number(value))
+                let least = if hidden.at_least { "at least " } else { "" };
+                format!("would show from {least}{} {unit}", number(value))
             },
         );
         let _ = writeln!(
@@ -131,6 +135,9 @@ pub fn in_words(diagnosis: &Diagnosis) -> String {
             hidden.effect,
             100.0 * hidden.visible
         );
+    }
+    if diagnosis.hidden.iter().any(|hidden| hidden.at_least) {
+        let _ = writeln!(text, "{AT_LEAST}");
     }
     for note in &diagnosis.notes {
         let _ = writeln!(text, "\nNote: {note}");

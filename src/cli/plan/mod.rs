@@ -346,10 +346,14 @@ fn answer(
     let bar = |row: &Diagnosability| Bar::new(row.effect.clone(), percent(row));
     let visible = Bars::new(Axis::new("visible part", "%")).bars(rows.iter().map(bar));
     for row in rows {
-        let (seen, told) = (
-            size(row.detectable, &row.unit),
-            size(row.identifiable, &row.unit),
-        );
+        let [seen, told] = [row.detectable, row.identifiable].map(|value| {
+            let least = if row.at_least && value.is_some() {
+                "\u{2265} "
+            } else {
+                ""
+            };
+            format!("{least}{}", size(value, &row.unit))
+        });
         let like = row
             .confused_with
             .as_ref()
@@ -369,6 +373,9 @@ fn answer(
             Cell::Text(harm),
             Cell::Text(like),
         ]);
+    }
+    if rows.iter().any(|row| row.at_least) {
+        text += "\u{2265}: what differs from repeat to repeat is taken for noise in part, and may have to be several times as great.\n";
     }
     text += "\nWhat would help most\n";
     let mut help = Vec::new();

@@ -10,4 +10,5 @@ pub(super) mod gram;
 pub(super) mod localise;
 pub(super) mod null;
 pub(super) mod scatter;
+pub(super) mod smallest;
 pub(super) mod space;

@@ -128,12 +128,12 @@ impl NullLaw {
             .map_or(1.0, |t| t.beyond(surprise))
     }
 
-    /// The statistic of one degree of freedom whose surprise a family exceeds with a probability.
-    pub fn threshold(&self, family: usize, probability: f64) -> f64 {
+    /// The statistic of so many degrees of freedom whose surprise a family exceeds with a probability.
+    pub fn threshold(&self, family: usize, probability: f64, freedom: usize) -> f64 {
         let (mut low, mut high) = (0.0, 1e3);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if self.family(family, surprise(middle, 1)) > probability {
+            if self.family(family, surprise(middle, freedom)) > probability {
                 low = middle;
             } else {
                 high = middle;

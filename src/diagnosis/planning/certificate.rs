@@ -2,9 +2,9 @@
 //!
 //! With Ê the projected, whitened signature: an effect of amplitude a has the signal-to-noise
 //! ratio a|Ê|. It is seen with 80 % probability from (√T + 0.84)/|Ê|, T the threshold of its
-//! family; it is told from another whose signature makes an angle θ with its own, with 99 %
-//! probability, from 2.33/(|Ê| sin θ/2) (difference of two chi-squared statistics as a product of
-//! two normal variables).
+//! family (`detection/smallest.rs`: where it has several shapes or differs from repeat to repeat); it is
+//! told from another whose signature makes an angle θ with its own, with 99 % probability, from
+//! 2.33/(|Ê| sin θ/2) (difference of two chi-squared statistics as a product of two normal variables).
 
 use std::sync::Arc;
 
@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use crate::diagnosis::detection::dictionary::{Dictionary, Meaning, Places, statistic};
 use crate::diagnosis::detection::null::NullLaw;
+use crate::diagnosis::detection::smallest::smallest;
 use crate::diagnosis::detection::space::Space;
 use crate::diagnosis::levels::{INVISIBLE, PLANNED, POWER, TELL, normal_quantile};
 use crate::diagnosis::noise::law::NoiseLaw;
@@ -28,6 +29,9 @@ pub struct Diagnosability {
     pub visible: f64,
     /// Smallest amplitude seen with 80 % probability, if any that is plausible is.
     pub detectable: Option<f64>,
+    /// Whether it may have to be greater than that: it differs from repeat to repeat and is taken for noise in
+    /// part.
+    pub at_least: bool,
     /// Smallest amplitude told from every other effect with 99 % probability, if any that is
     /// plausible is.
     pub identifiable: Option<f64>,
@@ -90,6 +94,7 @@ pub(in crate::diagnosis) fn certificate(
             effect: effect.name().to_owned(),
             visible,
             detectable: None,
+            at_least: false,
             identifiable: None,
             unit: effect
                 .amplitudes()
@@ -114,7 +119,7 @@ pub(in crate::diagnosis) fn certificate(
                 .column(0)
                 .clone_owned();
             let adjoint = dictionary.places.sums_of(&adjoint);
-            let seen = null.threshold(family, level).sqrt() + normal_quantile(POWER);
+            let seen = null.threshold(family, level, 1).sqrt() + normal_quantile(POWER);
             for other in catalogue.iter().filter(|o| o.name() != effect.name()) {
                 let Some(rival) = dictionary
                     .families
@@ -146,9 +151,13 @@ pub(in crate::diagnosis) fn certificate(
                     row.rivals.push((other.name().to_owned(), nearest));
                 }
             }
-            let plausible = |size: &f64| *size <= greatest_plausible(effect.as_ref());
-            let smallest = seen / length;
-            row.detectable = Some(smallest).filter(plausible);
+            let most = greatest_plausible(effect.as_ref());
+            let own = &dictionary.families[family];
+            let threshold = |order| null.threshold(family, level, order);
+            let found = smallest((model, law), &dictionary, own, threshold);
+            let least = found.map_or(seen / length, |s| s.size);
+            row.detectable = Some(least).filter(|size| *size <= most);
+            row.at_least = found.is_some_and(|s| s.at_least);
             let per_unit = length * law.sigma() / (n as f64).sqrt();
             // The harm is that of the first shape of the grid, so its own visible part counts.
             let first = space.gram(&first).matrix[(0, 0)].sqrt() / length;
@@ -157,11 +166,11 @@ pub(in crate::diagnosis) fn certificate(
                 .iter()
                 .map(|(name, bias, unit)| (name.clone(), bias / (first * per_unit), unit.clone()))
                 .collect();
-            row.visible_rms = Some(smallest * length * law.sigma() / (n as f64).sqrt());
+            row.visible_rms = Some(least * length * law.sigma() / (n as f64).sqrt());
             let half_angle = 0.5 * row.cosine.acos();
             row.identifiable = (half_angle.sin() > 1e-3)
-                .then(|| (normal_quantile(TELL) / (length * half_angle.sin())).max(smallest))
-                .filter(plausible);
+                .then(|| (normal_quantile(TELL) / (length * half_angle.sin())).max(least))
+                .filter(|size| *size <= most);
         }
         rows.push(row);
     }

@@ -4,7 +4,8 @@ use errsep_models::model::FittedModel;
 
 use crate::diagnosis::attribution::bias::weighted_std;
 use crate::diagnosis::attribution::context::Context;
-use crate::diagnosis::levels::{INVISIBLE, POWER, normal_quantile};
+use crate::diagnosis::detection::smallest::smallest;
+use crate::diagnosis::levels::INVISIBLE;
 use crate::diagnosis::options::Options;
 use crate::diagnosis::planning::certificate::greatest_plausible;
 use crate::diagnosis::verdict::types::{Harm, Hidden};
@@ -36,15 +37,15 @@ pub(in crate::diagnosis) fn hidden(
         let Some(family) = context.family_of(effect) else {
             continue;
         };
-        let visible = context.dictionary.families[family].visible;
-        let entries =
-            &context.dictionary.entries[context.dictionary.families[family].entries.clone()];
-        let gram = entries.iter().map(|e| e.gram[(0, 0)]).fold(0.0, f64::max);
-        let threshold = context.null.threshold(family, level);
+        let own = &context.dictionary.families[family];
+        let visible = own.visible;
         let most = greatest_plausible(description.as_ref());
-        let detectable = (visible >= INVISIBLE && gram > 0.0)
-            .then(|| (threshold.sqrt() + normal_quantile(POWER)) / gram.sqrt())
-            .filter(|size| *size <= most);
+        let noise = (context.model, &context.law);
+        let threshold = |order| context.null.threshold(family, level, order);
+        let smallest = (visible >= INVISIBLE)
+            .then(|| smallest(noise, &context.dictionary, own, threshold))
+            .flatten()
+            .filter(|smallest| smallest.size <= most);
         let shape = description.grid(context.model).into_iter().next();
         let column = shape
             .and_then(|s| description.columns(context.model, &s).into_iter().next())
@@ -67,7 +68,8 @@ pub(in crate::diagnosis) fn hidden(
         list.push(Hidden {
             effect: description.name().to_owned(),
             visible,
-            detectable,
+            detectable: smallest.map(|s| s.size),
+            at_least: smallest.is_some_and(|s| s.at_least),
             unit: description
                 .amplitudes()
                 .first()

@@ -195,6 +195,9 @@ pub struct Hidden {
     /// Smallest amplitude that would be seen with 80 % probability; none where that is greater than
     /// any plausible one or where nothing shows.
     pub detectable: Option<f64>,
+    /// Whether it may have to be greater than that: it differs from repeat to repeat and is taken for noise in
+    /// part.
+    pub at_least: bool,
     /// Unit of that amplitude.
     pub unit: String,
     /// The quantity it biases most, per unit of its amplitude.

@@ -328,7 +328,8 @@ fn hidden(view: &View) -> Section {
                 .detectable
                 .as_ref()
                 .map_or("at no size".into(), |(size, unit)| {
-                    Cell::from(format!("{} {unit}", number::plain(*size, 2)))
+                    let least = if hidden.at_least { "at least " } else { "" };
+                    Cell::from(format!("{least}{} {unit}", number::plain(*size, 2)))
                 }),
             hidden.harm.clone().into(),
         ]
@@ -336,7 +337,9 @@ fn hidden(view: &View) -> Section {
     section
         .paragraph(
             "An effect with no visible share looks to these readings exactly like other values of the \
-             fitted parameters: whether it is there cannot be told from them.",
+             fitted parameters: whether it is there cannot be told from them. What differs from repeat to \
+             repeat is taken for noise in part: where a size says at least, it may have to be several times \
+             as great.",
         )
         .table(
             Table::new(

@@ -191,6 +191,8 @@ pub struct Hidden {
     pub visible: f64,
     /// Smallest size that would be seen, with its unit, if any would.
     pub detectable: Option<(f64, String)>,
+    /// Whether it may have to be greater than that, being taken for noise in part.
+    pub at_least: bool,
     /// What it does to the answer unseen.
     pub harm: String,
 }

@@ -102,3 +102,44 @@ fn over_all_turns(model: &CirclePoints, count: f64) -> Vec<Column> {
         })
         .into()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::circle::Point;
+    use nalgebra::DVector;
+
+    /// Rounding: a wave that goes on from pass to pass is its two columns, wherever the widest gap between
+    /// the points of a pass cuts it open, and whichever way it is turned.
+    #[test]
+    fn a_wave_goes_on_from_where_a_pass_was_begun() {
+        for (sense, closing) in [(1.0, 0), (-1.0, 0), (1.0, 1)] {
+            let mut points = Vec::new();
+            let mut wave = Vec::new();
+            for pass in 0..4_u32 {
+                for k in 0..72 + closing {
+                    let wider = if (40..72).contains(&k) { 0.5 } else { 0.0 };
+                    let angle = (f64::from(k) * 5.0 + wider).to_radians();
+                    let (y, x) = (sense * angle).sin_cos();
+                    points.push((Point::new(50.0 * x, 50.0 * y), pass + 1));
+                    let turned = angle + std::f64::consts::TAU * f64::from(pass);
+                    wave.push((turned, (2.4 * turned).cos()));
+                }
+            }
+            let model = CirclePoints::new(&points, None).expect("a circle");
+            // In the order of the places.
+            let order = model.places().iter().map(|p| wave[p.time as usize].1);
+            let wave = DVector::from_iterator(points.len(), order);
+            let columns = over_all_turns(&model, 2.4);
+            let dense: Vec<_> = columns.iter().map(|c| c.dense(points.len())).collect();
+            let basis = DMatrix::from_columns(&dense);
+            let gram = basis.tr_mul(&basis).cholesky().expect("two columns");
+            let left = &wave - &basis * gram.solve(&basis.tr_mul(&wave));
+            assert!(
+                left.amax() < 1e-9,
+                "{sense} {closing}: {} is left",
+                left.amax()
+            );
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! The smallest size in which an effect would be seen in some readings.
+//!
+//! An effect of size a, whose signature the fit leaves with the length L in units of the noise, reaches
+//! the statistic T at which it stands out with the probability Φ(aL − √T). Where it has several
+//! shapes, the one that shows middling well stands for all: the best would tell too small a size, and a
+//! single one that hardly shows, as of a sensor whose errors the others' take up, far too great a one.
+//! What differs from repeat to repeat is taken for noise in part: it swells the noise as the repeats show
+//! it, or makes it seem correlated, and so hides itself. Of such an effect the size is a lower bound.
+
+use errsep_models::model::{AnyModel, Column, FittedModel};
+
+use crate::diagnosis::detection::dictionary::{Dictionary, Entry, Family};
+use crate::diagnosis::levels::{PASSES_FOR_NOISE, POWER, SWELLS, normal_quantile};
+use crate::diagnosis::noise::contrasts::Contrasts;
+use crate::diagnosis::noise::law::NoiseLaw;
+
+/// The smallest size that is seen with 80 % probability.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::diagnosis) struct Smallest {
+    pub size: f64,
+    /// Whether the effect is taken for noise in part, so that this is the least it may be.
+    pub at_least: bool,
+}
+
+/// The smallest size of an effect of a family; nothing where the fit absorbs all of it. `statistic`: where
+/// a signature of so many columns stands out.
+pub(in crate::diagnosis) fn smallest(
+    (model, law): (&AnyModel, &NoiseLaw),
+    dictionary: &Dictionary,
+    family: &Family,
+    statistic: impl Fn(usize) -> f64,
+) -> Option<Smallest> {
+    let entries = &dictionary.entries[family.entries.clone()];
+    let mut shapes: Vec<&Entry> = entries.iter().collect();
+    shapes.sort_by(|a, b| a.gram[(0, 0)].total_cmp(&b.gram[(0, 0)]));
+    let typical = shapes.get(shapes.len() / 2)?;
+    let least = statistic(typical.order()).sqrt() + normal_quantile(POWER);
+    let size = least / typical.gram[(0, 0)].sqrt();
+    let signature = dictionary.columns(typical).into_iter().next()?;
+    let at_least = model.stated_noise().is_none() && swells(model, law, &signature, size);
+    Some(Smallest { size, at_least })
+}
+
+/// Whether an effect of a size changes what the differences between repeats tell of the noise.
+fn swells(model: &AnyModel, law: &NoiseLaw, signature: &Column, size: f64) -> bool {
+    let full = signature.dense(model.places().len());
+    let contrasts = Contrasts::new(model.places(), model.traces(), &full);
+    if contrasts.count() == 0 {
+        return false;
+    }
+    let white = law.white.max(f64::MIN_POSITIVE);
+    if model.correlated_noise() && contrasts.reach().is_some() {
+        let seen = contrasts.likelihood(law.correlated / white, law.length, law.shift / white);
+        return size * size * seen.quadratic / white > PASSES_FOR_NOISE;
+    }
+    let (variance, _) = contrasts.scatter();
+    size * size * variance / white > SWELLS
+}

@@ -13,7 +13,7 @@ use errsep_models::reversal::Channel;
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::exact_readings::Injection;
 use nalgebra::{DMatrix, DVector};
-use other_models::{MAKERS, Put, within};
+use other_models::{MAKERS, Put, told_of_put, within};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -175,12 +175,7 @@ fn gap(tally: &mut Tally, size: Size, truth: f64) {
 }
 
 fn sized(tally: &mut Tally, diagnosis: &Diagnosis, effect: &str, size: f64) {
-    // A yaw is put in by the amplitude of a wave and told by its root mean square.
-    let size = if effect == "yaw" {
-        size / 2f64.sqrt()
-    } else {
-        size
-    };
+    let size = size * told_of_put(effect);
     let candidate = diagnosis.candidates.iter().find(|c| c.effect == effect);
     if let Some(found) = candidate.and_then(|c| c.parameters.first()) {
         tally.add(found.value.abs() - size, found.std, freedom(diagnosis));

@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::diagnosis::other_models::{self, MAKERS, Put, seen_from};
+use super::diagnosis::other_models::{self, MAKERS, Put, seen_from, told_of_put};
 use super::tally::{Row, Tally};
 
 fn options() -> Options {
@@ -103,12 +103,7 @@ fn one<M: FittedModel + 'static>(
     } else {
         &own.elsewhere.iter().find(|e| right(&e.variant))?.parameters
     };
-    // A yaw is put in by the amplitude of a wave and told by its root mean square.
-    let truth = if effect == "yaw" {
-        size / 2f64.sqrt()
-    } else {
-        size
-    };
+    let truth = size * told_of_put(effect);
     let told = parameters.first()?;
     let freedom = fit.noise.degrees_of_freedom.unwrap_or(f64::INFINITY);
     let mut tallies = [Tally::default(); 2];

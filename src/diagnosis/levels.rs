@@ -168,11 +168,11 @@ pub(in crate::diagnosis) const SAME: f64 = 0.9;
 
 /// *Quantile.* Power at which an effect of the smallest size is seen.
 pub(in crate::diagnosis) const POWER: f64 = 0.8;
-/// *Reckoned.* Part by which an effect makes the variance greater that repeats tell of white noise, from which it is
-/// said to be taken for noise: a tenth of the standard deviation.
+/// *Reckoned.* An effect that makes the variance which repeats tell of white noise greater by this part, its standard
+/// deviation by a tenth, is said to be taken for noise.
 pub(in crate::diagnosis) const SWELLS: f64 = 0.2;
-/// *Reckoned.* Sum of squares, in units of the noise, that an effect adds to the differences between repeats, from which
-/// it may pass for correlated noise: below one it is no chance's worth.
+/// *Reckoned.* Where noise may be correlated, an effect that adds this to the sum of squares of the differences between
+/// repeats, in units of the noise, is said to be: as much as noise of one degree of freedom.
 pub(in crate::diagnosis) const PASSES_FOR_NOISE: f64 = 1.0;
 /// *Quantile.* Probability at which two effects are told apart.
 pub(in crate::diagnosis) const TELL: f64 = 0.99;

@@ -5,6 +5,7 @@ use crate::other_models::{MAKERS, Maker, judged, seen_from, told_of};
 use errsep::diagnosis::{Kind, Options, diagnose};
 use errsep_models::calibration_line::simulate::{CalibrationSimulation, Disturbance, simulate};
 use errsep_models::calibration_line::{CalibrationLine, CalibrationReading};
+use errsep_models::circle::{self, CirclePoints, CircleSimulation, Point};
 use errsep_models::model::FittedModel;
 
 fn options(without: &[&str]) -> Options {
@@ -311,33 +312,62 @@ fn the_quadratic_of_pontius_is_named_and_withheld_no_other_alone_is_blamed() {
     );
 }
 
-/// In the smallest size that readings are said to show with 80 % an effect is seen in as many; of what differs from
-/// repeat to repeat that size is told as the least. k·u: of 60, 48 expected, with a standard deviation of 3.1; four of
-/// them either way.
+/// In the smallest size that readings are said to show with 80 % an effect is seen in as many. k·u: of 60, 48 are
+/// expected, with a standard deviation of 3.1; three of them either way.
 #[test]
 fn what_is_put_in_at_the_size_told_is_seen_in_four_cases_of_five() {
-    for (model, effect, differs) in [
-        ("calibration-line", "cubic", false),
-        ("circle", "ovality", false),
-        ("circle", "part-moved", true),
-    ] {
+    for (model, effect) in [("calibration-line", "cubic"), ("circle", "ovality")] {
         let maker = maker(model);
-        let mut seen = 0;
-        for seed in 300..360 {
-            let bare = (maker.diagnosed)(&[], seed, &options(&[]));
+        let seen = (300..360).filter(|seed| {
+            let bare = (maker.diagnosed)(&[], *seed, &options(&[]));
             // Readings that show it with nothing there, one in a hundred, tell no size.
-            let Some(own) = bare.hidden.iter().find(|h| h.effect == effect) else {
-                continue;
-            };
-            assert_eq!(own.at_least, differs, "{model} {effect}");
-            if differs {
-                break;
-            }
-            let put = [(effect, own.detectable.unwrap())];
-            let with = (maker.diagnosed)(&put, seed, &options(&[]));
-            seen += usize::from(with.verdict.kind != Kind::None);
-        }
-        let near = (36..=60).contains(&seen);
-        assert!(near || differs, "{model} {effect}: {seen} of 60");
+            let own = bare.hidden.iter().find(|h| h.effect == effect);
+            own.is_some_and(|own| {
+                let put = [(effect, own.detectable.unwrap())];
+                let with = (maker.diagnosed)(&put, *seed, &options(&[]));
+                with.verdict.kind != Kind::None
+            })
+        });
+        let seen = seen.count();
+        assert!((39..=57).contains(&seen), "{model} {effect}: {seen} of 60");
     }
+}
+
+/// What differs from repeat to repeat is taken for noise in part, and its size told as the least; what is the same in
+/// all is not, nor is noise that is stated swollen by anything.
+#[test]
+fn a_size_is_told_as_the_least_where_repeats_differ_by_it() {
+    let circle = maker("circle");
+    for (effect, differs) in [
+        ("part-moved", true),
+        ("zero-jump", true),
+        ("lobes", false),
+        ("ovality", false),
+    ] {
+        let told = told_of(circle, effect, &options(&[]));
+        assert_eq!(told.at_least, differs, "{effect}");
+    }
+    let points = circle_points(4);
+    let stated = diagnose(
+        &CirclePoints::new(&points, Some(1.0)).unwrap(),
+        &options(&[]),
+    );
+    assert!(stated.hidden.iter().any(|h| h.detectable.is_some()));
+    assert!(stated.hidden.iter().all(|h| !h.at_least));
+}
+
+/// Passes of 72 points with 1 µm of noise.
+fn circle_points(passes: usize) -> Vec<(Point, u32)> {
+    let what = |pass| CircleSimulation {
+        count: 72,
+        noise_um: 1.0,
+        pass: (pass, passes),
+        ..CircleSimulation::default()
+    };
+    (0..passes)
+        .flat_map(|pass| {
+            let points = circle::simulate_disturbed(&what(pass), &[], pass as u64).unwrap();
+            points.into_iter().map(move |p| (p, pass as u32 + 1))
+        })
+        .collect()
 }

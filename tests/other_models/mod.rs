@@ -288,12 +288,7 @@ pub fn within(diagnosis: &Diagnosis, effect: &str, size: f64) -> Option<bool> {
     if ["part-zero", "part-rotation"].contains(&effect) {
         return None;
     }
-    // A yaw is put in by the amplitude of a wave and told by its root mean square.
-    let size = if effect == "yaw" {
-        size / 2f64.sqrt()
-    } else {
-        size
-    };
+    let size = size * told_of_put(effect);
     let candidate = diagnosis.candidates.iter().find(|c| c.effect == effect)?;
     if !candidate.elsewhere.is_empty() {
         return None;
@@ -304,12 +299,12 @@ pub fn within(diagnosis: &Diagnosis, effect: &str, size: f64) -> Option<bool> {
     Some(right && (found.value.abs() - size).abs() <= 2.0 * found.std)
 }
 
-/// What the maker is to be given for an effect of a size: it puts a yaw in by the amplitude of a wave, and its size is
-/// told by the root mean square.
-pub fn put_in(effect: &str, size: f64) -> f64 {
+/// What the size of an effect is told to be, per unit of what is put in: a yaw is put in by the amplitude of a wave and
+/// told by its root mean square.
+pub fn told_of_put(effect: &str) -> f64 {
     match effect {
-        "yaw" => size * 2f64.sqrt(),
-        _ => size,
+        "yaw" => 0.5f64.sqrt(),
+        _ => 1.0,
     }
 }
 

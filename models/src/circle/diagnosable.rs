@@ -183,15 +183,19 @@ impl CirclePoints {
         place.time / (self.record.places.len().max(2) - 1) as f64
     }
 
-    /// Angle turned since the first pass began, rad: the passes follow each other without stopping. From the point at
-    /// which a pass was begun, wherever it is cut open.
+    /// Angle turned since the first pass was begun, rad: the passes follow each other without stopping. Counted from
+    /// the point at which each was begun, wherever it is cut open.
     pub(super) fn turned(&self, place: &Place) -> f64 {
-        let before = self.passes.iter().filter(|p| p.repeat < place.repeat);
-        let before = 360.0 * before.count() as f64;
         let own = self.passes.iter().find(|p| p.repeat == place.repeat);
-        let slack = 0.5 * self.spacing_of_a_pass();
-        let on = own.map_or(0.0, |pass| pass.turned(place, slack));
-        place.direction * (before + on).to_radians()
+        let (Some(first), Some(own)) = (self.passes.first(), own) else {
+            return 0.0;
+        };
+        let before = self.passes.iter().filter(|p| p.repeat < own.repeat).count();
+        // A pass may be begun a little before or after the angle of the first one.
+        let later = place.direction * (own.from - first.from);
+        let later = (later + 180.0).rem_euclid(360.0) - 180.0;
+        let on = own.turned(place, 0.5 * self.spacing_of_a_pass());
+        place.direction * (360.0 * before as f64 + later + on).to_radians()
     }
 
     /// Angle of a place, rad.

@@ -281,6 +281,19 @@ fn newly(before: &[Diagnosability], after: &[Diagnosability]) -> Vec<String> {
         .collect()
 }
 
+/// What the sign before a size means.
+const AT_LEAST: &str = "\u{2265}: what differs from repeat to repeat is taken for noise in part, and may have to be several times as great.";
+
+/// A size of an effect from which a plan shows it or tells it apart.
+fn effect_size(row: &Diagnosability, value: Option<f64>) -> String {
+    let least = if row.at_least && value.is_some() {
+        "\u{2265} "
+    } else {
+        ""
+    };
+    format!("{least}{}", size(value, &row.unit))
+}
+
 fn size(value: Option<f64>, unit: &str) -> String {
     value.map_or_else(
         || "never".to_owned(),
@@ -346,14 +359,7 @@ fn answer(
     let bar = |row: &Diagnosability| Bar::new(row.effect.clone(), percent(row));
     let visible = Bars::new(Axis::new("visible part", "%")).bars(rows.iter().map(bar));
     for row in rows {
-        let [seen, told] = [row.detectable, row.identifiable].map(|value| {
-            let least = if row.at_least && value.is_some() {
-                "\u{2265} "
-            } else {
-                ""
-            };
-            format!("{least}{}", size(value, &row.unit))
-        });
+        let [seen, told] = [row.detectable, row.identifiable].map(|value| effect_size(row, value));
         let like = row
             .confused_with
             .as_ref()
@@ -375,7 +381,7 @@ fn answer(
         ]);
     }
     if rows.iter().any(|row| row.at_least) {
-        text += "\u{2265}: what differs from repeat to repeat is taken for noise in part, and may have to be several times as great.\n";
+        let _ = writeln!(text, "{AT_LEAST}");
     }
     text += "\nWhat would help most\n";
     let mut help = Vec::new();
@@ -396,22 +402,22 @@ fn answer(
         .into_iter()
         .map(|(name, gain, shows)| json!({"measure": name, "gain": gain, "shows": shows}))
         .collect();
+    let mut section = Section::new("What the plan can show")
+        .figure(Figure::new(
+            "Visible part of each effect",
+            "What the fit of such a measurement cannot take up, so that it shows; below the rest it passes for form, tilt or offset.",
+            visible,
+        ))
+        .table(table);
+    if rows.iter().any(|row| row.at_least) {
+        section = section.paragraph(AT_LEAST);
+    }
     Answer {
         text,
         json: json!({"schema": "errsep.plan/1", "effects": rows, "extra_measurements": extras}),
         page: Page::new("Plan", args.plan.display().to_string())
             .summary(Standing::Neutral, sentence)
-            .section(
-            Section::new("What the plan can show")
-                .figure(Figure::new(
-                    "Visible part of each effect",
-                    "What the fit of such a measurement cannot take up, so that it shows; below the rest it passes for form, tilt or offset.",
-                    visible,
-                ))
-                .table(table)
-                .paragraph("What would help most:")
-                .list(help),
-        ),
+            .section(section.paragraph("What would help most:").list(help)),
         tables: Vec::new(),
         inputs: vec![args.plan.clone()],
         setup: None,

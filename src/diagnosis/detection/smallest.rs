@@ -2,8 +2,8 @@
 //!
 //! An effect of size a, whose signature the fit leaves with the length L in units of the noise, reaches
 //! the statistic T at which it stands out with the probability Φ(aL − √T). Where it has several
-//! shapes, the one that shows middling well stands for all: the best would tell too small a size, and a
-//! single one that hardly shows, as of a sensor whose errors the others' take up, far too great a one.
+//! shapes, the one of median length stands for all: by the longest, sizes of the others would be told too
+//! small, and the shortest may hardly show at all, so that no useful size would be told.
 //! What differs from repeat to repeat is taken for noise in part: it swells the noise as the repeats show
 //! it, or makes it seem correlated, and so hides itself. Of such an effect the size is a lower bound.
 
@@ -22,23 +22,28 @@ pub(in crate::diagnosis) struct Smallest {
     pub at_least: bool,
 }
 
-/// The smallest size of an effect of a family; nothing where the fit absorbs all of it. `statistic`: where
-/// a signature of so many columns stands out.
+/// The shape of an effect that stands for all of its family: that of median length beside the fit.
+pub(in crate::diagnosis) fn typical<'d>(
+    dictionary: &'d Dictionary,
+    family: &Family,
+) -> Option<&'d Entry> {
+    let mut shapes: Vec<&Entry> = dictionary.entries[family.entries.clone()].iter().collect();
+    shapes.sort_by(|a, b| a.gram[(0, 0)].total_cmp(&b.gram[(0, 0)]));
+    shapes.get(shapes.len() / 2).copied()
+}
+
+/// The smallest size of an effect in a shape: `length` and `signature` per unit of its size, `statistic` where a
+/// signature of so many columns stands out.
 pub(in crate::diagnosis) fn smallest(
     (model, law): (&AnyModel, &NoiseLaw),
-    dictionary: &Dictionary,
-    family: &Family,
-    statistic: impl Fn(usize) -> f64,
-) -> Option<Smallest> {
-    let entries = &dictionary.entries[family.entries.clone()];
-    let mut shapes: Vec<&Entry> = entries.iter().collect();
-    shapes.sort_by(|a, b| a.gram[(0, 0)].total_cmp(&b.gram[(0, 0)]));
-    let typical = shapes.get(shapes.len() / 2)?;
-    let least = statistic(typical.order()).sqrt() + normal_quantile(POWER);
-    let size = least / typical.gram[(0, 0)].sqrt();
-    let signature = dictionary.columns(typical).into_iter().next()?;
-    let at_least = model.stated_noise().is_none() && swells(model, law, &signature, size);
-    Some(Smallest { size, at_least })
+    (length, signature): (f64, &Column),
+    statistic: f64,
+) -> Smallest {
+    let size = (statistic.sqrt() + normal_quantile(POWER)) / length;
+    Smallest {
+        size,
+        at_least: model.stated_noise().is_none() && swells(model, law, signature, size),
+    }
 }
 
 /// Whether an effect of a size changes what the differences between repeats tell of the noise.

@@ -14,9 +14,9 @@ use serde::Serialize;
 
 use crate::diagnosis::detection::dictionary::{Dictionary, Meaning, Places, statistic};
 use crate::diagnosis::detection::null::NullLaw;
-use crate::diagnosis::detection::smallest::smallest;
+use crate::diagnosis::detection::smallest::{smallest, typical};
 use crate::diagnosis::detection::space::Space;
-use crate::diagnosis::levels::{INVISIBLE, PLANNED, POWER, TELL, normal_quantile};
+use crate::diagnosis::levels::{INVISIBLE, PLANNED, TELL, normal_quantile};
 use crate::diagnosis::noise::law::NoiseLaw;
 use crate::diagnosis::options::Options;
 
@@ -107,11 +107,10 @@ pub(in crate::diagnosis) fn certificate(
             harm,
             harm_per_visible: Vec::new(),
         };
-        let entries = &dictionary.entries[dictionary.families[family].entries.clone()];
-        if visible >= PLANNED && !entries.is_empty() {
-            // The middle of the grid stands for the family.
-            let entry = &entries[entries.len() / 2];
-            let (projected, _) = space.forward_columns(&dictionary.columns(entry));
+        let entry = typical(&dictionary, &dictionary.families[family]);
+        if let Some(entry) = entry.filter(|_| visible >= PLANNED) {
+            let columns = dictionary.columns(entry);
+            let (projected, _) = space.forward_columns(&columns);
             let length = projected.column(0).norm();
             let unit = projected.column(0) / length.max(f64::MIN_POSITIVE);
             let adjoint = space
@@ -119,7 +118,8 @@ pub(in crate::diagnosis) fn certificate(
                 .column(0)
                 .clone_owned();
             let adjoint = dictionary.places.sums_of(&adjoint);
-            let seen = null.threshold(family, level, 1).sqrt() + normal_quantile(POWER);
+            let threshold = null.threshold(family, level, entry.order());
+            let found = smallest((model, law), (length, &columns[0]), threshold);
             for other in catalogue.iter().filter(|o| o.name() != effect.name()) {
                 let Some(rival) = dictionary
                     .families
@@ -135,7 +135,7 @@ pub(in crate::diagnosis) fn certificate(
                         .clamp(0.0, 1.0)
                         .sqrt();
                     // What it takes to imitate the smallest size that is seen must be plausible.
-                    let needed = seen * cosine / candidate.gram[(0, 0)].sqrt();
+                    let needed = found.size * length * cosine / candidate.gram[(0, 0)].sqrt();
                     if needed > greatest_plausible(other.as_ref())
                         || !matches!(candidate.meaning, Meaning::Effect(_))
                     {
@@ -152,12 +152,8 @@ pub(in crate::diagnosis) fn certificate(
                 }
             }
             let most = greatest_plausible(effect.as_ref());
-            let own = &dictionary.families[family];
-            let threshold = |order| null.threshold(family, level, order);
-            let found = smallest((model, law), &dictionary, own, threshold);
-            let least = found.map_or(seen / length, |s| s.size);
-            row.detectable = Some(least).filter(|size| *size <= most);
-            row.at_least = found.is_some_and(|s| s.at_least);
+            row.detectable = Some(found.size).filter(|size| *size <= most);
+            row.at_least = found.at_least;
             let per_unit = length * law.sigma() / (n as f64).sqrt();
             // The harm is that of the first shape of the grid, so its own visible part counts.
             let first = space.gram(&first).matrix[(0, 0)].sqrt() / length;
@@ -166,10 +162,10 @@ pub(in crate::diagnosis) fn certificate(
                 .iter()
                 .map(|(name, bias, unit)| (name.clone(), bias / (first * per_unit), unit.clone()))
                 .collect();
-            row.visible_rms = Some(least * length * law.sigma() / (n as f64).sqrt());
+            row.visible_rms = Some(found.size * length * law.sigma() / (n as f64).sqrt());
             let half_angle = 0.5 * row.cosine.acos();
             row.identifiable = (half_angle.sin() > 1e-3)
-                .then(|| (normal_quantile(TELL) / (length * half_angle.sin())).max(least))
+                .then(|| (normal_quantile(TELL) / (length * half_angle.sin())).max(found.size))
                 .filter(|size| *size <= most);
         }
         rows.push(row);

@@ -4,7 +4,7 @@ use errsep_models::model::FittedModel;
 
 use crate::diagnosis::attribution::bias::weighted_std;
 use crate::diagnosis::attribution::context::Context;
-use crate::diagnosis::detection::smallest::smallest;
+use crate::diagnosis::detection::smallest::{smallest, typical};
 use crate::diagnosis::levels::INVISIBLE;
 use crate::diagnosis::options::Options;
 use crate::diagnosis::planning::certificate::greatest_plausible;
@@ -40,12 +40,18 @@ pub(in crate::diagnosis) fn hidden(
         let own = &context.dictionary.families[family];
         let visible = own.visible;
         let most = greatest_plausible(description.as_ref());
-        let noise = (context.model, &context.law);
-        let threshold = |order| context.null.threshold(family, level, order);
-        let smallest = (visible >= INVISIBLE)
-            .then(|| smallest(noise, &context.dictionary, own, threshold))
-            .flatten()
-            .filter(|smallest| smallest.size <= most);
+        let entry = typical(&context.dictionary, own).filter(|_| visible >= INVISIBLE);
+        let smallest = entry.and_then(|entry| {
+            let signature = context.dictionary.columns(entry).into_iter().next()?;
+            let threshold = context.null.threshold(family, level, entry.order());
+            let noise = (context.model, &context.law);
+            Some(smallest(
+                noise,
+                (entry.gram[(0, 0)].sqrt(), &signature),
+                threshold,
+            ))
+        });
+        let smallest = smallest.filter(|smallest| smallest.size <= most);
         let shape = description.grid(context.model).into_iter().next();
         let column = shape
             .and_then(|s| description.columns(context.model, &s).into_iter().next())

@@ -110,25 +110,30 @@ mod tests {
     use nalgebra::DVector;
 
     /// Rounding: a wave that goes on from pass to pass is its two columns, wherever the widest gap between
-    /// the points of a pass cuts it open, and whichever way it is turned.
+    /// the points of a pass cuts it open, whichever way it is turned, and begun a little earlier or later.
     #[test]
     fn a_wave_goes_on_from_where_a_pass_was_begun() {
-        for (sense, closing) in [(1.0, 0), (-1.0, 0), (1.0, 1)] {
+        for (sense, closing, begun) in [
+            (1.0, 0, [0.0; 4]),
+            (-1.0, 0, [0.0; 4]),
+            (1.0, 1, [0.0; 4]),
+            (1.0, 0, [0.0, 11.0, -7.0, 3.0]),
+        ] {
             let mut points = Vec::new();
             let mut wave = Vec::new();
-            for pass in 0..4_u32 {
+            for (pass, begun) in begun.into_iter().enumerate() {
                 for k in 0..72 + closing {
                     let wider = if (40..72).contains(&k) { 0.5 } else { 0.0 };
-                    let angle = (f64::from(k) * 5.0 + wider).to_radians();
+                    let angle = (begun + f64::from(k) * 5.0 + wider).to_radians();
                     let (y, x) = (sense * angle).sin_cos();
-                    points.push((Point::new(50.0 * x, 50.0 * y), pass + 1));
-                    let turned = angle + std::f64::consts::TAU * f64::from(pass);
-                    wave.push((turned, (2.4 * turned).cos()));
+                    points.push((Point::new(50.0 * x, 50.0 * y), pass as u32 + 1));
+                    let turned = angle + std::f64::consts::TAU * pass as f64;
+                    wave.push((2.4 * turned).cos());
                 }
             }
             let model = CirclePoints::new(&points, None).expect("a circle");
             // In the order of the places.
-            let order = model.places().iter().map(|p| wave[p.time as usize].1);
+            let order = model.places().iter().map(|p| wave[p.time as usize]);
             let wave = DVector::from_iterator(points.len(), order);
             let columns = over_all_turns(&model, 2.4);
             let dense: Vec<_> = columns.iter().map(|c| c.dense(points.len())).collect();
@@ -137,7 +142,7 @@ mod tests {
             let left = &wave - &basis * gram.solve(&basis.tr_mul(&wave));
             assert!(
                 left.amax() < 1e-9,
-                "{sense} {closing}: {} is left",
+                "{sense} {closing} {begun:?}: {} is left",
                 left.amax()
             );
         }

@@ -15,7 +15,7 @@ mod analysis;
 mod answers;
 mod contrasts;
 #[cfg(test)]
-mod dense;
+mod equal_to_dense;
 mod error;
 mod fit;
 mod left;

@@ -1,6 +1,11 @@
 //! The spline in time that follows samples of a turn.
 
+use errsep_solvers::linear::banded::{BandTriangle, RowStack};
+
 use crate::basis::bspline::CubicBSpline;
+
+/// Part of its column that is rounding: a coefficient of which no more is left is not determined.
+const UNDETERMINED: f64 = 1e-12;
 
 /// How far the turn strays at a time.
 #[derive(Debug, Clone, Copy)]
@@ -13,62 +18,38 @@ pub struct TurnSample {
     pub weight: f64,
 }
 
-/// Coefficients of the spline in time that comes nearest to samples, rad.
+/// What a coefficient's second difference weighs beside all samples: where a cell has none the curve goes on as it
+/// was.
+const STIFF: f64 = 1e-6;
+
+/// Coefficients of the spline in time that comes nearest to samples, rad; nothing where they do not determine it.
 pub fn turn_near(basis: &CubicBSpline, samples: &[TurnSample]) -> Option<Vec<f64>> {
     let n = basis.coefficient_count();
-    // Of each coefficient the elements with itself and the three after it.
-    let mut normal = vec![[0.0; 4]; n];
-    let mut turn = vec![0.0; n];
+    // Where a row begins in the band, its four values and what they are to make.
+    let mut rows: Vec<(usize, [f64; 4], f64)> = Vec::with_capacity(samples.len() + n);
     for sample in samples {
         let (first, values) = basis.values(sample.time);
-        for (i, a) in values.iter().enumerate() {
-            turn[first + i] += sample.weight * a * sample.stray;
-            for (j, b) in values[i..].iter().enumerate() {
-                normal[first + i][j] += sample.weight * b * a;
-            }
-        }
+        let root = sample.weight.sqrt();
+        rows.push((first, values.map(|v| root * v), root * sample.stray));
     }
-    // Where a cell has no sample the curve goes on as it was.
-    let stiff = 1e-6 / n as f64;
-    let bend = [1.0, -2.0, 1.0];
-    for k in 0..n.saturating_sub(2) {
-        for (i, a) in bend.into_iter().enumerate() {
-            for (j, b) in bend[i..].iter().enumerate() {
-                normal[k + i][j] += stiff * a * b;
-            }
-        }
+    let stiff = (STIFF / n as f64).sqrt();
+    let bend = [stiff, -2.0 * stiff, stiff, 0.0];
+    rows.extend((0..n.saturating_sub(3)).map(|first| (first, bend, 0.0)));
+    rows.push((n - 4, [0.0, stiff, -2.0 * stiff, stiff], 0.0));
+    rows.sort_by_key(|row| row.0);
+    let mut triangle = BandTriangle::new(n, 4, 1);
+    let mut stack = RowStack::default();
+    for (first, values, made) in rows {
+        stack.reset(first, 4, 1, 1);
+        let row = stack.row_mut(0);
+        row[..4].copy_from_slice(&values);
+        row[4] = made;
+        triangle.fold(&mut stack);
     }
-    solve_banded(normal, &mut turn)?;
+    if !triangle.undetermined(UNDETERMINED).is_empty() {
+        return None;
+    }
+    let mut turn: Vec<f64> = (0..n).map(|i| triangle.tail_row(i)[0]).collect();
+    triangle.solve(&mut turn);
     Some(turn)
-}
-
-/// Solves a positive definite system of which each unknown is beside the three after it, by Cholesky; `None` of
-/// another.
-fn solve_banded(mut matrix: Vec<[f64; 4]>, x: &mut [f64]) -> Option<()> {
-    let n = matrix.len();
-    for j in 0..n {
-        for k in j.saturating_sub(3)..j {
-            let above = matrix[k];
-            for (value, other) in matrix[j].iter_mut().zip(&above[j - k..]) {
-                *value -= above[j - k] * other;
-            }
-        }
-        if !(matrix[j][0] > 0.0) {
-            return None;
-        }
-        matrix[j][0] = matrix[j][0].sqrt();
-        let (diagonal, after) = matrix[j].split_at_mut(1);
-        after.iter_mut().for_each(|value| *value /= diagonal[0]);
-    }
-    for i in 0..n {
-        x[i] /= matrix[i][0];
-        for k in 1..4.min(n - i) {
-            x[i + k] -= matrix[i][k] * x[i];
-        }
-    }
-    for i in (0..n).rev() {
-        let after: f64 = (1..4.min(n - i)).map(|k| matrix[i][k] * x[i + k]).sum();
-        x[i] = (x[i] - after) / matrix[i][0];
-    }
-    Some(())
 }

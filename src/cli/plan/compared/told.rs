@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use super::super::designs::{Common, Promise, ToldApart};
-use super::super::{Args, size};
+use super::super::{AT_LEAST, Args, effect_size, size};
 use crate::report::plot::{Axis, Bar, Bars};
 use crate::report::{Cell, Figure, Page, Section, Standing, Table};
 
@@ -90,7 +90,7 @@ fn compared(promises: &[Promise]) -> Vec<Compared> {
         let own = p.effects.iter().find(|e| e.effect == name);
         own.map_or_else(
             || "-".to_owned(),
-            |e| size(if told { e.identifiable } else { e.detectable }, &e.unit),
+            |e| effect_size(e, if told { e.identifiable } else { e.detectable }),
         )
     };
     let rows = |told: bool| -> Vec<(String, Vec<String>)> {
@@ -134,6 +134,10 @@ fn open(p: &Promise) -> Vec<String> {
     open.chain(blind).collect()
 }
 
+fn told_as_the_least(promises: &[Promise]) -> bool {
+    promises.iter().flat_map(|p| &p.effects).any(|e| e.at_least)
+}
+
 pub(super) fn text(promises: &[Promise], told: &[ToldApart]) -> String {
     let mut text = format!("{}\n\n", sentence(promises));
     for (k, p) in promises.iter().enumerate() {
@@ -155,6 +159,9 @@ pub(super) fn text(promises: &[Promise], told: &[ToldApart]) -> String {
             }
             text.push('\n');
         }
+    }
+    if told_as_the_least(promises) {
+        let _ = writeln!(text, "{AT_LEAST}");
     }
     text += "\nConfused: one leaves what the other does, up to three times the size that is seen\n";
     for (k, p) in promises.iter().enumerate() {
@@ -263,6 +270,9 @@ pub(super) fn page(args: &Args, promises: &[Promise], told: &[ToldApart]) -> Pag
             table = table.row(std::iter::once(Cell::Text(name)).chain(cells));
         }
         section = section.table(table);
+    }
+    if told_as_the_least(promises) {
+        section = section.paragraph(AT_LEAST);
     }
     let mut limits = Section::new("What the designs cannot tell");
     for (k, p) in promises.iter().enumerate() {

@@ -3,7 +3,7 @@
 //! named, how often its size was within two standard uncertainties (where no other sensor or channel is left open),
 //! and what was said with the effect withheld; for each pair of effects whether both were named; and the
 //! alarms with nothing there. `nulls`: the alarms only. `sizes`: how often an effect is seen in just the size that the
-//! same readings without it are said to show with 80 % probability.
+//! same readings without it are said to show with 80 % probability, and in the greatest by its shape.
 
 #[path = "../tests/other_models/mod.rs"]
 mod other_models;
@@ -71,7 +71,7 @@ fn main() {
                     seed: first * 20_000 + case,
                     ..options(&[])
                 };
-                let diagnosis = (maker.diagnosed)(&[], first * 20_000 + case, &own);
+                let diagnosis = maker.diagnosed(&[], first * 20_000 + case, &own);
                 judged(&diagnosis, None) != "none, right"
             })
             .count();
@@ -79,9 +79,18 @@ fn main() {
     }
 }
 
-/// Each effect in the smallest size that readings without it are said to show.
+/// What readings without an effect tell of its sizes, and whether it is seen in them.
+struct Told {
+    size: f64,
+    seen: bool,
+    at_least: bool,
+    /// The greatest of the sizes by shape, where one that is plausible is told, and whether it is seen in that.
+    greatest: Option<(f64, bool)>,
+}
+
+/// Each effect in the sizes that readings without it are said to show.
 fn smallest(maker: &Maker, cases: u64, first: u64) {
-    let told: Vec<Vec<Option<(f64, bool, bool)>>> = (0..cases)
+    let told: Vec<Vec<Option<Told>>> = (0..cases)
         .into_par_iter()
         .map(|case| {
             let seed = first * 40_000 + case;
@@ -89,34 +98,49 @@ fn smallest(maker: &Maker, cases: u64, first: u64) {
                 seed,
                 ..options(&[])
             };
-            let bare = (maker.diagnosed)(&[], seed, &own);
+            let bare = maker.diagnosed(&[], seed, &own);
+            let seen = |effect: &str, size: f64| {
+                let put = [(effect, size / told_of_put(effect))];
+                maker.diagnosed(&put, seed, &own).verdict.kind != Kind::None
+            };
             let of = |effect: &&str| {
                 let hidden = bare.hidden.iter().find(|h| h.effect == **effect)?;
                 let size = hidden.detectable?;
-                let put = size / told_of_put(effect);
-                let with = (maker.diagnosed)(&[(*effect, put)], seed, &own);
-                Some((size, with.verdict.kind != Kind::None, hidden.at_least))
+                let greatest = hidden.by_shape.and_then(|shapes| shapes.to);
+                Some(Told {
+                    size,
+                    seen: seen(effect, size),
+                    at_least: hidden.at_least,
+                    greatest: greatest.map(|size| (size, seen(effect, size))),
+                })
             };
             maker.effects.iter().map(of).collect()
         })
         .collect();
     println!(
-        "| effect | size told, median | told in | as the least | seen |\n|---|---|---|---|---|"
+        "| effect | size told, median | told in | as the least | seen | greatest by shape, median | told in | seen |\n\
+         |---|---|---|---|---|---|---|---|"
     );
     for (k, effect) in maker.effects.iter().enumerate() {
-        let own: Vec<(f64, bool, bool)> = told.iter().filter_map(|case| case[k]).collect();
-        let mut sizes: Vec<f64> = own.iter().map(|o| o.0).collect();
-        sizes.sort_by(f64::total_cmp);
-        let median = sizes
-            .get(sizes.len() / 2)
-            .map_or("none".to_owned(), |size| format!("{size:.3e}"));
-        let seen = own.iter().filter(|o| o.1).count();
-        let least = own.iter().filter(|o| o.2).count();
+        let own: Vec<&Told> = told.iter().filter_map(|case| case[k].as_ref()).collect();
+        let seen = own.iter().filter(|told| told.seen).count();
+        let least = own.iter().filter(|told| told.at_least).count();
+        let greatest: Vec<(f64, bool)> = own.iter().filter_map(|told| told.greatest).collect();
         println!(
-            "| {effect} | {median} | {} of {cases} | {least} | {seen} |",
-            own.len()
+            "| {effect} | {} | {} of {cases} | {least} | {seen} | {} | {} | {} |",
+            median(own.iter().map(|told| told.size).collect()),
+            own.len(),
+            median(greatest.iter().map(|g| g.0).collect()),
+            greatest.len(),
+            greatest.iter().filter(|g| g.1).count()
         );
     }
+}
+
+fn median(mut sizes: Vec<f64>) -> String {
+    sizes.sort_by(f64::total_cmp);
+    let middle = sizes.get(sizes.len() / 2);
+    middle.map_or("none".to_owned(), |size| format!("{size:.3e}"))
 }
 
 /// Each effect alone, with the whole catalogue and withheld.
@@ -131,8 +155,8 @@ fn single(maker: &Maker, seen: &[(&str, f64)], cases: u64, first: u64) {
                 let size = smallest * (1.5 + 2.5 * random.random::<f64>());
                 let seed = random.random_range(2..1_000_000);
                 let put = [(*effect, size)];
-                let known = (maker.diagnosed)(&put, seed, &options(&[]));
-                let withheld = (maker.diagnosed)(&put, seed, &options(&[effect]));
+                let known = maker.diagnosed(&put, seed, &options(&[]));
+                let withheld = maker.diagnosed(&put, seed, &options(&[effect]));
                 let other = match judged(&withheld, Some(effect)) {
                     "another named" => withheld.verdict.effects.join(" + "),
                     word => word.to_owned(),
@@ -179,7 +203,7 @@ fn pairs(maker: &Maker, seen: &[(&str, f64)], cases: u64, first: u64) {
                 (effect, smallest * (1.5 + 2.5 * random.random::<f64>()))
             });
             let seed = random.random_range(2..1_000_000);
-            let diagnosis = (maker.diagnosed)(&put, seed, &options(&[]));
+            let diagnosis = maker.diagnosed(&put, seed, &options(&[]));
             let names = pair.map(|(effect, _)| effect);
             (judged_pair(&diagnosis, names), names)
         })

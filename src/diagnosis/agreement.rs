@@ -43,10 +43,17 @@ pub(super) fn agreement(model: &AnyModel, options: &Options, each: usize) -> Vec
             return Vec::new();
         };
         let names = Name::all(found.context, found.readings, &answer, options.false_alarm);
+        let grounds = Grounds::of(found.context);
         let mut rows = Vec::new();
         for name in &names {
-            for family in Family::beside(found.context, &name.members) {
-                rows.push(compared(found.context, name, family, options, each));
+            for family in Family::beside(found.context, &grounds, &name.members) {
+                rows.push(compared(
+                    found.context,
+                    name,
+                    (family, &grounds),
+                    options,
+                    each,
+                ));
             }
         }
         rows
@@ -56,12 +63,11 @@ pub(super) fn agreement(model: &AnyModel, options: &Options, each: usize) -> Vec
 fn compared(
     context: &Context<'_>,
     name: &Name,
-    family: Family,
+    (family, grounds): (Family, &Grounds),
     options: &Options,
     each: usize,
 ) -> Agreement {
-    let grounds = Grounds::of(context);
-    let rivals = Drawn::of(context, name, (family, &grounds), (options.seed, 0), each);
+    let rivals = Drawn::of(context, name, (family, grounds), (options.seed, 0), each);
     let scored = name.given(context, &rivals);
     let base = without_misfit(context.model);
     let whole: Vec<bool> = (0..rivals.count)
@@ -83,7 +89,7 @@ fn compared(
         .collect();
     let count = |kept: &dyn Fn(usize) -> bool| (0..rivals.count).filter(|k| kept(*k)).count();
     Agreement {
-        family: family.name(context),
+        family: family.name(context, grounds),
         cases: rivals.count,
         scored: count(&|k| scored[k]),
         whole: count(&|k| whole[k]),

@@ -30,6 +30,7 @@ pub use catalogue::curve::{Along, Curve, Way};
 pub use catalogue::formula::{Circumstances, Formula};
 pub use catalogue::tabulated::{Seen, Tabulated, TabulatedEffects};
 pub use catalogue::written::{quoted, rounded, written};
+pub use detection::smallest::SizesByShape;
 pub use joined::{Joined, JoinedEffect, JoinedGap, JoinedProfile, NotJoined};
 pub use learning::{HeldOutAlong, Learnt, NotLearnt, Tested};
 pub use noise::law::{Components, NoiseLaw, NoiseSource};

@@ -13,6 +13,7 @@ use errsep_models::machine::{
     Chain, ComponentError, ErrorFunction, Machine, MeasuredParts, PartDisturbance, Position, Sense,
     Spread, simulate_parts_disturbed,
 };
+use errsep_models::model::AnyModel;
 
 /// Effects by their names and sizes.
 pub type Put<'a> = &'a [(&'a str, f64)];
@@ -23,8 +24,17 @@ pub struct Maker {
     pub model: &'static str,
     /// Effects that such data show.
     pub effects: &'static [&'static str],
+    /// Makes the data of a seed, with an effect or none.
+    pub made: fn(Put<'_>, u64) -> AnyModel,
+    /// Standard deviation of the noise of a reading.
+    pub noise: f64,
+}
+
+impl Maker {
     /// Makes the data of a seed, with an effect or none, and diagnoses them.
-    pub diagnosed: fn(Put<'_>, u64, &Options) -> Diagnosis,
+    pub fn diagnosed(&self, put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
+        diagnose(&(self.made)(put, seed), options)
+    }
 }
 
 /// All models but the reversal.
@@ -43,7 +53,8 @@ pub const MAKERS: [Maker; 6] = [
             "square-root",
             "zero-jump",
         ],
-        diagnosed: calibration_line,
+        made: |put, seed| AnyModel::new(&calibration_line_made(put, seed, 1.0)),
+        noise: 1e-3,
     },
     Maker {
         model: "circle",
@@ -60,7 +71,8 @@ pub const MAKERS: [Maker; 6] = [
             "squareness",
             "zero-jump",
         ],
-        diagnosed: circle,
+        made: |put, seed| AnyModel::new(&circle_made(put, seed, 1.0)),
+        noise: 1.0,
     },
     Maker {
         model: "four-sensor",
@@ -73,7 +85,8 @@ pub const MAKERS: [Maker; 6] = [
             "settling",
             "zero-jump",
         ],
-        diagnosed: four_sensor,
+        made: |put, seed| AnyModel::new(&four_sensor_made(put, seed, 1.0)),
+        noise: 0.1,
     },
     Maker {
         model: "fourier",
@@ -86,7 +99,8 @@ pub const MAKERS: [Maker; 6] = [
             "yaw",
             "zero-jump",
         ],
-        diagnosed: fourier,
+        made: |put, seed| AnyModel::new(&fourier_made(put, seed, 1.0)),
+        noise: 1.0,
     },
     Maker {
         model: "step-diagonal",
@@ -99,7 +113,8 @@ pub const MAKERS: [Maker; 6] = [
             "mirror-misalignment",
             "thermal-expansion",
         ],
-        diagnosed: step_diagonal,
+        made: |put, seed| AnyModel::new(&step_diagonal_made(put, seed, 1.0)),
+        noise: 0.2,
     },
     Maker {
         model: "machine",
@@ -114,15 +129,12 @@ pub const MAKERS: [Maker; 6] = [
             "squareness-change",
             "thermal-expansion",
         ],
-        diagnosed: machine,
+        made: |put, seed| AnyModel::new(&machine_made(put, seed, 1.0)),
+        noise: 0.5,
     },
 ];
 
 const REPEATS: u32 = 4;
-
-fn calibration_line(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
-    diagnose(&calibration_line_made(put, seed, 1.0), options)
-}
 
 /// A calibration of four sets, its noise a number of times the usual.
 pub fn calibration_line_made(put: Put<'_>, seed: u64, noise: f64) -> CalibrationLine {
@@ -140,10 +152,6 @@ pub fn calibration_line_made(put: Put<'_>, seed: u64, noise: f64) -> Calibration
     };
     let readings = line::simulate(&what, seed).unwrap();
     CalibrationLine::new(&readings, None).unwrap()
-}
-
-fn circle(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
-    diagnose(&circle_made(put, seed, 1.0), options)
 }
 
 /// Four passes over a circle, likewise.
@@ -169,10 +177,6 @@ pub fn circle_made(put: Put<'_>, seed: u64, noise: f64) -> CirclePoints {
     CirclePoints::new(&points, None).unwrap()
 }
 
-fn four_sensor(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
-    diagnose(&four_sensor_made(put, seed, 1.0), options)
-}
-
 /// Four runs of four sensors, likewise.
 pub fn four_sensor_made(put: Put<'_>, seed: u64, noise: f64) -> FourSensors {
     let geometry = Geometry::new(5.0, [1, 1, 5], 62).unwrap();
@@ -188,10 +192,6 @@ pub fn four_sensor_made(put: Put<'_>, seed: u64, noise: f64) -> FourSensors {
         })
         .collect();
     FourSensors::new(&repeats, None).unwrap()
-}
-
-fn fourier(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
-    diagnose(&fourier_made(put, seed, 1.0), options)
 }
 
 /// Four scans of each spacing, likewise.
@@ -215,10 +215,6 @@ pub fn fourier_made(put: Put<'_>, seed: u64, noise: f64) -> FourierScans {
     FourierScans::new(&scans, section, None).unwrap()
 }
 
-fn step_diagonal(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
-    diagnose(&step_diagonal_made(put, seed, 1.0), options)
-}
-
 /// Four runs of each sequence, likewise.
 pub fn step_diagonal_made(put: Put<'_>, seed: u64, noise: f64) -> DiagonalRuns {
     let usual = DiagonalSimulation::default();
@@ -236,10 +232,6 @@ pub fn step_diagonal_made(put: Put<'_>, seed: u64, noise: f64) -> DiagonalRuns {
     let (readings, _, _) = diagonal::simulate_disturbed(&what, &disturbances, seed);
     let rotations: Vec<Component> = Component::all().filter(|c| c.rotation).collect();
     DiagonalRuns::new(&what.zone, &readings, &rotations, None).unwrap()
-}
-
-fn machine(put: Put<'_>, seed: u64, options: &Options) -> Diagnosis {
-    diagnose(&machine_made(put, seed, 1.0), options)
 }
 
 /// A machine without scatter: what differs between parts is what was put in. Its noise is a number of
@@ -316,7 +308,7 @@ pub fn seen_from(maker: &Maker, effect: &str, options: &Options) -> f64 {
 
 /// What data without an effect tell of it.
 pub fn told_of(maker: &Maker, effect: &str, options: &Options) -> Hidden {
-    let bare = (maker.diagnosed)(&[], 1, options);
+    let bare = maker.diagnosed(&[], 1, options);
     let own = bare.hidden.into_iter().find(|h| h.effect == effect);
     own.unwrap_or_else(|| panic!("{} shows {effect} with nothing there", maker.model))
 }

@@ -11,7 +11,7 @@ use super::effects;
 use super::prediction::{Parameter, sensitivities};
 use super::readings::{DiagonalError, DiagonalReading, check, check_noise};
 use super::{Component, Diagonal, Sequence, Target, Travel, WorkZone};
-use crate::model::{Effect, FittedModel, Freedom, Place, Profile, Quantity, Record};
+use crate::model::{Covariate, Effect, FittedModel, Freedom, Place, Profile, Quantity, Record};
 
 /// Readings whose laser was on one diagonal with one target, in one order of motions.
 type Channel = (Diagonal, Target, Sequence);
@@ -197,6 +197,25 @@ impl FittedModel for DiagonalRuns {
                 weights: weights.clone(),
             })
             .collect()
+    }
+
+    /// Where the beam meets the mirror: what turns or bends the mirror goes along with it.
+    fn covariates(&self) -> Vec<Covariate> {
+        let offset = |direction: usize, row: usize| {
+            self.weighted(row, |parameter| match parameter {
+                Parameter::Mirror(_, _, k) if *k == direction => 1.0,
+                _ => 0.0,
+            })
+        };
+        [(0, "first"), (1, "second")]
+            .map(|(direction, which)| Covariate {
+                name: format!("the {which} offset on the mirror"),
+                values: (0..self.places().len())
+                    .map(|row| offset(direction, row))
+                    .collect(),
+                groups: None,
+            })
+            .into()
     }
 
     fn profiles(&self) -> Vec<Profile> {

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::model::coordinate;
 use super::{Axis, ComponentError, Machine, MachineError, PartReading, effects, part_residuals};
-use crate::model::{Column, Effect, FittedModel, Freedom, Place, Quantity, Record};
+use crate::model::{Column, Covariate, Effect, FittedModel, Freedom, Place, Quantity, Record};
 
 /// Parts measured at points whose deviations a machine model predicts.
 #[derive(Debug, Clone)]
@@ -246,6 +246,27 @@ impl FittedModel for MeasuredParts {
                 })
             })
             .collect()
+    }
+
+    /// The coordinates of a point, in all parts alike and in every part otherwise.
+    fn covariates(&self) -> Vec<Covariate> {
+        let of = |axis: Axis| self.readings.iter().map(move |r| r.position[axis.index()]);
+        let parts: Vec<usize> = self.places().iter().map(|p| p.time as usize).collect();
+        let along = |axis: &Axis| {
+            let (name, values): (_, Vec<f64>) = (axis.letter(), of(*axis).collect());
+            let (everywhere, by_part) =
+                (name.to_string(), format!("{name}, another in every part"));
+            let covariate = |name, values, groups| Covariate {
+                name,
+                values,
+                groups,
+            };
+            [
+                covariate(everywhere, values.clone(), None),
+                covariate(by_part, values, Some(parts.clone())),
+            ]
+        };
+        Axis::ALL.iter().flat_map(along).collect()
     }
 
     fn refit(&self, observed: DVector<f64>) -> Self {

@@ -6,8 +6,8 @@ use std::any::Any;
 use nalgebra::{DMatrix, DVector};
 
 use super::{
-    About, Column, Effect, Estimate, FittedModel, Freedom, Link, Parameter, Pattern, Place,
-    Profile, Quantity, Record, Shape,
+    About, Column, Covariate, Effect, Estimate, FittedModel, Freedom, Link, Parameter, Pattern,
+    Place, Profile, Quantity, Record, Shape,
 };
 
 /// A fitted model of any kind. It does what the model in it does.
@@ -84,6 +84,7 @@ trait Behind: Send + Sync {
     fn smoothed_away(&self, noise: &DVector<f64>) -> Option<DMatrix<f64>>;
     fn roughened(self: Box<Self>, away: &DMatrix<f64>) -> Box<dyn Behind>;
     fn further(&self) -> Vec<(String, AnyModel)>;
+    fn covariates(&self) -> Vec<Covariate>;
     fn set_anew(&self) -> Option<DMatrix<f64>>;
     fn beneath(self: Box<Self>, change: &DVector<f64>) -> Box<dyn Behind>;
     fn effects(&self) -> Vec<Box<dyn Effect<AnyModel>>>;
@@ -175,6 +176,9 @@ impl<M: FittedModel + 'static> Behind for M {
         let any = |(words, model): (String, Self)| (words, AnyModel(Box::new(model)));
         FittedModel::further(self).into_iter().map(any).collect()
     }
+    fn covariates(&self) -> Vec<Covariate> {
+        FittedModel::covariates(self)
+    }
     fn set_anew(&self) -> Option<DMatrix<f64>> {
         FittedModel::set_anew(self)
     }
@@ -265,6 +269,10 @@ impl FittedModel for AnyModel {
     fn further(&self) -> Vec<(String, Self)> {
         self.0.further()
     }
+    fn covariates(&self) -> Vec<Covariate> {
+        self.0.covariates()
+    }
+
     fn set_anew(&self) -> Option<DMatrix<f64>> {
         self.0.set_anew()
     }

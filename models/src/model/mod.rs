@@ -39,6 +39,17 @@ pub struct Place {
     pub cell: usize,
 }
 
+/// Something along which an error may change smoothly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Covariate {
+    /// What follows "smooth in".
+    pub name: String,
+    /// Its value for every reading.
+    pub values: Vec<f64>,
+    /// For every reading the group whose error is of a size of its own in every channel; none: all are one group.
+    pub groups: Option<Vec<usize>>,
+}
+
 /// Readings with their circumstances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
@@ -309,6 +320,12 @@ pub trait FittedModel: Clone + Send + Sync {
     /// Measurements that could be made beside this one, in words, each as the model fitted to what
     /// the present state predicts for it; the cheapest first.
     fn further(&self) -> Vec<(String, Self)> {
+        Vec::new()
+    }
+
+    /// Of what, beside the position along the trace, the time and the reading, errors that nobody has listed may be smooth
+    /// functions: the diagnosis draws rivals of a name from them.
+    fn covariates(&self) -> Vec<Covariate> {
         Vec::new()
     }
 

@@ -2,7 +2,7 @@
 
 use errsep_models::model::{AnyModel, FittedModel, Place};
 
-use super::words::{harm_in_words, moved, shown};
+use super::words::{by_shape, harm_in_words, moved, shown};
 use crate::diagnosis::{
     Confidence, Diagnosis, Joined, JoinedEffect, Kind, ParameterOut, for_people,
 };
@@ -249,6 +249,7 @@ fn hidden(hidden: &crate::diagnosis::Hidden) -> sheet::Hidden {
             let (value, unit) = shown(d, &hidden.unit);
             (value, unit.to_owned())
         }),
+        by_shape: by_shape(hidden),
         at_least: hidden.at_least,
         harm: hidden
             .harm

@@ -126,7 +126,8 @@ pub fn in_words(diagnosis: &Diagnosis) -> String {
             |d| {
                 let (value, unit) = shown(d, &hidden.unit);
                 let least = if hidden.at_least { "at least " } else { "" };
-                format!("would show from {least}{} {unit}", number(value))
+                let shapes = by_shape(hidden).map_or(String::new(), |range| format!(" ({range})"));
+                format!("would show from {least}{} {unit}{shapes}", number(value))
             },
         );
         let _ = writeln!(
@@ -143,6 +144,20 @@ pub fn in_words(diagnosis: &Diagnosis) -> String {
         let _ = writeln!(text, "\nNote: {note}");
     }
     text
+}
+
+/// How far the size that shows is another for other shapes of an effect, in words.
+pub(super) fn by_shape(hidden: &Hidden) -> Option<String> {
+    let shapes = hidden.by_shape.as_ref()?;
+    let (from, unit) = shown(shapes.from, &hidden.unit);
+    let others = shapes.to.map_or("at no plausible size".to_owned(), |to| {
+        let (to, own) = shown(to, &hidden.unit);
+        format!("from {} {own}", number(to))
+    });
+    Some(format!(
+        "in some shapes from {} {unit}, in others {others}",
+        number(from)
+    ))
 }
 
 /// How far a quantity moves, as it is shown.

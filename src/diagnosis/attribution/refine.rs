@@ -104,6 +104,13 @@ impl Context<'_> {
         (self.cause(state, cause.effect, shape), t)
     }
 
+    /// The statistic of an effect at the best shape that is found from a start, without relatives.
+    pub fn greatest_near(&self, readings: &DVector<f64>, effect: usize, start: &Shape) -> f64 {
+        Seen::of(self, self.model, readings, effect, &[])
+            .searched(start)
+            .1
+    }
+
     /// As [`Context::refine`], without relatives.
     pub fn refine_alone(
         &self,

@@ -49,6 +49,8 @@ pub struct Family {
     pub is_effect: bool,
     /// Greatest visible part of its signatures, entries left out included.
     pub visible: f64,
+    /// How many of its signatures were left out as they do not show.
+    pub unseen: usize,
 }
 
 impl Entry {
@@ -176,17 +178,20 @@ impl Dictionary {
     fn add(&mut self, name: &str, is_effect: bool, sought: bool, built: Vec<Option<Entry>>) {
         let start = self.entries.len();
         let mut visible: f64 = 0.0;
+        let all = built.len();
         for entry in built.into_iter().flatten() {
             visible = visible.max(entry.visible);
             if sought && entry.visible > INVISIBLE {
                 self.entries.push(entry);
             }
         }
+        let seen = self.entries.len() - start;
         self.families.push(Family {
             name: name.to_owned(),
             entries: start..self.entries.len(),
             is_effect,
             visible,
+            unseen: all - seen,
         });
     }
 }

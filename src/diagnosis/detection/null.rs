@@ -20,6 +20,9 @@ use crate::diagnosis::detection::space::Space;
 use crate::diagnosis::noise::law::{NoiseLaw, draw_scatter};
 use crate::diagnosis::noise::spikes::Spikes;
 
+/// Parts of the draws of which each is judged by the tails of the others: of two, whose tails know half as much as
+/// those of all draws, the law of the smallest tail probability would be too wide.
+const PARTS: usize = 10;
 /// Draws handled at once.
 pub(in crate::diagnosis) const BATCH: usize = 64;
 
@@ -27,13 +30,19 @@ pub(in crate::diagnosis) const BATCH: usize = 64;
 /// probability among them.
 #[derive(Debug, Clone)]
 pub struct NullLaw {
-    families: Vec<Tail>,
-    /// Of the sum of squares that the fit leaves, in units of the noise.
-    misfit: Tail,
+    tails: Tails,
     /// Over the families.
     smallest: Tail,
     /// Over the families and the misfit.
     any: Tail,
+}
+
+/// The tails of each.
+#[derive(Debug, Clone)]
+struct Tails {
+    families: Vec<Tail>,
+    /// Of the sum of squares that the fit leaves, in units of the noise.
+    misfit: Tail,
 }
 
 /// A sorted sample with an exponential tail fitted to its upper tenth.
@@ -72,6 +81,33 @@ impl Tail {
     }
 }
 
+impl Tails {
+    /// From draws: a row holds the families' greatest scores and, last, the misfit.
+    fn new<'r>(rows: impl Iterator<Item = &'r Vec<f64>> + Clone) -> Self {
+        let of = |place: usize| Tail::new(rows.clone().map(|row| row[place]).collect());
+        let families = rows.clone().next().map_or(0, |row| row.len() - 1);
+        Self {
+            families: (0..families).map(of).collect(),
+            misfit: of(families),
+        }
+    }
+
+    fn family(&self, family: usize, surprise: f64) -> f64 {
+        self.families
+            .get(family)
+            .map_or(1.0, |t| t.beyond(surprise))
+    }
+
+    fn smallest_of(&self, surprises: &[f64]) -> f64 {
+        surprises
+            .iter()
+            .enumerate()
+            .map(|(family, s)| self.family(family, *s))
+            .fold(1.0, f64::min)
+            .max(f64::MIN_POSITIVE)
+    }
+}
+
 impl NullLaw {
     /// The law under a space and a dictionary, from a number of draws.
     pub fn simulate(
@@ -88,44 +124,45 @@ impl NullLaw {
             .into_par_iter()
             .map(|batch| greatest(model, dictionary, space, (law, &spikes), seed, batch))
             .collect();
-        let mut rows: Vec<Vec<f64>> = all.into_iter().flatten().collect();
-        // Two samples: tails judged by the draws that made them would look better than they are.
-        let others = rows.split_off(rows.len() / 2);
-        let count = dictionary.families.len();
-        let of = |place: usize| Tail::new(rows.iter().map(|row| row[place]).collect());
-        let mut null = Self {
-            families: (0..count).map(of).collect(),
-            misfit: of(count),
-            smallest: Tail::new(vec![0.0]),
-            any: Tail::new(vec![0.0]),
-        };
-        // A row holds the families' greatest scores and, last, the misfit.
-        let least = |row: &Vec<f64>| null.smallest_of(&row[..count]);
-        let smallest = others.iter().map(|row| -2.0 * least(row).ln());
-        let any = others
-            .iter()
-            .map(|row| -2.0 * least(row).min(null.misfit.beyond(row[count])).ln());
-        let (smallest, any) = (smallest.collect(), any.collect());
-        null.smallest = Tail::new(smallest);
-        null.any = Tail::new(any);
-        null
+        let rows: Vec<Vec<f64>> = all.into_iter().flatten().collect();
+        // Tails judged by the draws that made them would look better than they are: each part of the
+        // draws is judged by the tails of the others.
+        let part = rows.len().div_ceil(PARTS).max(1);
+        let least: Vec<[f64; 2]> = (0..rows.len())
+            .step_by(part)
+            .flat_map(|start| {
+                let (before, from) = rows.split_at(start);
+                let (own, after) = from.split_at(part.min(from.len()));
+                let tails = Tails::new(before.iter().chain(after));
+                let judged = |row: &Vec<f64>| {
+                    let (misfit, families) = row.split_last().unwrap_or((&0.0, &[]));
+                    let least = tails.smallest_of(families);
+                    [least, least.min(tails.misfit.beyond(*misfit))].map(|p| -2.0 * p.ln())
+                };
+                own.iter().map(judged).collect::<Vec<_>>()
+            })
+            .collect();
+        Self {
+            tails: Tails::new(rows.iter()),
+            smallest: Tail::new(least.iter().map(|pair| pair[0]).collect()),
+            any: Tail::new(least.iter().map(|pair| pair[1]).collect()),
+        }
     }
 
     /// Probability that any family or the misfit as a whole would stand out as much with nothing
     /// there: the one test of whether there is a gap.
     pub fn detection(&self, surprises: &[f64], misfit: f64) -> f64 {
         let least = self
+            .tails
             .smallest_of(surprises)
-            .min(self.misfit.beyond(misfit))
+            .min(self.tails.misfit.beyond(misfit))
             .max(f64::MIN_POSITIVE);
         self.any.beyond(-2.0 * least.ln())
     }
 
     /// Probability that the greatest score of a family would be as great with nothing there.
     pub fn family(&self, family: usize, surprise: f64) -> f64 {
-        self.families
-            .get(family)
-            .map_or(1.0, |t| t.beyond(surprise))
+        self.tails.family(family, surprise)
     }
 
     /// The statistic of so many degrees of freedom whose surprise a family exceeds with a probability.
@@ -156,19 +193,10 @@ impl NullLaw {
         low.exp()
     }
 
-    fn smallest_of(&self, surprises: &[f64]) -> f64 {
-        surprises
-            .iter()
-            .enumerate()
-            .map(|(family, s)| self.family(family, *s))
-            .fold(1.0, f64::min)
-            .max(f64::MIN_POSITIVE)
-    }
-
     /// Probability that any family would stand out as much, from the greatest scores of all.
     pub fn global(&self, surprises: &[f64]) -> f64 {
         self.smallest
-            .beyond(-2.0 * self.smallest_of(surprises).ln())
+            .beyond(-2.0 * self.tails.smallest_of(surprises).ln())
     }
 
     /// The same where one family stands out and no other does by more.

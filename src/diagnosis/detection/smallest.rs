@@ -4,10 +4,12 @@
 //! the statistic T at which it stands out with the probability Φ(aL − √T). Where it has several
 //! shapes, the one of median length stands for all: by the longest, sizes of the others would be told too
 //! small, and the shortest may hardly show at all, so that no useful size would be told.
+//! How far the sizes of its other shapes lie from that is told beside it.
 //! What differs from repeat to repeat is taken for noise in part: it swells the noise as the repeats show
 //! it, or makes it seem correlated, and so hides itself. Of such an effect the size is a lower bound.
 
 use errsep_models::model::{AnyModel, Column, FittedModel};
+use serde::Serialize;
 
 use crate::diagnosis::detection::dictionary::{Dictionary, Entry, Family};
 use crate::diagnosis::levels::{PASSES_FOR_NOISE, POWER, SWELLS, normal_quantile};
@@ -22,14 +24,63 @@ pub(in crate::diagnosis) struct Smallest {
     pub at_least: bool,
 }
 
+/// Part of the shapes that is left out at either end where their range is told.
+const LEFT_OUT: f64 = 0.1;
+/// Sizes of shapes that differ by less are alike.
+const ALIKE: f64 = 1.2;
+
+/// The smallest sizes of an effect over its shapes, without the tenth that shows best and the tenth that
+/// shows worst.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SizesByShape {
+    /// Of the shape that shows best.
+    pub from: f64,
+    /// Of the shape that shows worst; none where that shows at no plausible size.
+    pub to: Option<f64>,
+}
+
+impl SizesByShape {
+    /// Of a family; none where its shapes are alike. `statistic`: where a signature of so many columns stands out;
+    /// `most`: the greatest plausible size.
+    pub(in crate::diagnosis) fn new(
+        dictionary: &Dictionary,
+        family: &Family,
+        statistic: impl Fn(usize) -> f64,
+        most: f64,
+    ) -> Option<Self> {
+        let shapes = by_length(dictionary, family);
+        let left_out = (LEFT_OUT * (shapes.len() + family.unseen) as f64) as usize;
+        let size = |entry: &&Entry| least_size(entry.gram[(0, 0)].sqrt(), statistic(entry.order()));
+        let best = shapes.len().checked_sub(1 + left_out);
+        let from = shapes.get(best?).map(size)?;
+        // Those that show at no size are the worst.
+        let worst = left_out.checked_sub(family.unseen);
+        let to = worst.and_then(|worst| shapes.get(worst)).map(size);
+        let alike = to.is_some_and(|to| to <= ALIKE * from);
+        (!alike).then(|| Self {
+            from,
+            to: to.filter(|size| *size <= most),
+        })
+    }
+}
+
 /// The shape of an effect that stands for all of its family: that of median length beside the fit.
 pub(in crate::diagnosis) fn typical<'d>(
     dictionary: &'d Dictionary,
     family: &Family,
 ) -> Option<&'d Entry> {
+    let shapes = by_length(dictionary, family);
+    shapes.get(shapes.len() / 2).copied()
+}
+
+fn by_length<'d>(dictionary: &'d Dictionary, family: &Family) -> Vec<&'d Entry> {
     let mut shapes: Vec<&Entry> = dictionary.entries[family.entries.clone()].iter().collect();
     shapes.sort_by(|a, b| a.gram[(0, 0)].total_cmp(&b.gram[(0, 0)]));
-    shapes.get(shapes.len() / 2).copied()
+    shapes
+}
+
+fn least_size(length: f64, statistic: f64) -> f64 {
+    (statistic.sqrt() + normal_quantile(POWER)) / length
 }
 
 /// The smallest size of an effect in a shape: `length` and `signature` per unit of its size, `statistic` where a
@@ -39,7 +90,7 @@ pub(in crate::diagnosis) fn smallest(
     (length, signature): (f64, &Column),
     statistic: f64,
 ) -> Smallest {
-    let size = (statistic.sqrt() + normal_quantile(POWER)) / length;
+    let size = least_size(length, statistic);
     Smallest {
         size,
         at_least: model.stated_noise().is_none() && swells(model, law, signature, size),

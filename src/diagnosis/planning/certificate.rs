@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::diagnosis::detection::dictionary::{Dictionary, Meaning, Places, statistic};
 use crate::diagnosis::detection::null::NullLaw;
-use crate::diagnosis::detection::smallest::{smallest, typical};
+use crate::diagnosis::detection::smallest::{SizesByShape, smallest, typical};
 use crate::diagnosis::detection::space::Space;
 use crate::diagnosis::levels::{INVISIBLE, PLANNED, TELL, normal_quantile};
 use crate::diagnosis::noise::law::NoiseLaw;
@@ -29,6 +29,8 @@ pub struct Diagnosability {
     pub visible: f64,
     /// Smallest amplitude seen with 80 % probability, if any that is plausible is.
     pub detectable: Option<f64>,
+    /// How far that size is another for other shapes of the effect; none where they are alike.
+    pub by_shape: Option<SizesByShape>,
     /// Whether it may have to be greater than that: it differs from repeat to repeat and is taken for noise in
     /// part.
     pub at_least: bool,
@@ -94,6 +96,7 @@ pub(in crate::diagnosis) fn certificate(
             effect: effect.name().to_owned(),
             visible,
             detectable: None,
+            by_shape: None,
             at_least: false,
             identifiable: None,
             unit: effect
@@ -153,6 +156,10 @@ pub(in crate::diagnosis) fn certificate(
             }
             let most = greatest_plausible(effect.as_ref());
             row.detectable = Some(found.size).filter(|size| *size <= most);
+            row.by_shape = row.detectable.and_then(|_| {
+                let threshold = |order| null.threshold(family, level, order);
+                SizesByShape::new(&dictionary, &dictionary.families[family], threshold, most)
+            });
             row.at_least = found.at_least;
             let per_unit = length * law.sigma() / (n as f64).sqrt();
             // The harm is that of the first shape of the grid, so its own visible part counts.

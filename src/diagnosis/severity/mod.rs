@@ -55,7 +55,8 @@ pub struct Severity {
 /// A family of rivals.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rival {
-    /// An effect, or `smooth in position`, `smooth in time`, `smooth in reading`.
+    /// An effect, or `smooth in position`, `smooth in time`, `smooth in reading`, `smooth in position and time`, `smooth in` a
+    /// covariate of the model, `step in time`.
     pub name: String,
     /// Probability that a gap of this size made by it would have been given the same name alone.
     pub probability: f64,
@@ -65,9 +66,11 @@ impl Rival {
     /// The family in words.
     #[must_use]
     pub fn in_words(&self) -> String {
-        self.name
-            .strip_prefix("smooth in ")
-            .map_or_else(|| self.name.clone(), |of| format!("smooth errors in {of}"))
+        match self.name.split_once(' ') {
+            Some(("smooth", of)) => format!("smooth errors {of}"),
+            Some(("step", of)) => format!("steps {of}"),
+            _ => self.name.clone(),
+        }
     }
 }
 
@@ -151,7 +154,7 @@ pub(in crate::diagnosis) fn severities(
 }
 
 fn severity(context: &Context<'_>, grounds: &Grounds, name: &Name, options: &Options) -> Severity {
-    let families = Family::beside(context, &name.members);
+    let families = Family::beside(context, grounds, &name.members);
     let mut counts: Vec<(Family, Count)> = families
         .into_par_iter()
         .map(|family| {
@@ -176,7 +179,7 @@ fn severity(context: &Context<'_>, grounds: &Grounds, name: &Name, options: &Opt
         rivals: counts
             .iter()
             .map(|(family, count)| Rival {
-                name: family.name(context),
+                name: family.name(context, grounds),
                 probability: count.probability(),
             })
             .collect(),

@@ -116,7 +116,7 @@ fn nothing_is_lost_by_the_order_of_the_score_stage() {
             let mut alike = 0;
             let grounds = Grounds::of(context);
             for name in Name::all(context, found.readings, &answer, 0.01) {
-                for family in Family::beside(context, &name.members) {
+                for family in Family::beside(context, &grounds, &name.members) {
                     let rivals = Drawn::of(context, &name, (family, &grounds), (1, 0), 64);
                     let given = name.given(context, &rivals);
                     // Exact limit: the same questions, asked in another order.
@@ -125,7 +125,7 @@ fn nothing_is_lost_by_the_order_of_the_score_stage() {
                         given_plainly(context, &name, &rivals),
                         "{} by {}",
                         name.effect,
-                        family.name(context)
+                        family.name(context, &grounds)
                     );
                     alike += given.iter().filter(|g| **g).count();
                 }

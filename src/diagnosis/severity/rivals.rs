@@ -1,6 +1,6 @@
 //! Rivals: what else could have made a gap of the same visible size.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{Covariate, FittedModel};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -25,6 +25,10 @@ const FINENESS: f64 = 8.0;
 const ROUNDS: usize = 6;
 /// Effects tried for each that is wanted: few of a family may be possible at the size of the gap.
 const TRIES: usize = 64;
+/// Cosine to the nearest shape of the dictionary from which on what is sharp may be one of the shapes between.
+const UNLIKE: f64 = 0.5;
+/// Greatest length, in ranges, of functions that may be as good as straight.
+const STRAIGHT: f64 = 4.0;
 /// Part of the range by which values of the same place may differ by rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -39,30 +43,41 @@ pub(in crate::diagnosis) enum Family {
     Time,
     /// Of the reading.
     Reading,
+    /// Of the position times one of the time: what grows, fades or swings while it is measured.
+    PositionAndTime,
+    /// Nothing up to some time, then the same.
+    Step,
+    /// Smooth functions of a covariate of the model.
+    Covariate(usize),
 }
 
 impl Family {
     /// All families but the effects of a group.
-    pub fn beside(context: &Context<'_>, members: &[usize]) -> Vec<Self> {
+    pub fn beside(context: &Context<'_>, grounds: &Grounds, members: &[usize]) -> Vec<Self> {
         let others = (0..context.catalogue.len()).filter(|k| !members.contains(k));
         others
             .map(Self::Effect)
             .chain([Self::Position, Self::Time, Self::Reading])
+            .chain([Self::PositionAndTime, Self::Step])
+            .chain((0..grounds.covariates.len()).map(Self::Covariate))
             .collect()
     }
 
-    pub fn name(self, context: &Context<'_>) -> String {
+    pub fn name(self, context: &Context<'_>, grounds: &Grounds) -> String {
         match self {
             Self::Effect(k) => context.catalogue[k].name().to_owned(),
             Self::Position => "smooth in position".to_owned(),
             Self::Time => "smooth in time".to_owned(),
             Self::Reading => "smooth in reading".to_owned(),
+            Self::PositionAndTime => "smooth in position and time".to_owned(),
+            Self::Step => "step in time".to_owned(),
+            Self::Covariate(k) => format!("smooth in {}", grounds.covariates[k].0),
         }
     }
 
     /// The stream of random numbers that is its own, whatever else is in the catalogue.
-    fn stream(self, context: &Context<'_>) -> u64 {
-        let name = self.name(context);
+    fn stream(self, context: &Context<'_>, grounds: &Grounds) -> u64 {
+        let name = self.name(context, grounds);
         // FNV-1a.
         name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
@@ -87,14 +102,12 @@ impl Drawn {
         (seed, batch): (u64, usize),
         most: usize,
     ) -> Self {
-        let mut random = ChaCha8Rng::seed_from_u64(seed ^ family.stream(context));
+        let mut random = ChaCha8Rng::seed_from_u64(seed ^ family.stream(context, grounds));
         random.set_stream(batch as u64 + 1);
         let most = most.min(BATCH);
         let gaps = match family {
             Family::Effect(k) => effects(context, name, k, most, &mut random),
-            Family::Position => smooth(context, name, &grounds.position, most, &mut random),
-            Family::Time => smooth(context, name, &grounds.time, most, &mut random),
-            Family::Reading => smooth(context, name, &grounds.reading, most, &mut random),
+            family => grounds.drawn(context, name, family, most, &mut random),
         };
         let spikes = Spikes::new(context.model);
         let mut readings = DMatrix::zeros(context.space.readings(), BATCH);
@@ -158,36 +171,46 @@ fn effects(
     possible.into_iter().map(gap).collect()
 }
 
-/// Smooth gaps that are none of the effects of a group, without noise.
-fn smooth(
+/// Gaps that are none of the effects of a group, without noise.
+fn unlisted(
     context: &Context<'_>,
     name: &Name,
-    ground: &Ground,
+    (gap, sharp): (impl Fn(&mut ChaCha8Rng) -> DVector<f64>, bool),
     most: usize,
     random: &mut ChaCha8Rng,
 ) -> Vec<DVector<f64>> {
     let mut gaps = Vec::new();
-    if !(ground.range > 2.0 * ground.spacing) {
-        return gaps;
-    }
     for _ in 0..ROUNDS {
         let mut raw = DMatrix::zeros(context.space.readings(), BATCH);
         for mut column in raw.column_iter_mut() {
-            column.copy_from(&ground.smooth(context, random));
+            column.copy_from(&gap(random));
         }
         let (left, whole) = context.space.forward(raw.clone());
         let sizes: Vec<f64> = left.column_iter().map(|c| c.norm()).collect();
         let alike = cosines(context, name, left);
         let usable = (0..BATCH)
             .filter(|k| sizes[*k] * sizes[*k] > INVISIBLE * whole[*k] * whole[*k])
-            .filter(|k| alike[*k] < SAME);
-        gaps.extend(usable.map(|k| raw.column(k) * (name.size / sizes[k])));
+            .filter(|k| alike[*k] < SAME)
+            .map(|k| (alike[k], raw.column(k) * (name.size / sizes[k])))
+            // Shapes of the dictionary lie too far apart for what is sharp.
+            .filter(|(alike, gap)| !sharp || *alike < UNLIKE || searched(context, name, gap) < SAME)
+            .map(|(_, gap)| gap);
+        gaps.extend(usable.take(most - gaps.len()));
         if gaps.len() >= most {
             break;
         }
     }
-    gaps.truncate(most);
     gaps
+}
+
+/// Cosine of a gap to the nearest member of the group, whose shape is searched.
+fn searched(context: &Context<'_>, name: &Name, gap: &DVector<f64>) -> f64 {
+    let first = context.remainder(gap, &[]);
+    let nearest = name.members.iter().filter_map(|member| {
+        let start = context.start(&first, *member)?;
+        Some(context.greatest_near(gap, *member, start))
+    });
+    nearest.fold(0.0, f64::max).sqrt() / name.size
 }
 
 /// Amplitudes of which all visible directions are as probable.
@@ -237,6 +260,9 @@ pub(in crate::diagnosis) struct Grounds {
     position: Ground,
     time: Ground,
     reading: Ground,
+    /// Position and time of the products.
+    both: (Ground, Ground),
+    covariates: Vec<(String, Ground)>,
 }
 
 impl Grounds {
@@ -247,27 +273,94 @@ impl Grounds {
         let reading = Ground::new(without_misfit(context.model).iter().copied().collect());
         // What reads the same all along, but for noise, carries no function of the reading.
         let varies = reading.range > context.law.sigma();
+        let position = Ground::new(places.iter().map(|p| p.x).collect());
+        let time = Ground::new(places.iter().map(|p| p.time).collect());
         Self {
-            position: Ground::new(places.iter().map(|p| p.x).collect()),
-            time: Ground::new(places.iter().map(|p| p.time).collect()),
+            both: (
+                position.clone().with_straight(),
+                time.clone().with_straight(),
+            ),
+            position,
+            time,
             reading: if varies {
                 reading
             } else {
                 Ground::new(Vec::new())
             },
+            covariates: context
+                .model
+                .covariates()
+                .into_iter()
+                .map(Ground::of)
+                .collect(),
         }
+    }
+
+    /// Gaps of a family that is no effect.
+    fn drawn(
+        &self,
+        context: &Context<'_>,
+        name: &Name,
+        family: Family,
+        most: usize,
+        random: &mut ChaCha8Rng,
+    ) -> Vec<DVector<f64>> {
+        let (position, time) = (&self.position, &self.time);
+        let (along, meanwhile) = &self.both;
+        let ground = match family {
+            Family::Effect(_) => return Vec::new(),
+            Family::Step if time.range > 0.0 => {
+                let step = |random: &mut ChaCha8Rng| time.step(context, random);
+                return unlisted(context, name, (step, true), most, random);
+            }
+            Family::PositionAndTime if meanwhile.may_be_smooth() => along,
+            Family::Step | Family::PositionAndTime => return Vec::new(),
+            Family::Position => position,
+            Family::Time => time,
+            Family::Reading => &self.reading,
+            Family::Covariate(k) => &self.covariates[k].1,
+        };
+        if !ground.may_be_smooth() {
+            return Vec::new();
+        }
+        let gap = |random: &mut ChaCha8Rng| {
+            let smooth = ground.smooth(context, random);
+            match family {
+                Family::PositionAndTime => smooth.component_mul(&meanwhile.course(random)),
+                _ => smooth,
+            }
+        };
+        unlisted(context, name, (gap, false), most, random)
     }
 }
 
 /// That of which a smooth rival is a function.
+#[derive(Clone)]
 struct Ground {
     values: Vec<f64>,
     from: f64,
     range: f64,
     spacing: f64,
+    /// The greatest length of its smooth functions.
+    longest: f64,
+    /// For every reading the group that has weights of its own.
+    groups: Option<Vec<usize>>,
 }
 
 impl Ground {
+    /// Functions that are as good as straight are drawn only where all readings are one group: with values of its own,
+    /// every group may be straight in its own way.
+    fn of(covariate: Covariate) -> (String, Self) {
+        let ground = match covariate.groups {
+            None => Self::new(covariate.values).with_straight(),
+            groups => Self {
+                groups,
+                ..Self::new(covariate.values)
+            },
+        };
+        (covariate.name, ground)
+    }
+
     fn new(values: Vec<f64>) -> Self {
         let mut sorted = values.clone();
         sorted.sort_by(f64::total_cmp);
@@ -279,13 +372,73 @@ impl Ground {
             from,
             range,
             spacing: range / sorted.len().saturating_sub(1).max(1) as f64,
+            longest: range,
+            groups: None,
         }
     }
 
-    /// A smooth function times a normal weight for each channel.
+    /// Whether it has values between which a function can be smooth.
+    fn may_be_smooth(&self) -> bool {
+        self.longest > 2.0 * self.spacing
+    }
+
+    /// The same with functions that are as good as straight.
+    fn with_straight(self) -> Self {
+        Self {
+            longest: STRAIGHT * self.range,
+            ..self
+        }
+    }
+
+    /// A smooth function times a normal weight for each channel of each group, or for one channel alone.
     fn smooth(&self, context: &Context<'_>, random: &mut ChaCha8Rng) -> DVector<f64> {
+        let course = self.course(random);
+        self.weighted(context, course, random)
+    }
+
+    /// Nothing up to some value and then such weights.
+    fn step(&self, context: &Context<'_>, random: &mut ChaCha8Rng) -> DVector<f64> {
+        let from = self.from + self.range * random.random::<f64>();
+        let after = self
+            .values
+            .iter()
+            .map(|v| if *v > from { 1.0 } else { 0.0 });
+        let course = DVector::from_iterator(self.values.len(), after);
+        self.weighted(context, course, random)
+    }
+
+    fn weighted(
+        &self,
+        context: &Context<'_>,
+        mut course: DVector<f64>,
+        random: &mut ChaCha8Rng,
+    ) -> DVector<f64> {
+        let channels = context.model.channel_names().len().max(1);
+        let group = |k: usize| self.groups.as_ref().map_or(0, |groups| groups[k]);
+        let last = self.groups.iter().flatten().max();
+        let groups = last.map_or(1, |last| last + 1);
+        // Half of them are errors of one channel only.
+        let only = (random.random::<f64>() < 0.5).then(|| random.random_range(0..channels));
+        let weights: Vec<f64> = (0..groups * channels)
+            .map(|k| {
+                let weight: f64 = StandardNormal.sample(random);
+                match only {
+                    Some(channel) if k % channels != channel => 0.0,
+                    _ => weight,
+                }
+            })
+            .collect();
+        for (k, place) in context.model.places().iter().enumerate() {
+            let weight = weights.get(group(k) * channels + place.channel);
+            course[k] *= weight.copied().unwrap_or(1.0);
+        }
+        course
+    }
+
+    /// A smooth function.
+    fn course(&self, random: &mut ChaCha8Rng) -> DVector<f64> {
         let shortest = 2.0 * self.spacing;
-        let length = shortest * (self.range / shortest).powf(random.random::<f64>());
+        let length = shortest * (self.longest / shortest).powf(random.random::<f64>());
         let cosines: Vec<(f64, f64)> = (0..COSINES)
             .map(|_| {
                 let frequency: f64 = StandardNormal.sample(random);
@@ -295,10 +448,6 @@ impl Ground {
                 )
             })
             .collect();
-        let channels = context.model.channel_names().len();
-        let weights: Vec<f64> = (0..channels.max(1))
-            .map(|_| StandardNormal.sample(random))
-            .collect();
         let step = length / FINENESS;
         let points = (self.range / step).ceil() as usize + 2;
         let grid: Vec<f64> = (0..points)
@@ -307,13 +456,11 @@ impl Ground {
                 cosines.iter().map(|(w, phase)| (w * u + phase).cos()).sum()
             })
             .collect();
-        let places = context.model.places();
         DVector::from_fn(self.values.len(), |k, _| {
             let at = (self.values[k] - self.from) / step;
             let low = (at as usize).min(points - 2);
             let part = at - low as f64;
-            let value = (1.0 - part) * grid[low] + part * grid[low + 1];
-            value * weights.get(places[k].channel).copied().unwrap_or(1.0)
+            (1.0 - part) * grid[low] + part * grid[low + 1]
         })
     }
 }

@@ -4,7 +4,7 @@ use errsep_models::model::FittedModel;
 
 use crate::diagnosis::attribution::bias::weighted_std;
 use crate::diagnosis::attribution::context::Context;
-use crate::diagnosis::detection::smallest::{smallest, typical};
+use crate::diagnosis::detection::smallest::{SizesByShape, smallest, typical};
 use crate::diagnosis::levels::INVISIBLE;
 use crate::diagnosis::options::Options;
 use crate::diagnosis::planning::certificate::greatest_plausible;
@@ -52,6 +52,10 @@ pub(in crate::diagnosis) fn hidden(
             ))
         });
         let smallest = smallest.filter(|smallest| smallest.size <= most);
+        let by_shape = smallest.and_then(|_| {
+            let threshold = |order| context.null.threshold(family, level, order);
+            SizesByShape::new(&context.dictionary, own, threshold, most)
+        });
         let shape = description.grid(context.model).into_iter().next();
         let column = shape
             .and_then(|s| description.columns(context.model, &s).into_iter().next())
@@ -75,6 +79,7 @@ pub(in crate::diagnosis) fn hidden(
             effect: description.name().to_owned(),
             visible,
             detectable: smallest.map(|s| s.size),
+            by_shape,
             at_least: smallest.is_some_and(|s| s.at_least),
             unit: description
                 .amplitudes()

@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::diagnosis::attribution::reported::{Bias, Candidate};
 use crate::diagnosis::attribution::shrink::{HeldOut, Size};
 use crate::diagnosis::detection::localise::Item;
+use crate::diagnosis::detection::smallest::SizesByShape;
 use crate::diagnosis::levels::INVISIBLE;
 use crate::diagnosis::noise::law::NoiseLaw;
 use crate::diagnosis::severity::Severity;
@@ -195,6 +196,8 @@ pub struct Hidden {
     /// Smallest amplitude that would be seen with 80 % probability; none where that is greater than
     /// any plausible one or where nothing shows.
     pub detectable: Option<f64>,
+    /// How far that size is another for other shapes of the effect; none where they are alike.
+    pub by_shape: Option<SizesByShape>,
     /// Whether it may have to be greater than that: it differs from repeat to repeat and is taken for noise in
     /// part.
     pub at_least: bool,

@@ -193,6 +193,8 @@ pub struct Hidden {
     pub detectable: Option<(f64, String)>,
     /// Whether it may have to be greater than that, being taken for noise in part.
     pub at_least: bool,
+    /// How far that size is another for other shapes, in words.
+    pub by_shape: Option<String>,
     /// What it does to the answer unseen.
     pub harm: String,
 }

@@ -126,7 +126,7 @@ pub fn in_words(diagnosis: &Diagnosis) -> String {
             |d| {
                 let (value, unit) = shown(d, &hidden.unit);
                 let least = if hidden.at_least { "at least " } else { "" };
-                let shapes = by_shape(hidden).map_or(String::new(), |range| format!(" ({range})"));
+                let shapes = by_shape(hidden).map_or(String::new(), |range| format!(", {range}"));
                 format!("would show from {least}{} {unit}{shapes}", number(value))
             },
         );
@@ -155,7 +155,7 @@ pub(super) fn by_shape(hidden: &Hidden) -> Option<String> {
         format!("from {} {own}", number(to))
     });
     Some(format!(
-        "in some shapes from {} {unit}, in others {others}",
+        "in some shapes from {} {unit} and in others {others}",
         number(from)
     ))
 }

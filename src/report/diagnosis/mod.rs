@@ -330,7 +330,7 @@ fn hidden(view: &View) -> Section {
                 .map_or("at no size".into(), |(size, unit)| {
                     let least = if hidden.at_least { "at least " } else { "" };
                     let shapes =
-                        (hidden.by_shape.as_ref()).map_or(String::new(), |s| format!(" ({s})"));
+                        (hidden.by_shape.as_ref()).map_or(String::new(), |s| format!(", {s}"));
                     Cell::from(format!("{least}{} {unit}{shapes}", number::plain(*size, 2)))
                 }),
             hidden.harm.clone().into(),

@@ -10,7 +10,8 @@ use crate::diagnosis::detection::fitted::without_misfit;
 use crate::diagnosis::diagnose::diagnose_with;
 use crate::diagnosis::noise::spikes::calmed;
 use crate::diagnosis::options::Options;
-use crate::diagnosis::severity::rivals::{Drawn, Family, Grounds};
+use crate::diagnosis::severity::grounds::Grounds;
+use crate::diagnosis::severity::rivals::{Drawn, Family};
 use crate::diagnosis::severity::stage::Name;
 
 /// Rivals of one family that were named by the score stage and by whole diagnoses.

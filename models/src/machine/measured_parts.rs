@@ -248,23 +248,22 @@ impl FittedModel for MeasuredParts {
             .collect()
     }
 
-    /// The coordinates of a point, in all parts alike and in every part otherwise.
+    /// The coordinates of a point, in all parts alike and, where there are several, in every part otherwise.
     fn covariates(&self) -> Vec<Covariate> {
         let of = |axis: Axis| self.readings.iter().map(move |r| r.position[axis.index()]);
         let parts: Vec<usize> = self.places().iter().map(|p| p.time as usize).collect();
         let along = |axis: &Axis| {
-            let (name, values): (_, Vec<f64>) = (axis.letter(), of(*axis).collect());
-            let (everywhere, by_part) =
-                (name.to_string(), format!("{name}, another in every part"));
-            let covariate = |name, values, groups| Covariate {
-                name,
-                values,
-                groups,
+            let everywhere = Covariate {
+                name: axis.letter().to_string(),
+                values: of(*axis).collect(),
+                groups: None,
             };
-            [
-                covariate(everywhere, values.clone(), None),
-                covariate(by_part, values, Some(parts.clone())),
-            ]
+            let by_part = (self.parts.len() > 1).then(|| Covariate {
+                name: format!("{}, another in every part", axis.letter()),
+                groups: Some(parts.clone()),
+                ..everywhere.clone()
+            });
+            std::iter::once(everywhere).chain(by_part)
         };
         Axis::ALL.iter().flat_map(along).collect()
     }

@@ -49,12 +49,9 @@ impl SizesByShape {
         most: f64,
     ) -> Option<Self> {
         let shapes = by_length(dictionary, family);
-        let left_out = (LEFT_OUT * (shapes.len() + family.unseen) as f64) as usize;
         let size = |entry: &&Entry| least_size(entry.gram[(0, 0)].sqrt(), statistic(entry.order()));
-        let best = shapes.len().checked_sub(1 + left_out);
-        let from = shapes.get(best?).map(size)?;
-        // Those that show at no size are the worst.
-        let worst = left_out.checked_sub(family.unseen);
+        let (best, worst) = ends(shapes.len(), family.unseen);
+        let from = shapes.get(best).map(size)?;
         let to = worst.and_then(|worst| shapes.get(worst)).map(size);
         let alike = to.is_some_and(|to| to <= ALIKE * from);
         (!alike).then(|| Self {
@@ -62,6 +59,14 @@ impl SizesByShape {
             to: to.filter(|size| *size <= most),
         })
     }
+}
+
+/// Which of the shapes that show, the shortest first, stands for those that show best, and which for those that show
+/// worst; none where so many show at no size that one of these does.
+fn ends(shown: usize, unseen: usize) -> (usize, Option<usize>) {
+    let left_out = (LEFT_OUT * (shown + unseen) as f64) as usize;
+    let best = shown.saturating_sub(1 + left_out);
+    (best, left_out.checked_sub(unseen))
 }
 
 /// The shape of an effect that stands for all of its family: that of median length beside the fit.
@@ -111,4 +116,19 @@ fn swells(model: &AnyModel, law: &NoiseLaw, signature: &Column, size: f64) -> bo
     }
     let (variance, _) = contrasts.scatter();
     size * size * variance / white > SWELLS
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ends;
+
+    /// Exact limits: all show; a tenth shows at no size; more do; fewer show than are left out.
+    #[test]
+    fn a_tenth_is_left_out_at_either_end() {
+        assert_eq!(ends(20, 0), (17, Some(2)));
+        assert_eq!(ends(18, 2), (15, Some(0)));
+        assert_eq!(ends(17, 3), (14, None));
+        assert_eq!(ends(2, 28), (0, None));
+        assert_eq!(ends(1, 0), (0, Some(0)));
+    }
 }

@@ -5,6 +5,7 @@
 //! the noise, and named as the diagnosis names (`stage.rs`). One minus the greatest of the
 //! probabilities, over the families, of coming to the same name is the severity.
 
+pub(super) mod grounds;
 #[cfg(test)]
 mod named_alike;
 pub(super) mod rivals;
@@ -20,7 +21,8 @@ use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::detection::null::BATCH;
 use crate::diagnosis::levels::{STRONG, SURE};
 use crate::diagnosis::options::Options;
-use crate::diagnosis::severity::rivals::{Drawn, Family, Grounds};
+use crate::diagnosis::severity::grounds::Grounds;
+use crate::diagnosis::severity::rivals::{Drawn, Family};
 use crate::diagnosis::severity::stage::Name;
 use crate::number::{percent, plain};
 

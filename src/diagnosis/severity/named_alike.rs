@@ -13,7 +13,8 @@ use crate::diagnosis::attribution::outweighed::outweighed;
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::null::rows_of;
 use crate::diagnosis::levels::{EARNED, REFINED, UNSEARCHED};
-use crate::diagnosis::severity::rivals::{Drawn, Family, Grounds};
+use crate::diagnosis::severity::grounds::Grounds;
+use crate::diagnosis::severity::rivals::{Drawn, Family};
 use crate::diagnosis::severity::stage::Name;
 
 /// Four sets of twenty loads, noise of 1.

@@ -1,6 +1,5 @@
 //! Rivals: what else could have made a gap of the same visible size.
 
-use errsep_models::model::{Covariate, FittedModel};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,18 +7,13 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::detection::dictionary::{Entry, Meaning};
-use crate::diagnosis::detection::fitted::without_misfit;
 use crate::diagnosis::detection::null::{BATCH, seen, statistics};
 use crate::diagnosis::levels::{INVISIBLE, SAME};
 use crate::diagnosis::noise::law::draw_scatter;
 use crate::diagnosis::noise::spikes::Spikes;
+use crate::diagnosis::severity::grounds::Grounds;
 use crate::diagnosis::severity::stage::Name;
 
-/// Cosines that make a smooth function: their sum is a Gaussian process but for its fourth moments,
-/// which are off by 1/16 of themselves.
-const COSINES: usize = 24;
-/// Points a length at which it is reckoned, straight between them.
-const FINENESS: f64 = 8.0;
 /// Rounds of drawing smooth functions until a batch is full: fewer rivals are taken where most are like
 /// the effect.
 const ROUNDS: usize = 6;
@@ -27,10 +21,6 @@ const ROUNDS: usize = 6;
 const TRIES: usize = 64;
 /// Cosine to the nearest shape of the dictionary from which on what is sharp may be one of the shapes between.
 const UNLIKE: f64 = 0.5;
-/// Greatest length, in ranges, of functions that may be as good as straight.
-const STRAIGHT: f64 = 4.0;
-/// Part of the range by which values of the same place may differ by rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// A family of rivals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,7 +97,7 @@ impl Drawn {
         let most = most.min(BATCH);
         let gaps = match family {
             Family::Effect(k) => effects(context, name, k, most, &mut random),
-            family => grounds.drawn(context, name, family, most, &mut random),
+            family => of_no_effect(grounds, context, name, family, most, &mut random),
         };
         let spikes = Spikes::new(context.model);
         let mut readings = DMatrix::zeros(context.space.readings(), BATCH);
@@ -169,6 +159,43 @@ fn effects(
         sum
     };
     possible.into_iter().map(gap).collect()
+}
+
+/// Gaps of a family that is no effect.
+fn of_no_effect(
+    grounds: &Grounds,
+    context: &Context<'_>,
+    name: &Name,
+    family: Family,
+    most: usize,
+    random: &mut ChaCha8Rng,
+) -> Vec<DVector<f64>> {
+    let (position, time) = (&grounds.position, &grounds.time);
+    let (along, meanwhile) = &grounds.both;
+    let ground = match family {
+        Family::Effect(_) => return Vec::new(),
+        Family::Step if time.range > 0.0 => {
+            let step = |random: &mut ChaCha8Rng| time.step(context, random);
+            return unlisted(context, name, (step, true), most, random);
+        }
+        Family::PositionAndTime if meanwhile.may_be_smooth() => along,
+        Family::Step | Family::PositionAndTime => return Vec::new(),
+        Family::Position => position,
+        Family::Time => time,
+        Family::Reading => &grounds.reading,
+        Family::Covariate(k) => &grounds.covariates[k].1,
+    };
+    if !ground.may_be_smooth() {
+        return Vec::new();
+    }
+    let gap = |random: &mut ChaCha8Rng| {
+        let smooth = ground.smooth(context, random);
+        match family {
+            Family::PositionAndTime => smooth.component_mul(&meanwhile.course(random)),
+            _ => smooth,
+        }
+    };
+    unlisted(context, name, (gap, false), most, random)
 }
 
 /// Gaps that are none of the effects of a group, without noise.
@@ -253,214 +280,4 @@ fn cosines(context: &Context<'_>, name: &Name, left: DMatrix<f64>) -> Vec<f64> {
     pairs
         .map(|(t, square)| (t / square.max(f64::MIN_POSITIVE)).sqrt())
         .collect()
-}
-
-/// What smooth rivals may be functions of.
-pub(in crate::diagnosis) struct Grounds {
-    position: Ground,
-    time: Ground,
-    reading: Ground,
-    /// Position and time of the products.
-    both: (Ground, Ground),
-    covariates: Vec<(String, Ground)>,
-}
-
-impl Grounds {
-    /// Those of a context.
-    pub fn of(context: &Context<'_>) -> Self {
-        let places = context.model.places();
-        // What the model reads: a gap is no function of itself, nor of the noise.
-        let reading = Ground::new(without_misfit(context.model).iter().copied().collect());
-        // What reads the same all along, but for noise, carries no function of the reading.
-        let varies = reading.range > context.law.sigma();
-        let position = Ground::new(places.iter().map(|p| p.x).collect());
-        let time = Ground::new(places.iter().map(|p| p.time).collect());
-        Self {
-            both: (
-                position.clone().with_straight(),
-                time.clone().with_straight(),
-            ),
-            position,
-            time,
-            reading: if varies {
-                reading
-            } else {
-                Ground::new(Vec::new())
-            },
-            covariates: context
-                .model
-                .covariates()
-                .into_iter()
-                .map(Ground::of)
-                .collect(),
-        }
-    }
-
-    /// Gaps of a family that is no effect.
-    fn drawn(
-        &self,
-        context: &Context<'_>,
-        name: &Name,
-        family: Family,
-        most: usize,
-        random: &mut ChaCha8Rng,
-    ) -> Vec<DVector<f64>> {
-        let (position, time) = (&self.position, &self.time);
-        let (along, meanwhile) = &self.both;
-        let ground = match family {
-            Family::Effect(_) => return Vec::new(),
-            Family::Step if time.range > 0.0 => {
-                let step = |random: &mut ChaCha8Rng| time.step(context, random);
-                return unlisted(context, name, (step, true), most, random);
-            }
-            Family::PositionAndTime if meanwhile.may_be_smooth() => along,
-            Family::Step | Family::PositionAndTime => return Vec::new(),
-            Family::Position => position,
-            Family::Time => time,
-            Family::Reading => &self.reading,
-            Family::Covariate(k) => &self.covariates[k].1,
-        };
-        if !ground.may_be_smooth() {
-            return Vec::new();
-        }
-        let gap = |random: &mut ChaCha8Rng| {
-            let smooth = ground.smooth(context, random);
-            match family {
-                Family::PositionAndTime => smooth.component_mul(&meanwhile.course(random)),
-                _ => smooth,
-            }
-        };
-        unlisted(context, name, (gap, false), most, random)
-    }
-}
-
-/// That of which a smooth rival is a function.
-#[derive(Clone)]
-struct Ground {
-    values: Vec<f64>,
-    from: f64,
-    range: f64,
-    spacing: f64,
-    /// The greatest length of its smooth functions.
-    longest: f64,
-    /// For every reading the group that has weights of its own.
-    groups: Option<Vec<usize>>,
-}
-
-impl Ground {
-    /// Functions that are as good as straight are drawn only where all readings are one group: with values of its own,
-    /// every group may be straight in its own way.
-    fn of(covariate: Covariate) -> (String, Self) {
-        let ground = match covariate.groups {
-            None => Self::new(covariate.values).with_straight(),
-            groups => Self {
-                groups,
-                ..Self::new(covariate.values)
-            },
-        };
-        (covariate.name, ground)
-    }
-
-    fn new(values: Vec<f64>) -> Self {
-        let mut sorted = values.clone();
-        sorted.sort_by(f64::total_cmp);
-        let from = sorted.first().copied().unwrap_or(0.0);
-        let range = sorted.last().copied().unwrap_or(0.0) - from;
-        sorted.dedup_by(|later, earlier| *later - *earlier <= ROUNDING * range);
-        Self {
-            values,
-            from,
-            range,
-            spacing: range / sorted.len().saturating_sub(1).max(1) as f64,
-            longest: range,
-            groups: None,
-        }
-    }
-
-    /// Whether it has values between which a function can be smooth.
-    fn may_be_smooth(&self) -> bool {
-        self.longest > 2.0 * self.spacing
-    }
-
-    /// The same with functions that are as good as straight.
-    fn with_straight(self) -> Self {
-        Self {
-            longest: STRAIGHT * self.range,
-            ..self
-        }
-    }
-
-    /// A smooth function times a normal weight for each channel of each group, or for one channel alone.
-    fn smooth(&self, context: &Context<'_>, random: &mut ChaCha8Rng) -> DVector<f64> {
-        let course = self.course(random);
-        self.weighted(context, course, random)
-    }
-
-    /// Nothing up to some value and then such weights.
-    fn step(&self, context: &Context<'_>, random: &mut ChaCha8Rng) -> DVector<f64> {
-        let from = self.from + self.range * random.random::<f64>();
-        let after = self
-            .values
-            .iter()
-            .map(|v| if *v > from { 1.0 } else { 0.0 });
-        let course = DVector::from_iterator(self.values.len(), after);
-        self.weighted(context, course, random)
-    }
-
-    fn weighted(
-        &self,
-        context: &Context<'_>,
-        mut course: DVector<f64>,
-        random: &mut ChaCha8Rng,
-    ) -> DVector<f64> {
-        let channels = context.model.channel_names().len().max(1);
-        let group = |k: usize| self.groups.as_ref().map_or(0, |groups| groups[k]);
-        let last = self.groups.iter().flatten().max();
-        let groups = last.map_or(1, |last| last + 1);
-        // Half of them are errors of one channel only.
-        let only = (random.random::<f64>() < 0.5).then(|| random.random_range(0..channels));
-        let weights: Vec<f64> = (0..groups * channels)
-            .map(|k| {
-                let weight: f64 = StandardNormal.sample(random);
-                match only {
-                    Some(channel) if k % channels != channel => 0.0,
-                    _ => weight,
-                }
-            })
-            .collect();
-        for (k, place) in context.model.places().iter().enumerate() {
-            let weight = weights.get(group(k) * channels + place.channel);
-            course[k] *= weight.copied().unwrap_or(1.0);
-        }
-        course
-    }
-
-    /// A smooth function.
-    fn course(&self, random: &mut ChaCha8Rng) -> DVector<f64> {
-        let shortest = 2.0 * self.spacing;
-        let length = shortest * (self.longest / shortest).powf(random.random::<f64>());
-        let cosines: Vec<(f64, f64)> = (0..COSINES)
-            .map(|_| {
-                let frequency: f64 = StandardNormal.sample(random);
-                (
-                    frequency / length,
-                    random.random::<f64>() * std::f64::consts::TAU,
-                )
-            })
-            .collect();
-        let step = length / FINENESS;
-        let points = (self.range / step).ceil() as usize + 2;
-        let grid: Vec<f64> = (0..points)
-            .map(|k| {
-                let u = k as f64 * step;
-                cosines.iter().map(|(w, phase)| (w * u + phase).cos()).sum()
-            })
-            .collect();
-        DVector::from_fn(self.values.len(), |k, _| {
-            let at = (self.values[k] - self.from) / step;
-            let low = (at as usize).min(points - 2);
-            let part = at - low as f64;
-            (1.0 - part) * grid[low] + part * grid[low + 1]
-        })
-    }
 }

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::effects;
 use super::lack_of_fit::{LackOfFit, lack_of_fit};
-use crate::model::{Effect, FittedModel, Freedom, Place, Quantity, Record};
+use crate::model::{Course, Covariate, Effect, FittedModel, Freedom, Place, Quantity, Record};
 
 /// One reading of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -241,6 +241,29 @@ impl FittedModel for CalibrationLine {
 
     fn stated_noise(&self) -> Option<f64> {
         self.noise
+    }
+
+    /// A sensitivity that drifts, and a line of its own in every set.
+    fn covariates(&self) -> Vec<Covariate> {
+        let places = self.record.places.iter();
+        let loads: Vec<f64> = places.clone().map(|p| p.x).collect();
+        let ones = vec![1.0; loads.len()];
+        let times = places.map(|p| p.time).collect();
+        let sensitivity = Covariate {
+            factors: vec![loads.clone()],
+            ..Covariate::smooth("time, in proportion to the load", times)
+        };
+        let traces = self.record.traces.iter().enumerate();
+        let sets = traces.flat_map(|(set, trace)| trace.clone().map(move |_| set));
+        let by_set = Covariate {
+            name: "the load or the same, another in every set".to_owned(),
+            course: Course::Proportional,
+            factors: vec![ones, loads],
+            groups: Some(sets.collect()),
+            ..sensitivity.clone()
+        };
+        let by_set = (self.record.traces.len() > 1).then_some(by_set);
+        std::iter::once(sensitivity).chain(by_set).collect()
     }
 
     fn refit(&self, observed: DVector<f64>) -> Self {

@@ -12,7 +12,9 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use super::effects;
 use super::orthogonal::{CircleFit, orthogonal_fit};
 use super::points::{Circle, CircleError, Point};
-use crate::model::{Effect, FittedModel, Freedom, Place, Quantity, ROUNDING, Record};
+use crate::model::{
+    Course, Covariate, Effect, FittedModel, Freedom, Place, Quantity, ROUNDING, Record,
+};
 use crate::units::UM_PER_MM;
 
 /// Points of one or several passes round a circle with the fitted circle.
@@ -305,6 +307,45 @@ impl FittedModel for CirclePoints {
 
     fn stated_noise(&self) -> Option<f64> {
         self.noise
+    }
+
+    /// Errors of the axes, as the radius shows them: along either, functions of the place along one of them, or another in each
+    /// sense of travel; a centre that wanders or is another from some moment on.
+    fn covariates(&self) -> Vec<Covariate> {
+        let of = |part: fn(f64, f64) -> f64| -> Vec<f64> {
+            let places = self.places().iter();
+            places.map(|p| part(Self::angle(p), p.direction)).collect()
+        };
+        let along = [of(|angle, _| angle.cos()), of(|angle, _| angle.sin())];
+        let reversing = [
+            of(|angle, turn| angle.cos() * (-turn * angle.sin()).signum()),
+            of(|angle, turn| angle.sin() * (turn * angle.cos()).signum()),
+        ];
+        let smooth = |name: &str, values: &[f64]| Covariate {
+            factors: along.to_vec(),
+            ..Covariate::smooth(name, values.to_vec())
+        };
+        let times: Vec<f64> = self.places().iter().map(|p| p.time).collect();
+        let wandering = smooth("time, of the centre", &times);
+        let jumping = Covariate {
+            course: Course::Step,
+            ..wandering.clone()
+        };
+        let lost_motion = |axis: &str, factor: Vec<f64>| Covariate {
+            name: format!("the sense of travel of {axis}"),
+            course: Course::Proportional,
+            factors: vec![factor],
+            ..wandering.clone()
+        };
+        let [x, y] = reversing;
+        vec![
+            smooth("X, along either axis", &along[0]),
+            smooth("Y, along either axis", &along[1]),
+            lost_motion("X", x),
+            lost_motion("Y", y),
+            wandering,
+            jumping,
+        ]
     }
 
     fn refit(&self, observed: DVector<f64>) -> Self {

@@ -208,12 +208,12 @@ impl FittedModel for DiagonalRuns {
             })
         };
         [(0, "first"), (1, "second")]
-            .map(|(direction, which)| Covariate {
-                name: format!("the {which} offset on the mirror"),
-                values: (0..self.places().len())
-                    .map(|row| offset(direction, row))
-                    .collect(),
-                groups: None,
+            .map(|(direction, which)| {
+                let rows = 0..self.places().len();
+                Covariate::smooth(
+                    format!("the {which} offset on the mirror"),
+                    rows.map(|row| offset(direction, row)).collect(),
+                )
             })
             .into()
     }

@@ -10,7 +10,9 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::model::coordinate;
 use super::{Axis, ComponentError, Machine, MachineError, PartReading, effects, part_residuals};
-use crate::model::{Column, Covariate, Effect, FittedModel, Freedom, Place, Quantity, Record};
+use crate::model::{
+    Column, Course, Covariate, Effect, FittedModel, Freedom, Place, Quantity, Record,
+};
 
 /// Parts measured at points whose deviations a machine model predicts.
 #[derive(Debug, Clone)]
@@ -253,19 +255,33 @@ impl FittedModel for MeasuredParts {
         let of = |axis: Axis| self.readings.iter().map(move |r| r.position[axis.index()]);
         let parts: Vec<usize> = self.places().iter().map(|p| p.time as usize).collect();
         let along = |axis: &Axis| {
-            let everywhere = Covariate {
-                name: axis.letter().to_string(),
-                values: of(*axis).collect(),
-                groups: None,
-            };
+            let everywhere = Covariate::smooth(axis.letter(), of(*axis).collect());
             let by_part = (self.parts.len() > 1).then(|| Covariate {
                 name: format!("{}, another in every part", axis.letter()),
                 groups: Some(parts.clone()),
                 ..everywhere.clone()
             });
-            std::iter::once(everywhere).chain(by_part)
+            let others = Axis::ALL.into_iter().filter(|other| other != axis);
+            let product = Covariate {
+                name: format!("{} times another coordinate", axis.letter()),
+                factors: others.map(|other| of(other).collect()).collect(),
+                ..everywhere.clone()
+            };
+            [everywhere, product].into_iter().chain(by_part)
         };
-        Axis::ALL.iter().flat_map(along).collect()
+        let times: Vec<f64> = self.places().iter().map(|p| p.time).collect();
+        let in_time = Covariate {
+            factors: Axis::ALL.iter().map(|axis| of(*axis).collect()).collect(),
+            ..Covariate::smooth("time times a coordinate", times)
+        };
+        let proportional = Covariate {
+            name: "a coordinate".to_owned(),
+            course: Course::Proportional,
+            ..in_time.clone()
+        };
+        let of_all = (self.parts.len() > 1).then_some(in_time);
+        let by_axis = Axis::ALL.iter().flat_map(along);
+        by_axis.chain(of_all).chain([proportional]).collect()
     }
 
     fn refit(&self, observed: DVector<f64>) -> Self {

@@ -39,13 +39,29 @@ pub struct Place {
     pub cell: usize,
 }
 
-/// Something along which an error may change smoothly.
+/// How an error may change along a covariate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Course {
+    /// By any smooth function.
+    Smooth,
+    /// Nothing up to some value, the same from there on.
+    Step,
+    /// Not at all: it is in proportion to the factors alone.
+    Proportional,
+}
+
+/// Something along which an error may change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariate {
-    /// What follows "smooth in".
+    /// What follows "smooth in", "step in" or "proportional to".
     pub name: String,
     /// Its value for every reading.
     pub values: Vec<f64>,
+    /// How the error may change along it.
+    pub course: Course,
+    /// What the function is multiplied by in every reading, each with a weight of its own: the parts by which errors
+    /// along several axes are read. None: by one.
+    pub factors: Vec<Vec<f64>>,
     /// For every reading the group whose error is of a size of its own in every channel; none: all are one group.
     pub groups: Option<Vec<usize>>,
 }
@@ -59,6 +75,19 @@ pub struct Record {
     pub traces: Arc<[Range<usize>]>,
     /// The readings.
     pub observed: DVector<f64>,
+}
+
+impl Covariate {
+    /// That of smooth functions, the same in all readings.
+    pub fn smooth(name: impl Into<String>, values: Vec<f64>) -> Self {
+        Self {
+            name: name.into(),
+            values,
+            course: Course::Smooth,
+            factors: Vec::new(),
+            groups: None,
+        }
+    }
 }
 
 impl Record {
@@ -323,7 +352,7 @@ pub trait FittedModel: Clone + Send + Sync {
         Vec::new()
     }
 
-    /// Of what, beside the position along the trace, the time and the reading, errors that nobody has listed may be smooth
+    /// Of what, beside the position along the trace, the time and the reading, errors that nobody has listed may be
     /// functions: the diagnosis draws rivals of a name from them.
     fn covariates(&self) -> Vec<Covariate> {
         Vec::new()

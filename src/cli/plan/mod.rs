@@ -284,6 +284,8 @@ fn newly(before: &[Diagnosability], after: &[Diagnosability]) -> Vec<String> {
 /// What the sign before a size means.
 const AT_LEAST: &str = "\u{2265}: what differs from repeat to repeat is taken for noise in part, and may have to be several times as great.";
 
+const BY_SHAPE: &str = "The sizes above are of a typical shape:";
+
 /// A size of an effect from which a plan shows it or tells it apart.
 fn effect_size(row: &Diagnosability, value: Option<f64>) -> String {
     let least = if row.at_least && value.is_some() {
@@ -292,6 +294,22 @@ fn effect_size(row: &Diagnosability, value: Option<f64>) -> String {
         ""
     };
     format!("{least}{}", size(value, &row.unit))
+}
+
+/// Effects of which other shapes show from another size on than the typical one.
+fn by_shape(rows: &[Diagnosability]) -> Vec<String> {
+    let in_words = |row: &Diagnosability| {
+        let shapes = row.by_shape.as_ref()?;
+        let from = size(Some(shapes.from), &row.unit);
+        let others = shapes.to.map_or("at no plausible size".to_owned(), |to| {
+            format!("from {}", size(Some(to), &row.unit))
+        });
+        Some(format!(
+            "{}: in some shapes from {from}, in others {others}",
+            row.effect
+        ))
+    };
+    rows.iter().filter_map(in_words).collect()
 }
 
 fn size(value: Option<f64>, unit: &str) -> String {
@@ -383,6 +401,13 @@ fn answer(
     if rows.iter().any(|row| row.at_least) {
         let _ = writeln!(text, "{AT_LEAST}");
     }
+    let shapes = by_shape(rows);
+    if !shapes.is_empty() {
+        let _ = writeln!(text, "\n{BY_SHAPE}");
+        for line in &shapes {
+            let _ = writeln!(text, "  {line}");
+        }
+    }
     text += "\nWhat would help most\n";
     let mut help = Vec::new();
     for (name, gain, new) in &extras {
@@ -411,6 +436,9 @@ fn answer(
         .table(table);
     if rows.iter().any(|row| row.at_least) {
         section = section.paragraph(AT_LEAST);
+    }
+    if !shapes.is_empty() {
+        section = section.paragraph(BY_SHAPE).list(shapes);
     }
     Answer {
         text,

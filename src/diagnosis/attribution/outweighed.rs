@@ -56,18 +56,28 @@ fn drop_holders(context: &Context<'_>, members: &mut Vec<Member>, k: usize) {
         return;
     };
     let leader = &members[most];
-    let (own, misfit) = (leader.causes[k].unknowns(), leader.misfit);
-    let own_length = leader.causes[k].projected.norm_squared();
-    let projected = leader.causes[k].projected.clone();
+    let cause = leader.causes[k].clone();
+    let left = leader.misfit;
     members.retain(|m| {
-        let more = m.causes[k].unknowns().saturating_sub(own);
-        if more == 0 || misfit - m.misfit > chi_squared_quantile(0.99, more) {
-            return true;
-        }
-        let basis = span(&m.causes, context.space.readings());
-        let left = &projected - &basis * basis.tr_mul(&projected);
-        left.norm_squared() > HELD * own_length
+        let other = (&m.causes[..], m.causes[k].unknowns(), m.misfit);
+        !holds(context, other, (&cause, left))
     });
+}
+
+/// Whether causes, with the unknowns of the one that varies and what they leave, hold the signature of another cause among
+/// others of their own that explain no more than chance.
+pub(in crate::diagnosis) fn holds(
+    context: &Context<'_>,
+    (causes, unknowns, left): (&[Cause], usize, f64),
+    (own, left_by_own): (&Cause, f64),
+) -> bool {
+    let more = unknowns.saturating_sub(own.unknowns());
+    if more == 0 || left_by_own - left > chi_squared_quantile(0.99, more) {
+        return false;
+    }
+    let basis = span(causes, context.space.readings());
+    let beside = &own.projected - &basis * basis.tr_mul(&own.projected);
+    beside.norm_squared() <= HELD * own.projected.norm_squared()
 }
 
 /// Drops what is outweighed by the member of greatest evidence.

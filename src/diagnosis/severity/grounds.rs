@@ -1,6 +1,6 @@
 //! What errors that nobody has listed may be functions of.
 
-use errsep_models::model::{Covariate, FittedModel};
+use errsep_models::model::{Course, Covariate, FittedModel};
 use nalgebra::DVector;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -26,7 +26,15 @@ pub(in crate::diagnosis) struct Grounds {
     pub reading: Ground,
     /// Position and time of the products.
     pub both: (Ground, Ground),
-    pub covariates: Vec<(String, Ground)>,
+    pub covariates: Vec<Along>,
+}
+
+/// A covariate of the model.
+pub(in crate::diagnosis) struct Along {
+    pub name: String,
+    pub ground: Ground,
+    /// How errors change along it.
+    pub course: Course,
 }
 
 impl Grounds {
@@ -70,6 +78,8 @@ pub(in crate::diagnosis) struct Ground {
     spacing: f64,
     /// The greatest length of its smooth functions.
     longest: f64,
+    /// What the function is multiplied by, each with a weight of its own.
+    factors: Vec<Vec<f64>>,
     /// For every reading the group that has weights of its own.
     groups: Option<Vec<usize>>,
 }
@@ -77,15 +87,20 @@ pub(in crate::diagnosis) struct Ground {
 impl Ground {
     /// Functions that are as good as straight are drawn only where all readings are one group: with values of its own,
     /// every group may be straight in its own way.
-    fn of(covariate: Covariate) -> (String, Self) {
-        let ground = match covariate.groups {
-            None => Self::new(covariate.values).with_straight(),
-            groups => Self {
-                groups,
-                ..Self::new(covariate.values)
-            },
+    fn of(covariate: Covariate) -> Along {
+        let ground = Self {
+            factors: covariate.factors,
+            ..Self::new(covariate.values)
         };
-        (covariate.name, ground)
+        let ground = match covariate.groups {
+            None => ground.with_straight(),
+            groups => Self { groups, ..ground },
+        };
+        Along {
+            name: covariate.name,
+            ground,
+            course: covariate.course,
+        }
     }
 
     fn new(values: Vec<f64>) -> Self {
@@ -100,6 +115,7 @@ impl Ground {
             range,
             spacing: range / sorted.len().saturating_sub(1).max(1) as f64,
             longest: range,
+            factors: Vec::new(),
             groups: None,
         }
     }
@@ -117,7 +133,7 @@ impl Ground {
         }
     }
 
-    /// A smooth function times a normal weight for each channel of each group, or for one channel alone.
+    /// A smooth function times a normal weight for each channel, factor and group, or for one channel and factor alone.
     pub fn smooth(&self, context: &Context<'_>, random: &mut ChaCha8Rng) -> DVector<f64> {
         let course = self.course(random);
         self.weighted(context, course, random)
@@ -134,6 +150,12 @@ impl Ground {
         self.weighted(context, course, random)
     }
 
+    /// In proportion to its factors, with such weights.
+    pub fn proportional(&self, context: &Context<'_>, random: &mut ChaCha8Rng) -> DVector<f64> {
+        let course = DVector::from_element(self.values.len(), 1.0);
+        self.weighted(context, course, random)
+    }
+
     fn weighted(
         &self,
         context: &Context<'_>,
@@ -144,20 +166,30 @@ impl Ground {
         let group = |k: usize| self.groups.as_ref().map_or(0, |groups| groups[k]);
         let last = self.groups.iter().flatten().max();
         let groups = last.map_or(1, |last| last + 1);
-        // Half of them are errors of one channel only.
-        let only = (random.random::<f64>() < 0.5).then(|| random.random_range(0..channels));
-        let weights: Vec<f64> = (0..groups * channels)
+        // Half of them are errors of one channel only, by one factor.
+        let strands = channels * self.factors.len().max(1);
+        let only = (random.random::<f64>() < 0.5).then(|| random.random_range(0..strands));
+        let weights: Vec<f64> = (0..groups * strands)
             .map(|k| {
                 let weight: f64 = StandardNormal.sample(random);
                 match only {
-                    Some(channel) if k % channels != channel => 0.0,
+                    Some(strand) if k % strands != strand => 0.0,
                     _ => weight,
                 }
             })
             .collect();
+        let weight = |group: usize, factor: usize, channel: usize| {
+            let weight = weights.get(group * strands + factor * channels + channel);
+            weight.copied().unwrap_or(1.0)
+        };
         for (k, place) in context.model.places().iter().enumerate() {
-            let weight = weights.get(group(k) * channels + place.channel);
-            course[k] *= weight.copied().unwrap_or(1.0);
+            let of = |factor: usize| weight(group(k), factor, place.channel);
+            let factors = self.factors.iter().enumerate();
+            course[k] *= if self.factors.is_empty() {
+                of(0)
+            } else {
+                factors.map(|(j, values)| of(j) * values[k]).sum()
+            };
         }
         course
     }

@@ -58,7 +58,7 @@ pub struct Severity {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rival {
     /// An effect, or `smooth in position`, `smooth in time`, `smooth in reading`, `smooth in position and time`, `smooth in` a
-    /// covariate of the model, `step in time`.
+    /// covariate of the model, `step in time` or such a covariate, `proportional to` one.
     pub name: String,
     /// Probability that a gap of this size made by it would have been given the same name alone.
     pub probability: f64,
@@ -71,6 +71,7 @@ impl Rival {
         match self.name.split_once(' ') {
             Some(("smooth", of)) => format!("smooth errors {of}"),
             Some(("step", of)) => format!("steps {of}"),
+            Some(("proportional", of)) => format!("errors proportional {of}"),
             _ => self.name.clone(),
         }
     }

@@ -9,7 +9,7 @@ use crate::diagnosis::attribution::confidence::possible;
 use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::attribution::doubt::FEW_DRAWS;
 use crate::diagnosis::attribution::examined::examined;
-use crate::diagnosis::attribution::outweighed::outweighed;
+use crate::diagnosis::attribution::outweighed::{holds, outweighed};
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::null::rows_of;
 use crate::diagnosis::levels::{EARNED, REFINED, UNSEARCHED};
@@ -79,19 +79,26 @@ fn is_first(context: &Context<'_>, name: &Name, rivals: &Drawn, rival: usize) ->
         passes.then(|| (left.square, cause.unknowns()))
     };
     let of_group = |cause: &Cause| name.members.contains(&cause.effect);
-    let others: Vec<(f64, usize)> = refined
+    let others: Vec<(&Cause, (f64, usize))> = refined
         .iter()
         .filter(|(cause, _)| !of_group(cause))
-        .filter_map(|(cause, _)| passed(cause))
+        .filter_map(|(cause, _)| Some((cause, passed(cause)?)))
         .collect();
     let best = refined.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    let Some(own) = best
+    let Some((cause, own)) = best
         .filter(|(cause, _)| of_group(cause))
-        .and_then(|(cause, _)| passed(cause))
+        .and_then(|(cause, _)| Some((cause, passed(cause)?)))
     else {
         return false;
     };
-    others.iter().all(|other| outweighed(context, *other, own))
+    others.iter().all(|(other, (left, unknowns))| {
+        outweighed(context, (*left, *unknowns), own)
+            || holds(
+                context,
+                (std::slice::from_ref(*other), *unknowns, *left),
+                (cause, own.0),
+            )
+    })
 }
 
 /// A drift near the limit of detection, of which smooth errors are often named alike, and a bend, of which

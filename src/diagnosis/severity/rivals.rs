@@ -1,5 +1,6 @@
 //! Rivals: what else could have made a gap of the same visible size.
 
+use errsep_models::model::Course;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +12,7 @@ use crate::diagnosis::detection::null::{BATCH, seen, statistics};
 use crate::diagnosis::levels::{INVISIBLE, SAME};
 use crate::diagnosis::noise::law::draw_scatter;
 use crate::diagnosis::noise::spikes::Spikes;
-use crate::diagnosis::severity::grounds::Grounds;
+use crate::diagnosis::severity::grounds::{Ground, Grounds};
 use crate::diagnosis::severity::stage::Name;
 
 /// Rounds of drawing smooth functions until a batch is full: fewer rivals are taken where most are like
@@ -37,7 +38,7 @@ pub(in crate::diagnosis) enum Family {
     PositionAndTime,
     /// Nothing up to some time, then the same.
     Step,
-    /// Smooth functions of a covariate of the model.
+    /// Functions of a covariate of the model.
     Covariate(usize),
 }
 
@@ -61,7 +62,15 @@ impl Family {
             Self::Reading => "smooth in reading".to_owned(),
             Self::PositionAndTime => "smooth in position and time".to_owned(),
             Self::Step => "step in time".to_owned(),
-            Self::Covariate(k) => format!("smooth in {}", grounds.covariates[k].0),
+            Self::Covariate(k) => {
+                let along = &grounds.covariates[k];
+                let course = match along.course {
+                    Course::Smooth => "smooth in",
+                    Course::Step => "step in",
+                    Course::Proportional => "proportional to",
+                };
+                format!("{course} {}", along.name)
+            }
         }
     }
 
@@ -172,18 +181,30 @@ fn of_no_effect(
 ) -> Vec<DVector<f64>> {
     let (position, time) = (&grounds.position, &grounds.time);
     let (along, meanwhile) = &grounds.both;
+    let mut steps = |ground: &Ground| {
+        if ground.range <= 0.0 {
+            return Vec::new();
+        }
+        let step = |random: &mut ChaCha8Rng| ground.step(context, random);
+        unlisted(context, name, (step, true), most, random)
+    };
     let ground = match family {
         Family::Effect(_) => return Vec::new(),
-        Family::Step if time.range > 0.0 => {
-            let step = |random: &mut ChaCha8Rng| time.step(context, random);
-            return unlisted(context, name, (step, true), most, random);
+        Family::Step => return steps(time),
+        Family::Covariate(k) if grounds.covariates[k].course == Course::Step => {
+            return steps(&grounds.covariates[k].ground);
+        }
+        Family::Covariate(k) if grounds.covariates[k].course == Course::Proportional => {
+            let ground = &grounds.covariates[k].ground;
+            let gap = |random: &mut ChaCha8Rng| ground.proportional(context, random);
+            return unlisted(context, name, (gap, true), most, random);
         }
         Family::PositionAndTime if meanwhile.may_be_smooth() => along,
-        Family::Step | Family::PositionAndTime => return Vec::new(),
+        Family::PositionAndTime => return Vec::new(),
         Family::Position => position,
         Family::Time => time,
         Family::Reading => &grounds.reading,
-        Family::Covariate(k) => &grounds.covariates[k].1,
+        Family::Covariate(k) => &grounds.covariates[k].ground,
     };
     if !ground.may_be_smooth() {
         return Vec::new();

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::diagnosis::attribution::confidence::{Answer, possible};
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
 use crate::diagnosis::attribution::doubt::FEW_DRAWS;
-use crate::diagnosis::attribution::outweighed::outweighed;
+use crate::diagnosis::attribution::outweighed::{holds, outweighed};
 use crate::diagnosis::detection::dictionary::Dictionary;
 use crate::diagnosis::detection::folding::Sums;
 use crate::diagnosis::detection::null::{BATCH, add_surprises, seen};
@@ -111,7 +111,7 @@ impl Name {
     }
 
     /// Whether refining leaves one of the group first, nothing stands out beside it, and no other
-    /// effect passes in its place. The others are searched only where one of the group passes.
+    /// effect passes in its place but one that holds it. The others are searched only where one of the group passes.
     fn is_found(&self, context: &Context<'_>, readings: &DVector<f64>) -> bool {
         let first = context.remainder(readings, &[]);
         // What one leaves, and its unknowns, where it passes.
@@ -149,7 +149,13 @@ impl Name {
                 None => {}
             }
         }
-        let stands = |other: &Cause| passed(other).is_some_and(|o| !outweighed(context, o, own));
+        let stands = |other: &Cause| {
+            passed(other).is_some_and(|(left, unknowns)| {
+                let alone = (std::slice::from_ref(other), unknowns, left);
+                !outweighed(context, (left, unknowns), own)
+                    && !holds(context, alone, (cause, own.0))
+            })
+        };
         !others.iter().any(stands)
     }
 }

@@ -1,7 +1,7 @@
 //! What a named effect is worth: `cargo run --release --example severity_campaign -- CASES SEED [MODEL…]
 //! [other-formulas] [agreement]`, of every model or those named, with this project's own shapes or, of three models, with
 //! those of other formulas. For each effect at four times the size that is seen with 80 %: how often it is named, and
-//! strong; with it withheld at 1.5 to 4 times: how often another is named, and strong, and how often that is one which
+//! strong, and whether these data could tell it from every other effect there; with it withheld at 1.5 to 4 times: how often another is named, and strong, and how often that is one which
 //! these data could have told from the withheld one at its size. Where asked, how often score stage and whole diagnosis
 //! agree on rivals.
 
@@ -184,12 +184,14 @@ fn outcome(maker: &Maker, effect: &str, smallest: f64, told: &Told, seed: u64) -
 fn table(maker: &Maker, cases: u64, first: u64) {
     println!("\n### {}\n", maker.model);
     println!(
-        "| effect | at four times: alone | in its group | of both strong | withheld: another named | strong \
-         | another that could be told from it | strong |"
+        "| effect | at four times: alone | in its group | of both strong | separable there | withheld: another named \
+         | strong | another that could be told from it | strong |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|");
     let told = told_by(&(maker.made)(&[], 1), maker.noise);
     let mut sums = [0; 7];
+    // Cases of what is separable, and the right and strong among them.
+    let mut separable = (0, 0);
     let mut said: BTreeMap<String, usize> = BTreeMap::new();
     for effect in maker.effects {
         let smallest = seen_from(maker, effect, &options(&[], 0));
@@ -205,19 +207,31 @@ fn table(maker: &Maker, cases: u64, first: u64) {
         for what in outcomes.into_iter().flat_map(|outcome| outcome.said) {
             *said.entry(what).or_default() += 1;
         }
-        println!(
-            "| {effect} | {} |",
-            counts.map(|n| n.to_string()).join(" | ")
-        );
+        let mut others = maker.effects.iter().filter(|other| *other != effect);
+        let apart = others.all(|other| told(effect, other, 4.0));
+        if apart {
+            separable.0 += cases;
+            separable.1 += counts[2];
+        }
+        let apart = if apart { "yes" } else { "no" };
+        println!("| {effect} | {} |", cells(counts, apart));
     }
     let all = cases * maker.effects.len() as u64;
+    let (of, strong) = separable;
     println!(
         "| of {all} | {} |\n",
-        sums.map(|n| n.to_string()).join(" | ")
+        cells(sums, &format!("{strong} of {of}"))
     );
     for (what, count) in said {
         println!("{count} {what}");
     }
+}
+
+/// The cells of a row, the separable after what was named.
+fn cells(counts: [usize; 7], separable: &str) -> String {
+    let counts = counts.map(|n| n.to_string());
+    let (known, hidden) = counts.split_at(3);
+    [&known.join(" | "), separable, &hidden.join(" | ")].join(" | ")
 }
 
 /// Score stage and whole diagnoses, on rivals of names near the limit of detection and well above.

@@ -78,26 +78,22 @@ fn is_first(context: &Context<'_>, name: &Name, rivals: &Drawn, rival: usize) ->
         let passes = context.adequate(alone, &left);
         passes.then(|| (left.square, cause.unknowns()))
     };
-    let of_group = |cause: &Cause| name.members.contains(&cause.effect);
-    let others: Vec<(&Cause, (f64, usize))> = refined
+    let (group, others): (Vec<_>, Vec<_>) = refined
         .iter()
-        .filter(|(cause, _)| !of_group(cause))
-        .filter_map(|(cause, _)| Some((cause, passed(cause)?)))
-        .collect();
-    let best = refined.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    let Some((cause, own)) = best
-        .filter(|(cause, _)| of_group(cause))
-        .and_then(|(cause, _)| Some((cause, passed(cause)?)))
+        .partition(|(cause, _)| name.members.contains(&cause.effect));
+    let best = group.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    let Some((cause, most, own)) =
+        best.and_then(|(cause, most)| Some((cause, *most, passed(cause)?)))
     else {
         return false;
     };
-    others.iter().all(|(other, (left, unknowns))| {
-        outweighed(context, (*left, *unknowns), own)
-            || holds(
-                context,
-                (std::slice::from_ref(*other), *unknowns, *left),
-                (cause, own.0),
-            )
+    others.into_iter().all(|(other, t)| {
+        let leads = *t > most;
+        passed(other).map_or(!leads, |(left, unknowns)| {
+            let alone = (std::slice::from_ref(other), unknowns, left);
+            holds(context, alone, (cause, own.0))
+                || (!leads && outweighed(context, (left, unknowns), own))
+        })
     })
 }
 

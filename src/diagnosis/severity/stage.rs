@@ -110,8 +110,8 @@ impl Name {
             .collect()
     }
 
-    /// Whether refining leaves one of the group first, nothing stands out beside it, and no other
-    /// effect passes in its place but one that holds it. The others are searched only where one of the group passes.
+    /// Whether refining leaves one of the group first, nothing stands out beside it, and no other effect passes in its
+    /// place: all but what holds it and explains no more than chance. The others are searched only where one of the group passes.
     fn is_found(&self, context: &Context<'_>, readings: &DVector<f64>) -> bool {
         let first = context.remainder(readings, &[]);
         // What one leaves, and its unknowns, where it passes.
@@ -140,20 +140,24 @@ impl Name {
         let Some(own) = passed(cause).filter(|_| is_tried(*effect)) else {
             return false;
         };
-        let ranked = ranked(context, &first);
         let mut others = Vec::new();
-        for effect in ranked.into_iter().filter(|k| !self.members.contains(k)) {
-            match refined(effect) {
-                Some((_, t)) if t > *most => return false,
-                Some((cause, _)) => others.push(cause),
-                None => {}
+        for effect in ranked(context, &first) {
+            if self.members.contains(&effect) {
+                continue;
+            }
+            if let Some((other, t)) = refined(effect) {
+                let leads = t > *most;
+                if leads && other.unknowns() <= cause.unknowns() {
+                    return false;
+                }
+                others.push((other, leads));
             }
         }
-        let stands = |other: &Cause| {
-            passed(other).is_some_and(|(left, unknowns)| {
+        let stands = |(other, leads): &(Cause, bool)| {
+            passed(other).map_or(*leads, |(left, unknowns)| {
                 let alone = (std::slice::from_ref(other), unknowns, left);
-                !outweighed(context, (left, unknowns), own)
-                    && !holds(context, alone, (cause, own.0))
+                !holds(context, alone, (cause, own.0))
+                    && (*leads || !outweighed(context, (left, unknowns), own))
             })
         };
         !others.iter().any(stands)

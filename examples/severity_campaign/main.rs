@@ -139,7 +139,7 @@ fn outcome(maker: &Maker, effect: &str, smallest: f64, told: &Told, seed: u64) -
     // Draws of their own: the same in all cases would make one law, in error by the same, of all.
     let own = |without: &[&str]| Options {
         seed,
-        ..options(without, 256)
+        ..options(without, 1000)
     };
     let known = maker.diagnosed(&[(effect, 4.0 * smallest)], seed, &own(&[]));
     let hidden = maker.diagnosed(&[(effect, times * smallest)], seed, &own(&[effect]));

@@ -151,7 +151,7 @@ impl Args {
 
 /// Rivals of a family where the user states no number: 5 of them named alike are still below 5 %
 /// (Clopper and Pearson).
-pub(super) const RIVALS: usize = 256;
+pub(super) const RIVALS: usize = 1000;
 
 /// Most rivals of a family.
 const MOST_RIVALS: usize = 100_000;

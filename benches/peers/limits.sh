@@ -1,6 +1,6 @@
 #!/bin/sh
-# Every line of the table of limits (docs/validation/engine.md#all-lines-in-one-run), each beside its peer or the
-# earlier way, in one run. It takes about an hour on two cores; nothing else should run.
+# What the whole program costs, line by line (docs/validation/engine.md), beside its peers or the earlier way, in one
+# run. It takes about an hour on two cores; nothing else should run.
 #
 #   benches/peers/limits.sh [fit | reading | work | build] ...      default: all
 #

@@ -20,6 +20,8 @@ use crate::diagnosis::severity::stage::Name;
 const ROUNDS: usize = 6;
 /// Effects tried for each that is wanted: few of a family may be possible at the size of the gap.
 const TRIES: usize = 64;
+/// Cosine to the nearest shape of the dictionary from which on what is sharp may be one of the shapes between.
+const UNLIKE: f64 = 0.5;
 
 /// A family of rivals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -237,9 +239,10 @@ fn unlisted(
         let usable = (0..BATCH)
             .filter(|k| sizes[*k] * sizes[*k] > INVISIBLE * whole[*k] * whole[*k])
             .filter(|k| alike[*k] < SAME)
-            .map(|k| raw.column(k) * (name.size / sizes[k]))
+            .map(|k| (alike[k], raw.column(k) * (name.size / sizes[k])))
             // Shapes of the dictionary lie too far apart for what is sharp.
-            .filter(|gap| !sharp || searched(context, name, gap) < SAME);
+            .filter(|(alike, gap)| !sharp || *alike < UNLIKE || searched(context, name, gap) < SAME)
+            .map(|(_, gap)| gap);
         gaps.extend(usable.take(most - gaps.len()));
         if gaps.len() >= most {
             break;

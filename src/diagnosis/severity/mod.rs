@@ -26,6 +26,8 @@ use crate::diagnosis::severity::rivals::{Drawn, Family};
 use crate::diagnosis::severity::stage::Name;
 use crate::number::{percent, plain};
 
+/// One in so many of the rivals asked for must be drawn: of a family that can hardly make any none are counted.
+const FEWEST: usize = 4;
 /// Rivals that a line tells.
 const TOLD: usize = 3;
 
@@ -198,8 +200,10 @@ fn drawn(
     options: &Options,
 ) -> Count {
     let mut count = Count::default();
+    let mut asked = 0;
     for batch in 0..options.severity.div_ceil(BATCH) {
         let most = BATCH.min(options.severity - count.drawn);
+        asked += most;
         let rivals = Drawn::of(context, name, family, (options.seed, batch), most);
         if rivals.count == 0 {
             break;
@@ -211,7 +215,7 @@ fn drawn(
             return count;
         }
     }
-    let told = count.drawn >= BATCH.min(options.severity);
+    let told = count.drawn >= BATCH.min(options.severity) && FEWEST * count.drawn >= asked;
     if told { count } else { Count::default() }
 }
 

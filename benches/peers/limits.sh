@@ -1,6 +1,6 @@
 #!/bin/sh
 # What the whole program costs, line by line (docs/validation/engine.md), beside its peers or the earlier way, in one
-# run. It takes about an hour on two cores; nothing else should run.
+# run. Nothing else should run.
 #
 #   benches/peers/limits.sh [fit | reading | work | build] ...      default: all
 #

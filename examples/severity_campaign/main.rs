@@ -1,9 +1,9 @@
 //! What a named effect is worth: `cargo run --release --example severity_campaign -- CASES SEED [MODEL…]
 //! [other-formulas] [agreement]`, of every model or those named, with this project's own shapes or, of three models, with
 //! those of other formulas. For each effect at four times the size that is seen with 80 %: how often it is named, and
-//! strong, and whether these data could tell it from every other effect there; with it withheld at 1.5 to 4 times: how often another is named, and strong, and how often that is one which
-//! these data could have told from the withheld one at its size. Where asked, how often score stage and whole diagnosis
-//! agree on rivals.
+//! strong, and whether these data could tell it there from every other effect that they show; with it withheld at 1.5 to
+//! 4 times: how often another is named, and strong, and how often that is one which these data could have told from the
+//! withheld one at its size. Where asked, how often score stage and whole diagnosis agree on rivals.
 
 mod makers;
 #[path = "../../tests/other_models/mod.rs"]

@@ -328,6 +328,11 @@ fn a_plan_names_only_sizes_and_rivals_that_are_plausible() {
     let gain = repeats["gain"].as_f64().unwrap();
     assert!((gain / 2f64.sqrt() - 1.0).abs() < 0.15, "{gain}");
     let text = run(&folder, &["plan", "p.toml"]).stdout;
+    // Wide chips pass for form, narrow ones do not: their sizes differ.
+    assert!(
+        text.contains("local-contamination: in some shapes from "),
+        "{text}"
+    );
     assert!(!text.contains(" um") && !text.contains("urad"), "{text}");
 }
 

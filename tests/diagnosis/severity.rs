@@ -159,7 +159,7 @@ fn a_drift_that_is_a_jump_is_weak_and_a_jump_is_strong() {
 }
 
 /// An effect that the catalogue lacks is taken for one of like shape, and the name is weak by what the model says errors may
-/// be functions of: at twice the size that is seen all four were named strong without such rivals.
+/// be functions of, at twice the size that is seen.
 #[test]
 fn a_name_for_what_the_catalogue_lacks_is_weak_by_what_the_model_knows() {
     let cases = [

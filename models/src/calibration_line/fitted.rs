@@ -256,7 +256,7 @@ impl FittedModel for CalibrationLine {
         let traces = self.record.traces.iter().enumerate();
         let sets = traces.flat_map(|(set, trace)| trace.clone().map(move |_| set));
         let by_set = Covariate {
-            name: "the load or the same, another in every set".to_owned(),
+            name: "the load with an offset, another in every set".to_owned(),
             course: Course::Proportional,
             factors: vec![ones, loads],
             groups: Some(sets.collect()),

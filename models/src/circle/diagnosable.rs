@@ -312,37 +312,38 @@ impl FittedModel for CirclePoints {
     /// Errors of the axes, as the radius shows them: along either, functions of the place along one of them, or another in each
     /// sense of travel; a centre that wanders or is another from some moment on.
     fn covariates(&self) -> Vec<Covariate> {
-        let of = |part: fn(f64, f64) -> f64| -> Vec<f64> {
-            let places = self.places().iter();
-            places.map(|p| part(Self::angle(p), p.direction)).collect()
-        };
-        let along = [of(|angle, _| angle.cos()), of(|angle, _| angle.sin())];
-        let reversing = [
-            of(|angle, turn| angle.cos() * (-turn * angle.sin()).signum()),
-            of(|angle, turn| angle.sin() * (turn * angle.cos()).signum()),
-        ];
-        let smooth = |name: &str, values: &[f64]| Covariate {
+        let places = self.places();
+        let part = |of: fn(f64) -> f64| places.iter().map(|p| of(Self::angle(p))).collect();
+        let along: [Vec<f64>; 2] = [part(f64::cos), part(f64::sin)];
+        let smooth = |name: &str, values: Vec<f64>| Covariate {
             factors: along.to_vec(),
-            ..Covariate::smooth(name, values.to_vec())
+            ..Covariate::smooth(name, values)
         };
-        let times: Vec<f64> = self.places().iter().map(|p| p.time).collect();
-        let wandering = smooth("time, of the centre", &times);
+        let wandering = smooth(
+            "time, of the centre",
+            places.iter().map(|p| p.time).collect(),
+        );
         let jumping = Covariate {
             course: Course::Step,
             ..wandering.clone()
         };
-        let lost_motion = |axis: &str, factor: Vec<f64>| Covariate {
-            name: format!("the sense of travel of {axis}"),
+        let lost_motion = |axis: usize, letter: &str| Covariate {
+            name: format!("the sense of travel of {letter}"),
             course: Course::Proportional,
-            factors: vec![factor],
+            factors: vec![
+                effects::lost_motion(self, axis)
+                    .dense(places.len())
+                    .as_slice()
+                    .to_vec(),
+            ],
             ..wandering.clone()
         };
-        let [x, y] = reversing;
+        let [x, y] = along.clone();
         vec![
-            smooth("X, along either axis", &along[0]),
-            smooth("Y, along either axis", &along[1]),
-            lost_motion("X", x),
-            lost_motion("Y", y),
+            smooth("X, along either axis", x),
+            smooth("Y, along either axis", y),
+            lost_motion(0, "X"),
+            lost_motion(1, "Y"),
             wandering,
             jumping,
         ]

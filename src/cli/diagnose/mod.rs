@@ -149,7 +149,7 @@ impl Args {
     }
 }
 
-/// Rivals of a family where the user states no number: 5 of them named alike are still below 5 %
+/// Rivals of a family where the user states no number: 38 of them named alike are still below 5 %
 /// (Clopper and Pearson).
 pub(super) const RIVALS: usize = 1000;
 

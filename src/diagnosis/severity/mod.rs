@@ -26,7 +26,8 @@ use crate::diagnosis::severity::rivals::{Drawn, Family};
 use crate::diagnosis::severity::stage::Name;
 use crate::number::{percent, plain};
 
-/// One in so many of the rivals asked for must be drawn: of a family that can hardly make any none are counted.
+/// One in so many of the rivals asked for must be drawn: a family that is mostly the name's own shape, or nothing of the
+/// size of the gap, is no rival of it.
 const FEWEST: usize = 4;
 /// Rivals that a line tells.
 const TOLD: usize = 3;
@@ -205,8 +206,8 @@ fn drawn(
         let most = BATCH.min(options.severity - count.drawn);
         asked += most;
         let rivals = Drawn::of(context, name, family, (options.seed, batch), most);
-        if rivals.count == 0 {
-            break;
+        if FEWEST * (count.drawn + rivals.count) < asked {
+            return Count::default();
         }
         let alike = name.given(context, &rivals);
         count.drawn += rivals.count;
@@ -215,7 +216,7 @@ fn drawn(
             return count;
         }
     }
-    let told = count.drawn >= BATCH.min(options.severity) && FEWEST * count.drawn >= asked;
+    let told = count.drawn >= BATCH.min(options.severity);
     if told { count } else { Count::default() }
 }
 

@@ -47,18 +47,23 @@ impl Effect<CirclePoints> for AxisBacklash {
     }
 
     fn columns(&self, model: &CirclePoints, shape: &Shape) -> Vec<Column> {
-        let earlier = model.spacing_of_a_pass() / 4.0;
-        let earlier = earlier.min(JUST_BEFORE_DEG).to_radians();
-        vec![Column::from_places(model.places(), |_, place| {
-            let angle = CirclePoints::angle(place);
-            let (sin, cos) = (angle - place.direction * earlier).sin_cos();
-            let (along, speed) = match shape.variant {
-                X => (angle.cos(), -sin),
-                _ => (angle.sin(), cos),
-            };
-            -0.5 * along * (place.direction * speed).signum()
-        })]
+        vec![lost_motion(model, shape.variant)]
     }
+}
+
+/// Half of a lost motion of one against the travel of an axis, as the radius shows it.
+pub(in crate::circle) fn lost_motion(model: &CirclePoints, axis: usize) -> Column {
+    let earlier = model.spacing_of_a_pass() / 4.0;
+    let earlier = earlier.min(JUST_BEFORE_DEG).to_radians();
+    Column::from_places(model.places(), |_, place| {
+        let angle = CirclePoints::angle(place);
+        let (sin, cos) = (angle - place.direction * earlier).sin_cos();
+        let (along, speed) = match axis {
+            X => (angle.cos(), -sin),
+            _ => (angle.sin(), cos),
+        };
+        -0.5 * along * (place.direction * speed).signum()
+    })
 }
 
 #[cfg(test)]

@@ -18,6 +18,8 @@ use nalgebra::DMatrix;
 use super::diagnosable::CirclePoints;
 use crate::model::{Column, Effect, Estimate, FittedModel, Parameter};
 
+pub(super) use axis_backlash::lost_motion;
+
 /// The catalogue.
 pub(super) fn all() -> Vec<Box<dyn Effect<CirclePoints>>> {
     vec![

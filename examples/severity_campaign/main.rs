@@ -151,13 +151,15 @@ fn outcome(maker: &Maker, effect: &str, smallest: f64, told: &Told, seed: u64) -
     let separable = causes.any(|group| group.iter().all(|other| told(effect, other, times)));
     let mut said = Vec::new();
     for severity in known.verdict.severity.iter().filter(|_| right) {
-        if severity.confidence == Confidence::Weak {
+        if severity.has_rivals() {
             let worst = &severity.rivals[0];
             let rival = format!("{} {:.3}", worst.name, worst.probability);
             said.push(format!(
                 "{effect} weak by {rival}, lower {:.3}",
                 severity.lower
             ));
+        } else if severity.leaves_something() {
+            said.push(format!("{effect} weak by what is left"));
         }
     }
     if wrong {

@@ -160,6 +160,9 @@ pub(in crate::diagnosis) const MOSTLY: f64 = 0.8;
 pub(in crate::diagnosis) const STRONG: f64 = 0.95;
 /// See [`STRONG`].
 pub(in crate::diagnosis) const SURE: f64 = 0.95;
+/// *Quantile.* A name is strong where what the causes leave would stand out as much in more than this part of noise
+/// alone. ([`ADEQUATE`] asks what may be excused, this what nothing need be said about.)
+pub(in crate::diagnosis) const SUSPECT: f64 = 0.05;
 /// *Reckoned.* What is smooth, and nearer to an effect than this cosine, is that effect to whoever acts on
 /// the name.
 pub(in crate::diagnosis) const SAME: f64 = 0.9;

@@ -213,3 +213,45 @@ fn a_name_for_what_the_catalogue_lacks_is_weak_by_what_the_model_knows() {
         );
     }
 }
+
+/// Beside a drift far above the noise a bend that nobody listed leaves something, less than makes the drift inadequate:
+/// no rival is named alike, and the name is weak by what it leaves. Without the bend it is strong.
+#[test]
+fn a_name_that_leaves_something_is_weak() {
+    let line = calibration_line();
+    let bends = [
+        "quadratic",
+        "cubic",
+        "logarithmic",
+        "square-root",
+        "saturation",
+    ];
+    let lacking = Options {
+        without: bends.map(str::to_owned).to_vec(),
+        ..options(256)
+    };
+    let smallest = |effect: &str| seen_from(line, effect, &options(0));
+    let (drift, bend) = (6.0 * smallest("drift"), smallest("quadratic"));
+    let with = |times: f64| {
+        let put = [("drift", drift), ("quadratic", times * bend)];
+        line.diagnosed(&put, 7, &lacking)
+    };
+    let clean = with(0.0);
+    assert_eq!(clean.verdict.causes(), [["drift"]]);
+    assert!(!only(&clean).leaves_something());
+    assert_eq!(only(&clean).confidence, Confidence::Strong);
+
+    let mut bent = (1..30).map(|k| with(0.1 * f64::from(k)));
+    let left = bent.find(|diagnosis| {
+        diagnosis.verdict.causes() == [["drift"]] && only(diagnosis).leaves_something()
+    });
+    let diagnosis = left.expect("between nothing and what is unknown something is left");
+    let severity = only(&diagnosis);
+    assert!(!severity.has_rivals(), "{severity:?}");
+    assert_eq!(severity.confidence, Confidence::Weak);
+    let said = &diagnosis.verdict.statement;
+    assert!(
+        said.contains("weak: noise alone would leave as much beside this name in only "),
+        "{said}"
+    );
+}

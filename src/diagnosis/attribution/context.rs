@@ -14,7 +14,7 @@ use crate::diagnosis::detection::dictionary::{
 use crate::diagnosis::detection::folding::Sums;
 use crate::diagnosis::detection::null::NullLaw;
 use crate::diagnosis::detection::space::{Space, inner_products, orthonormal};
-use crate::diagnosis::levels::{ADEQUATE, FAR, SEPARABLE, SLACK};
+use crate::diagnosis::levels::{ADEQUATE, FAR, SEPARABLE, SLACK, SUSPECT};
 use crate::diagnosis::noise::law::NoiseLaw;
 
 /// Vectors that signatures are multiplied with at once.
@@ -147,6 +147,17 @@ impl<'a> Context<'a> {
         if causes.is_empty() || self.adequate(causes, &plain) {
             return plain;
         }
+        self.doubted(readings, causes, plain, draws)
+    }
+
+    /// What remains beside causes, with the doubt about the state where that can excuse it.
+    fn doubted(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+        plain: Remainder,
+        draws: usize,
+    ) -> Remainder {
         let basis = span(causes, self.space.readings());
         let freedom = self.space.degrees_of_freedom() as f64;
         let most = freedom + FAR * (2.0 * freedom).sqrt();
@@ -166,9 +177,19 @@ impl<'a> Context<'a> {
 
     /// Probability that as much would stand out with nothing there: in any effect, at any place or
     /// in the misfit as a whole.
-    pub fn detection(&self, first: &Remainder) -> f64 {
-        self.null
-            .detection(&self.surprises(first), first.residual.norm_squared())
+    pub fn detection(&self, left: &Remainder) -> f64 {
+        self.null.detection(&self.surprises(left), left.square)
+    }
+
+    /// Probability that as much as causes leave would stand out with nothing else there, with the doubt about the
+    /// state where that can make the difference.
+    pub fn chance_beside(&self, readings: &DVector<f64>, causes: &[Cause]) -> f64 {
+        let plain = self.remainder(readings, causes);
+        let chance = self.detection(&plain);
+        if chance > SUSPECT {
+            return chance;
+        }
+        self.detection(&self.doubted(readings, causes, plain, DRAWS))
     }
 
     /// Probability that any family would stand out as much with nothing else there.

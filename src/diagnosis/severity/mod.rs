@@ -4,6 +4,9 @@
 //! Rivals of the visible size of the gap found are drawn from families (`rivals.rs`), each with a draw of
 //! the noise, and named as the diagnosis names (`stage.rs`). One minus the greatest of the
 //! probabilities, over the families, of coming to the same name is the severity.
+//!
+//! Rivals are drawn of what is listed or smooth. A cause that nobody listed, and that is nearly the one named, is none of
+//! them, but is mostly not quite that one either: a name is strong only where what it leaves is such as noise leaves.
 
 pub(super) mod grounds;
 #[cfg(test)]
@@ -19,7 +22,7 @@ use statrs::distribution::{Beta, ContinuousCDF};
 use crate::diagnosis::attribution::confidence::Answer;
 use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::detection::null::BATCH;
-use crate::diagnosis::levels::{STRONG, SURE};
+use crate::diagnosis::levels::{STRONG, SURE, SUSPECT};
 use crate::diagnosis::options::Options;
 use crate::diagnosis::severity::grounds::Grounds;
 use crate::diagnosis::severity::rivals::{Drawn, Family};
@@ -36,7 +39,7 @@ const TOLD: usize = 3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Confidence {
-    /// The lower limit of the severity is 0.95 or more.
+    /// The lower limit of the severity is 0.95 or more, and what the causes leave is such as noise leaves.
     Strong,
     /// It is not.
     Weak,
@@ -51,7 +54,9 @@ pub struct Severity {
     pub value: f64,
     /// Its one-sided 95 % lower limit (Clopper and Pearson, of the least known family).
     pub lower: f64,
-    /// Whether the lower limit reaches 0.95.
+    /// Probability that as much as the causes leave, all of them together, would stand out with nothing else there.
+    pub left: f64,
+    /// Strong where the lower limit reaches 0.95 and `left` is above 0.05.
     pub confidence: Confidence,
     /// The families of rivals, the greatest probability first.
     pub rivals: Vec<Rival>,
@@ -81,6 +86,18 @@ impl Rival {
 }
 
 impl Severity {
+    /// Whether rivals alone make the name weak.
+    #[must_use]
+    pub fn has_rivals(&self) -> bool {
+        self.lower < STRONG
+    }
+
+    /// Whether what the causes leave stands out.
+    #[must_use]
+    pub fn leaves_something(&self) -> bool {
+        self.left <= SUSPECT
+    }
+
     /// The severity in a line.
     #[must_use]
     pub fn in_words(&self) -> String {
@@ -97,8 +114,12 @@ impl Severity {
             format!("would have looked the same: {}", worst.join(", "))
         };
         let word = match self.confidence {
-            Confidence::Strong => "strong",
-            Confidence::Weak => "weak",
+            Confidence::Strong => "strong".to_owned(),
+            Confidence::Weak if self.leaves_something() => format!(
+                "weak, as noise alone would leave as much beside it in only {} of cases",
+                percent(self.left)
+            ),
+            Confidence::Weak => "weak".to_owned(),
         };
         format!(
             "Severity of {}: {} (at least {}), {word}; {alike}",
@@ -153,13 +174,20 @@ pub(in crate::diagnosis) fn severities(
     options: &Options,
 ) -> Vec<Severity> {
     let grounds = Grounds::of(context);
+    let left = context.chance_beside(readings, &answer.causes);
     Name::all(context, readings, answer, options.false_alarm)
         .iter()
-        .map(|name| severity(context, &grounds, name, options))
+        .map(|name| severity(context, (&grounds, left), name, options))
         .collect()
 }
 
-fn severity(context: &Context<'_>, grounds: &Grounds, name: &Name, options: &Options) -> Severity {
+/// The severity of one name, beside what all causes leave.
+fn severity(
+    context: &Context<'_>,
+    (grounds, left): (&Grounds, f64),
+    name: &Name,
+    options: &Options,
+) -> Severity {
     let families = Family::beside(context, grounds, &name.members);
     let mut counts: Vec<(Family, Count)> = families
         .into_par_iter()
@@ -177,7 +205,8 @@ fn severity(context: &Context<'_>, grounds: &Grounds, name: &Name, options: &Opt
         effect: name.effect.clone(),
         value: 1.0 - most,
         lower,
-        confidence: if lower >= STRONG {
+        left,
+        confidence: if lower >= STRONG && left > SUSPECT {
             Confidence::Strong
         } else {
             Confidence::Weak

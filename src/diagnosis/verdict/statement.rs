@@ -172,14 +172,26 @@ fn weakness(verdict: &Verdict) -> String {
                 (true, false) => "one of these names".to_owned(),
                 (false, _) => format!("the name {}", severity.effect),
             };
-            match severity.rivals.first() {
-                Some(worst) if worst.probability > 0.0 => format!(
-                    "{} of this size would be given {name} in {} of cases",
-                    worst.in_words(),
-                    percent(worst.probability)
-                ),
-                _ => format!("too few rivals were drawn to say what else would be given {name}"),
+            let mut reasons = Vec::new();
+            if severity.has_rivals() {
+                reasons.push(match severity.rivals.first() {
+                    Some(worst) if worst.probability > 0.0 => format!(
+                        "{} of this size would be given {name} in {} of cases",
+                        worst.in_words(),
+                        percent(worst.probability)
+                    ),
+                    _ => {
+                        format!("too few rivals were drawn to say what else would be given {name}")
+                    }
+                });
             }
+            if severity.leaves_something() {
+                reasons.push(format!(
+                    "noise alone would leave as much beside {name} in only {} of cases",
+                    percent(severity.left)
+                ));
+            }
+            reasons.join(", and ")
         })
         .collect();
     if each.is_empty() {

@@ -283,8 +283,8 @@ fn told(
             return Err(NotJoined::Mixed(name(k)));
         }
     }
-    let sizes = Sizes::fitted_with_state(context, readings, causes)
-        .ok_or_else(|| NotJoined::Undetermined(name(0)))?;
+    let sizes =
+        Sizes::told(context, readings, causes).ok_or_else(|| NotJoined::Undetermined(name(0)))?;
     let allowed = allowed_fits(context, readings, causes, &sizes);
     let change = context.change(causes, &sizes.amplitudes);
     let mut effects = Vec::with_capacity(causes.len());

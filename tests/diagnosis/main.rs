@@ -17,6 +17,7 @@ mod plates;
 mod positions;
 #[path = "../realisations/mod.rs"]
 mod realisations;
+mod rough_forms;
 #[path = "../scene/mod.rs"]
 mod scene;
 #[path = "../sealed_machine/mod.rs"]

@@ -142,7 +142,7 @@ pub(in crate::diagnosis) fn widened(
     others: &[Allowed],
 ) -> Vec<Estimate> {
     for other in others.iter().filter(|o| o.which == which && !o.variant) {
-        let Some(sizes) = Sizes::fitted_with_state(context, readings, &other.causes) else {
+        let Some(sizes) = Sizes::told(context, readings, &other.causes) else {
             continue;
         };
         let theirs = sizes.of(context, &other.causes, which);

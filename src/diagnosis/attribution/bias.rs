@@ -163,7 +163,7 @@ impl Taken {
         if causes.is_empty() {
             return None;
         }
-        let sizes = Sizes::fitted_with_state(context, readings, causes)?;
+        let sizes = Sizes::told(context, readings, causes)?;
         let signatures = signatures(context, readings, causes, &sizes.amplitudes);
         let derivative = |unknown: &Unknown| match *unknown {
             Unknown::Amplitude(which, k) => signatures

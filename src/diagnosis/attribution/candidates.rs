@@ -22,7 +22,7 @@ pub(in crate::diagnosis) fn candidates(
     causes: &[Cause],
 ) -> Vec<Candidate> {
     let readings_count = context.space.readings() as f64;
-    let fitted = Sizes::fitted_with_state(context, readings, causes);
+    let fitted = Sizes::told(context, readings, causes);
     let mut list: Vec<(f64, Candidate)> = Vec::new();
     for (effect, description) in context.catalogue.iter().enumerate() {
         let Some(family) = context.family_of(effect) else {
@@ -108,7 +108,7 @@ pub(in crate::diagnosis) fn elsewhere(
     let alike = variants_alike(context, readings, causes, which).into_iter();
     alike
         .filter_map(|(variant, trial)| {
-            let sizes = Sizes::fitted_with_state(context, readings, &trial)?;
+            let sizes = Sizes::told(context, readings, &trial)?;
             let own = sizes.of(context, &trial, which);
             Some(Elsewhere {
                 variant,

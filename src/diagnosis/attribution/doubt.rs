@@ -238,20 +238,34 @@ impl Context<'_> {
     /// What the model leaves open beside causes, because they show its state where it is not known: whitened,
     /// projected changes of one standard deviation each.
     pub fn open(&self, readings: &DVector<f64>, causes: &[Cause]) -> DMatrix<f64> {
-        let nothing = DMatrix::zeros(readings.len(), 0);
+        let each = self.open_of_each(readings, causes);
+        let widths = each.iter().map(DMatrix::ncols);
+        let mut open = DMatrix::zeros(readings.len(), widths.sum());
+        let mut at = 0;
+        for own in each {
+            open.columns_mut(at, own.ncols()).copy_from(&own);
+            at += own.ncols();
+        }
+        open
+    }
+
+    /// The same for each of the causes.
+    pub fn open_of_each(&self, readings: &DVector<f64>, causes: &[Cause]) -> Vec<DMatrix<f64>> {
         let Some(changes) = self.changes(readings, causes) else {
-            return nothing;
+            return vec![DMatrix::zeros(readings.len(), 0); causes.len()];
         };
         let state = self
             .model
             .refit_as_smooth(self.without(readings, causes, &changes));
-        let of = |cause: &Cause| self.catalogue[cause.effect].open(&state, &cause.shape);
-        let columns: Vec<Column> = causes.iter().flat_map(of).collect();
-        if columns.is_empty() {
-            nothing
-        } else {
-            self.space.forward_columns(&columns).0
-        }
+        let of = |cause: &Cause| {
+            let columns = self.catalogue[cause.effect].open(&state, &cause.shape);
+            if columns.is_empty() {
+                DMatrix::zeros(readings.len(), 0)
+            } else {
+                self.space.forward_columns(&columns).0
+            }
+        };
+        causes.iter().map(of).collect()
     }
 
     /// The doubt about causes beside what the model and they themselves absorb (`basis`), with what the model

@@ -5,6 +5,11 @@
 //! derivative of Σ aE(a), noise ν of the readings moves them by G ν, G = (SᵀD)⁻¹Sᵀ; D = S where a
 //! signature depends on nothing. Noise also moves the state at which signatures are taken: that is
 //! drawn. What the state leaves open, W of one standard deviation each, adds G W (G W)ᵀ.
+//!
+//! What the state interpolates falsely makes sizes small, however many readings there are: errors of the square
+//! |W|² in a change of the square |aE|² leave of a size the part |aE|²/(|aE|² + |W|²) (attenuation; Fuller,
+//! Measurement Error Models (1987), section 1.1). How much of W is such is not known, as where a form keeps to what is
+//! interpolated there are none: anything from none to all is as probable (GUM 4.3.7), for all amplitudes of a cause alike.
 
 use std::sync::Arc;
 
@@ -116,6 +121,30 @@ impl Sizes {
             draws: Some(draws),
             ..plain
         })
+    }
+
+    /// The same with what falsely interpolated states may take away of the sizes: as they are told.
+    pub fn told(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) -> Option<Self> {
+        let mut sizes = Self::fitted_with_state(context, readings, causes)?;
+        for (which, open) in context.open_of_each(readings, causes).iter().enumerate() {
+            let first = first_amplitude(causes, which);
+            let count = causes[which].projected.ncols();
+            let own = sizes.amplitudes.rows(first, count);
+            let change = (&causes[which].projected * own).norm_squared();
+            let open = open.norm_squared();
+            if open <= 0.0 {
+                continue;
+            }
+            let taken = open / (change + open) / 3f64.sqrt();
+            let spread = |parameter: &Unknown| match *parameter {
+                Unknown::Amplitude(of, k) if of == which => taken * own[k],
+                _ => 0.0,
+            };
+            let spread =
+                DVector::from_iterator(sizes.parameters.len(), sizes.parameters.iter().map(spread));
+            sizes.covariance.ger(1.0, &spread, &spread, 1.0);
+        }
+        Some(sizes)
     }
 
     /// What is reported of one of the causes.

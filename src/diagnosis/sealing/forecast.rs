@@ -107,7 +107,7 @@ impl Known {
                 derivatives: DMatrix::zeros(n, 0),
             });
         }
-        let sizes = Sizes::fitted_with_state(context, readings, causes)?;
+        let sizes = Sizes::told(context, readings, causes)?;
         let rest = &sizes.covariance - &sizes.gain * sizes.gain.transpose();
         let mut eigen = SymmetricEigen::new(0.5 * (&rest + rest.transpose()));
         eigen.eigenvalues.apply(|v| *v = v.max(0.0).sqrt());
@@ -227,8 +227,7 @@ impl There {
             .collect();
         let (placed, _) = placed(ahead, &shapes, &self.amplitudes);
         let with = expected + &self.change;
-        let sizes =
-            Sizes::fitted_with_state(ahead, &with, &placed).ok_or(NotSealed::Undetermined)?;
+        let sizes = Sizes::told(ahead, &with, &placed).ok_or(NotSealed::Undetermined)?;
         // What another shape makes of the sizes that are found with the sealed one.
         let moved =
             &self.derivatives * DMatrix::from_diagonal(&DVector::from_vec(self.scales.clone()));

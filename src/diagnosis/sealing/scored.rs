@@ -158,7 +158,7 @@ fn effects(
     let found = (!causes.is_empty())
         .then(|| {
             let causes = fitted(context, readings, causes)?;
-            let sizes = Sizes::fitted_with_state(context, readings, &causes)?;
+            let sizes = Sizes::told(context, readings, &causes)?;
             Some((causes, sizes))
         })
         .flatten();

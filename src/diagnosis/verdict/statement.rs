@@ -152,8 +152,13 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
     } else {
         ""
     };
+    let remain = if gap.after.is_nothing() {
+        "remains"
+    } else {
+        "remain"
+    };
     format!(
-        "{beginning}; with {with} {} remain{more}. {doubt}",
+        "{beginning}; with {with} {} {remain}{more}. {doubt}",
         gap.after.in_words(gap.unit)
     )
 }

@@ -57,12 +57,20 @@ impl Size {
         self.ci95[0] > 0.0
     }
 
+    /// Whether its interval holds zero alone: there is less than even noise leaves.
+    #[must_use]
+    pub fn is_nothing(&self) -> bool {
+        self.ci95[1] <= 0.0
+    }
+
     /// The number, or the bound that takes its place where the noise leaves no more to be said.
     #[must_use]
     pub fn in_words(&self, unit: &str) -> String {
         let unit = for_people(unit);
         if self.rms > 0.0 {
             format!("{} {unit} RMS", plain(self.rms, DIGITS))
+        } else if self.is_nothing() {
+            "nothing beyond the noise".to_owned()
         } else {
             format!("less than {} {unit} RMS", plain(self.ci95[1], DIGITS))
         }

@@ -151,7 +151,7 @@ fn outcome(maker: &Maker, effect: &str, smallest: f64, told: &Told, seed: u64) -
     let separable = causes.any(|group| group.iter().all(|other| told(effect, other, times)));
     let mut said = Vec::new();
     for severity in known.verdict.severity.iter().filter(|_| right) {
-        if severity.has_rivals() {
+        if severity.is_weak_by_rivals() {
             let worst = &severity.rivals[0];
             let rival = format!("{} {:.3}", worst.name, worst.probability);
             said.push(format!(

@@ -247,7 +247,7 @@ fn a_name_that_leaves_something_is_weak() {
     });
     let diagnosis = left.expect("between nothing and what is unknown something is left");
     let severity = only(&diagnosis);
-    assert!(!severity.has_rivals(), "{severity:?}");
+    assert!(!severity.is_weak_by_rivals(), "{severity:?}");
     assert_eq!(severity.confidence, Confidence::Weak);
     let said = &diagnosis.verdict.statement;
     assert!(

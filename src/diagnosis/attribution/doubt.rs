@@ -238,7 +238,10 @@ impl Context<'_> {
     /// What the model leaves open beside causes, because they show its state where it is not known: whitened,
     /// projected changes of one standard deviation each.
     pub fn open(&self, readings: &DVector<f64>, causes: &[Cause]) -> DMatrix<f64> {
-        let each = self.open_of_each(readings, causes);
+        let mut each = self.open_of_each(readings, causes);
+        if causes.len() == 1 {
+            return each.remove(0);
+        }
         let widths = each.iter().map(DMatrix::ncols);
         let mut open = DMatrix::zeros(readings.len(), widths.sum());
         let mut at = 0;

@@ -86,9 +86,9 @@ impl Rival {
 }
 
 impl Severity {
-    /// Whether rivals alone make the name weak.
+    /// Whether the lower limit of the severity makes the name weak: by rivals, or as too few could be drawn.
     #[must_use]
-    pub fn has_rivals(&self) -> bool {
+    pub fn is_weak_by_rivals(&self) -> bool {
         self.lower < STRONG
     }
 

@@ -163,7 +163,7 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
     )
 }
 
-/// Of each weak name what else would be given it; nothing where all are strong.
+/// Of each weak name what else would be given it, or how rare it is that noise leaves as much; nothing where all are strong.
 fn weakness(verdict: &Verdict) -> String {
     let alone = verdict.effects.len() == 1;
     let weak = verdict
@@ -178,7 +178,7 @@ fn weakness(verdict: &Verdict) -> String {
                 (false, _) => format!("the name {}", severity.effect),
             };
             let mut reasons = Vec::new();
-            if severity.has_rivals() {
+            if severity.is_weak_by_rivals() {
                 reasons.push(match severity.rivals.first() {
                     Some(worst) if worst.probability > 0.0 => format!(
                         "{} of this size would be given {name} in {} of cases",

@@ -68,6 +68,7 @@ fn effects_as_machines_have_them_are_named() {
         ("thermal-drift", 4),
         ("cyclic-error", 5),
         ("stick-slip", 4),
+        ("sticking-plunger", 0),
         ("axis-backlash", 2),
         ("reversal-shift", 1),
     ];

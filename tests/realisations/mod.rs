@@ -24,6 +24,7 @@ pub const REALISATIONS: &[(&str, usize)] = &[
     ("lateral-backlash", 7),
     ("ambient-cycle", 4),
     ("stick-slip", 6),
+    ("sticking-plunger", 4),
     ("off-crest", 5),
     ("taper", 1),
     ("gain-mismatch", 2),
@@ -253,6 +254,45 @@ pub fn made(effect: &str, way: usize, size: f64, seed: u64) -> Option<Shown> {
                 let wound = (run / pitch + stands).rem_euclid(1.0);
                 let at = n.x - n.direction * 100.0 * size * wound;
                 w.seen(n, at, at)
+            })
+        }
+        // The plunger holds on until it is off by the size, and goes all the way: at a stop, or on the way to it.
+        ("sticking-plunger", _) => {
+            let near = uniform(0.0, 1.0) < 0.5;
+            let mut pointer = [f64::NAN; 2];
+            let mut before = [(0.0, 0.0); 2];
+            let mut holds: Vec<f64> = (0..4096).map(|_| uniform(0.85, 1.15)).collect();
+            Box::new(move |w, n| {
+                let seen = plain(w, n);
+                let k = n.indicator;
+                let hold = size
+                    * match way {
+                        2 if k == 1 => 0.6,
+                        0 | 1 | 3 if (k == 0) != near => 0.0,
+                        _ => 1.0,
+                    };
+                let (spindle, last) = before[k];
+                before[k] = (n.spindle, n.x);
+                if pointer[k].is_nan() || n.spindle != spindle {
+                    pointer[k] = seen - 0.7 * hold;
+                    return pointer[k];
+                }
+                let steps = if way == 0 { 1 } else { 40 };
+                for step in 1..=steps {
+                    let x = last + (n.x - last) * f64::from(step) / f64::from(steps);
+                    let seen = w.seen(n, x, x);
+                    // Friction differs from time to time.
+                    let part = if way == 3 {
+                        holds.last().copied()
+                    } else {
+                        None
+                    };
+                    if (seen - pointer[k]).abs() >= hold * part.unwrap_or(1.0) {
+                        pointer[k] = seen;
+                        holds.pop();
+                    }
+                }
+                pointer[k]
             })
         }
         // The stylus leaves the crest sideways as slide and bar are askew: what it loses is a circle's.

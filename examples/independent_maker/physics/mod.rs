@@ -120,7 +120,7 @@ const fn unseen(name: &'static str, recipe: fn(usize, &mut Chance, &Facts) -> Re
 }
 
 /// All error sources.
-pub const SOURCES: [Source; 19] = [
+pub const SOURCES: [Source; 20] = [
     source("taper", "geometry", 4, geometry::taper),
     Source {
         tilted: true,
@@ -132,7 +132,8 @@ pub const SOURCES: [Source; 19] = [
     source("indicator-nonlinearity", "sensor", 5, sensor::curved),
     source("cyclic-error", "sensor", 6, sensor::cyclic),
     source("hysteresis", "stylus", 4, stylus::play),
-    source("stick-slip", "stylus", 4, stylus::stick_slip),
+    source("sticking-plunger", "stylus", 4, stylus::sticking_plunger),
+    source("stick-slip", "stylus", 2, stylus::stick_slip),
     source("thermal-drift", "thermal", 6, thermal::drift),
     source("ambient-cycle", "thermal", 5, thermal::cycle),
     source("zero-jump", "zero", 4, zero::jump),

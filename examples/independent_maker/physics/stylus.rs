@@ -37,18 +37,30 @@ pub fn play(which: usize, chance: &mut Chance, _: &Facts) -> Recipe {
     }
 }
 
-/// Friction that holds and lets go.
+/// A plunger that sticks in its bushing.
+pub fn sticking_plunger(which: usize, _: &mut Chance, _: &Facts) -> Recipe {
+    let (what, parts) = [
+        ("near plunger sticks", [1.0, 0.0]),
+        ("both plungers stick alike", [1.0, 1.0]),
+        ("far plunger sticks", [0.0, 1.0]),
+        ("both plungers stick, by different amounts", [0.5, 1.0]),
+    ][which % 4];
+    let recipe = Recipe::new(what, [0.2, 20.0], move |hold| {
+        vec![sticking(parts.map(|part| part * hold))]
+    });
+    if which % 4 == 3 {
+        recipe
+    } else {
+        recipe.sized(1.0, "µm")
+    }
+}
+
+/// A slide that its drive holds and lets go.
 pub fn stick_slip(which: usize, chance: &mut Chance, facts: &Facts) -> Recipe {
     let lot = chance.lot();
     let stride = chance.between(0.04, 0.15) * facts.length;
-    match which % 4 {
-        0 => Recipe::new("near plunger sticks", [0.2, 20.0], |s| {
-            vec![sticking(s, [true, false])]
-        }),
-        1 => Recipe::new("both plungers stick", [0.2, 20.0], |s| {
-            vec![sticking(s, [true, true])]
-        }),
-        2 => Recipe::new("slide crabs while it sticks", [0.2, 50.0], move |s| {
+    match which % 2 {
+        0 => Recipe::new("slide crabs while it sticks", [0.2, 50.0], move |s| {
             vec![Disturbance::slide(move |m, x| {
                 m.direction * s * sawtooth(m, x, stride, lot)
             })]
@@ -66,13 +78,13 @@ fn sawtooth(moment: &Moment, x: f64, stride: f64, lot: u64) -> f64 {
     (moment.direction * x / stride + share(lot, moment.pass())).rem_euclid(1.0)
 }
 
-/// A plunger that stays until it is off by `hold`, then goes all the way.
-fn sticking(hold: f64, which: [bool; 2]) -> Disturbance {
+/// Plungers of the near and the far indicator that stay until they are off by a hold, then go all the way.
+fn sticking(holds: [f64; 2]) -> Disturbance {
     Disturbance::stylus(move |path, values| {
-        if !path.first().is_some_and(|m| which[m.indicator]) {
+        let Some(hold) = path.first().map(|m| holds[m.indicator]) else {
             return;
-        }
-        let Some(mut pointer) = values.first().copied() else {
+        };
+        let Some(mut pointer) = values.first().copied().filter(|_| hold > 0.0) else {
             return;
         };
         for value in values.iter_mut() {

@@ -347,6 +347,12 @@ impl<M: FittedModel + 'static> Effect<AnyModel> for AnyEffect<M> {
     fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
         self.0.settled(shape, amplitudes)
     }
+    fn traced(&self, model: &AnyModel, readings: &DVector<f64>, shape: &Shape) -> Option<Shape> {
+        self.0.traced(model.known(), readings, shape)
+    }
+    fn choices(&self, shape: &Shape) -> usize {
+        self.0.choices(shape)
+    }
     fn carried(
         &self,
         from: &AnyModel,
@@ -359,10 +365,11 @@ impl<M: FittedModel + 'static> Effect<AnyModel> for AnyEffect<M> {
     fn restored(
         &self,
         model: &AnyModel,
+        shape: &Shape,
         readings: &DVector<f64>,
         clean: &DVector<f64>,
     ) -> Option<DVector<f64>> {
-        self.0.restored(model.known(), readings, clean)
+        self.0.restored(model.known(), shape, readings, clean)
     }
     fn resolution(&self, model: &AnyModel, shape: &Shape) -> Vec<f64> {
         self.0.resolution(model.known(), shape)

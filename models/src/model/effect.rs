@@ -228,6 +228,17 @@ pub trait Effect<M>: Send + Sync {
         None
     }
 
+    /// The shape as the readings themselves tell it, from those without what other causes change in them, for an
+    /// effect that does at each reading what came before makes of it.
+    fn traced(&self, _model: &M, _readings: &DVector<f64>, _shape: &Shape) -> Option<Shape> {
+        None
+    }
+
+    /// How often the readings chose between two ways, as probable before, that the shape could take.
+    fn choices(&self, _shape: &Shape) -> usize {
+        0
+    }
+
     /// The same physical effect at another state of the model, where shape or amplitudes are told
     /// relative to the state.
     fn carried(&self, _from: &M, _to: &M, shape: &Shape, amplitudes: &[f64]) -> (Shape, Vec<f64>) {
@@ -240,6 +251,7 @@ pub trait Effect<M>: Send + Sync {
     fn restored(
         &self,
         _model: &M,
+        _shape: &Shape,
         _readings: &DVector<f64>,
         _clean: &DVector<f64>,
     ) -> Option<DVector<f64>> {

@@ -39,12 +39,14 @@ pub(in crate::diagnosis) struct Cause {
     pub shape: Shape,
     pub columns: Vec<Column>,
     pub projected: DMatrix<f64>,
+    /// Choices that the readings made for its shape.
+    pub choices: usize,
 }
 
 impl Cause {
-    /// Number of its amplitudes and free shape parameters.
+    /// Number of its amplitudes and free shape parameters, and of as many more as its choices are worth.
     pub fn unknowns(&self) -> usize {
-        self.projected.ncols() + self.shape.free()
+        unknowns(self.projected.shape(), &self.shape, self.choices)
     }
 }
 
@@ -123,6 +125,7 @@ impl<'a> Context<'a> {
         let columns = self.catalogue[effect].columns(state, &shape);
         Cause {
             effect,
+            choices: self.catalogue[effect].choices(&shape),
             shape,
             projected: self.space.forward_columns(&columns).0,
             columns,
@@ -334,6 +337,19 @@ impl<'a> Context<'a> {
         Some((&covariance * score, covariance))
     }
 
+    /// Amplitudes of causes fitted beside some directions.
+    pub fn amplitudes_beside(
+        &self,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+        directions: &DMatrix<f64>,
+    ) -> Option<DVector<f64>> {
+        let stacked = stack(causes, self.space.readings());
+        let beside = &stacked - directions * directions.tr_mul(&stacked);
+        let gram = beside.tr_mul(&beside).cholesky()?;
+        Some(gram.solve(&beside.tr_mul(&self.residual(readings))))
+    }
+
     /// The readings' change by causes at given amplitudes.
     pub fn change(&self, causes: &[Cause], amplitudes: &DVector<f64>) -> DVector<f64> {
         let mut change = DVector::zeros(self.space.readings());
@@ -376,6 +392,17 @@ impl<'a> Context<'a> {
                 .zip(&shape.values)
                 .all(|(p, v)| *v >= p.low && *v <= p.high)
     }
+}
+
+/// Unknowns of a shape with columns, readings × amplitudes. Of two ways as probable before the evidence takes
+/// ln 2 away, and half the logarithm of the number of readings for an unknown.
+pub(in crate::diagnosis) fn unknowns(
+    (readings, amplitudes): (usize, usize),
+    shape: &Shape,
+    choices: usize,
+) -> usize {
+    let each = 2.0 * std::f64::consts::LN_2 / (readings.max(2) as f64).ln();
+    amplitudes + shape.free() + (choices as f64 * each).ceil() as usize
 }
 
 /// The same shape with the steps of a finer search.

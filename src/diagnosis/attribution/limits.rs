@@ -23,6 +23,7 @@ pub(in crate::diagnosis) fn is_beyond_limit(
         shape: Shape::only(),
         projected: context.space.forward_columns(&columns).0,
         columns,
+        choices: 0,
     };
     let more = causes[k].unknowns().saturating_sub(limit.unknowns());
     let mut plain = causes.to_vec();

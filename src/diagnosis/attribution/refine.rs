@@ -5,8 +5,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::by_traces::ByTraces;
-use crate::diagnosis::attribution::context::{Cause, Context, as_matrix, column, span};
+use crate::diagnosis::attribution::context::{Cause, Context, as_matrix, column, span, unknowns};
 use crate::diagnosis::detection::dictionary::{inverse, is_positive, products, statistic};
+use crate::diagnosis::detection::space::orthonormal;
 use crate::diagnosis::levels::{ALIKE, UNSEARCHED};
 use crate::diagnosis::search::{around, coordinate_search};
 
@@ -30,8 +31,11 @@ impl Context<'_> {
         let (mut shape, mut t) = seen.searched(start);
         let log_readings = (self.space.readings() as f64).ln();
         let weighed = |shape: &Shape, t: f64| {
-            let columns = self.catalogue[effect].amplitudes_at(shape).len();
-            (t - (columns + shape.free()) as f64 * log_readings, columns)
+            let known = &self.catalogue[effect];
+            let columns = known.amplitudes_at(shape).len();
+            let size = (self.space.readings(), columns);
+            let unknowns = unknowns(size, shape, known.choices(shape));
+            (t - unknowns as f64 * log_readings, columns)
         };
         let relatives = self.catalogue[effect].relatives(state, &shape);
         let mut relatives: Vec<(f64, usize, Shape)> = relatives
@@ -130,6 +134,8 @@ pub(super) struct Seen<'s> {
     pub context: &'s Context<'s>,
     pub effect: &'s dyn Effect<AnyModel>,
     pub state: &'s AnyModel,
+    readings: &'s DVector<f64>,
+    beside: &'s [Cause],
     /// What a column is multiplied with to get its score.
     pub adjoint: DVector<f64>,
     /// The same of the other causes' directions.
@@ -140,9 +146,9 @@ impl<'s> Seen<'s> {
     pub fn of(
         context: &'s Context<'s>,
         state: &'s AnyModel,
-        readings: &DVector<f64>,
+        readings: &'s DVector<f64>,
         effect: usize,
-        beside: &[Cause],
+        beside: &'s [Cause],
     ) -> Self {
         let whole = context.residual(readings);
         let basis = span(beside, context.space.readings());
@@ -153,6 +159,8 @@ impl<'s> Seen<'s> {
             context,
             effect: context.catalogue[effect].as_ref(),
             state,
+            readings,
+            beside,
             adjoint,
             directions: directions.column_iter().map(|c| c.clone_owned()).collect(),
         }
@@ -220,8 +228,31 @@ impl<'s> Seen<'s> {
         }
     }
 
-    /// A shape with what its size makes of it.
+    /// A shape as the readings tell it, less what the other causes change in them when all are fitted together.
+    fn traced(&self, shape: &Shape) -> Option<Shape> {
+        // Most effects are not told so, which is known from the readings as they are.
+        let first = self.effect.traced(self.state, self.readings, shape)?;
+        if self.beside.is_empty() {
+            return Some(first);
+        }
+        let columns = self.effect.columns(self.state, shape);
+        let own = self.context.space.forward_columns(&columns).0;
+        let basis = orthonormal(
+            &own,
+            &own.column_iter().map(|c| c.norm()).collect::<Vec<_>>(),
+        );
+        let without = self
+            .context
+            .amplitudes_beside(self.readings, self.beside, &basis)?;
+        let left = self.readings - self.context.change(self.beside, &without);
+        self.effect.traced(self.state, &left, shape)
+    }
+
+    /// A shape with what readings and its size make of it.
     fn settled(&self, mut shape: Shape) -> (Shape, f64) {
+        if let Some(traced) = self.traced(&shape) {
+            shape = traced;
+        }
         let (mut t, mut gram, mut score) = self.value(&shape);
         for _ in 0..8 {
             // What the model absorbs of several columns together stays as small as may be.

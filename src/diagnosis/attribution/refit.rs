@@ -146,8 +146,8 @@ impl Context<'_> {
         let mut clean = readings - changes.column_sum();
         for (cause, change) in causes.iter().zip(changes.column_iter()) {
             let with = &clean + change;
-            if let Some(restored) = self.catalogue[cause.effect].restored(self.model, &with, &clean)
-            {
+            let effect = &self.catalogue[cause.effect];
+            if let Some(restored) = effect.restored(self.model, &cause.shape, &with, &clean) {
                 clean = restored;
             }
         }

@@ -321,6 +321,7 @@ impl<'a> Bench<'a> {
             shape: Shape::only(),
             columns: Vec::new(),
             projected: self.tangents(&fitted),
+            choices: 0,
         };
         let causes = [cause];
         let remainder = context.remainder(&left, &causes);

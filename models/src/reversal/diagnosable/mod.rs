@@ -290,6 +290,11 @@ impl Linearised {
         self.smooth[self.record.places[reading].cell] + added
     }
 
+    /// The smooth value of a reading of its cell, without what effects add to it before it is seen, µm.
+    pub(super) fn cell_reading(&self, reading: usize) -> f64 {
+        self.smooth[self.record.places[reading].cell]
+    }
+
     /// The share of a reading that was taken after a moment, s: none or all of it, or of the readings
     /// that were gathered into it.
     pub(super) fn share_after(&self, reading: usize, time: f64) -> f64 {

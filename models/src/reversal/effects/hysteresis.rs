@@ -100,6 +100,7 @@ impl Effect<Linearised> for Hysteresis {
     fn restored(
         &self,
         model: &Linearised,
+        _shape: &Shape,
         readings: &DVector<f64>,
         clean: &DVector<f64>,
     ) -> Option<DVector<f64>> {

@@ -21,6 +21,7 @@ mod oval_cone;
 mod passes;
 mod reversal_shift;
 mod stick_slip;
+mod sticking_plunger;
 mod taper;
 mod thermal_drift;
 mod thickness_shift;
@@ -54,6 +55,7 @@ pub fn all(channels: &Arrangement) -> Vec<Box<dyn Effect<Linearised>>> {
         Box::new(off_crest::OffCrest::new(channels)),
         Box::new(reversal_shift::ReversalShift::new(channels)),
         Box::new(stick_slip::StickSlip::new(channels)),
+        Box::new(sticking_plunger::StickingPlunger(indicators())),
         Box::new(taper::Taper),
         Box::new(thermal_drift::ThermalDrift(indicators())),
         Box::new(thickness_shift::ThicknessShift),

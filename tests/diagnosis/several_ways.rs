@@ -2,7 +2,7 @@
 //! that last, curvature of one, fast cycles, bumps of either sign.
 
 use crate::realisations::{measured, nothing};
-use errsep::diagnosis::{Diagnosis, Kind, Options, diagnose};
+use errsep::diagnosis::{Diagnosis, Kind, NotSealed, Options, diagnose, sealed};
 use errsep_models::model::FittedModel;
 use errsep_models::reversal::Observations;
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
@@ -115,6 +115,35 @@ fn a_lag_that_begins_anew_in_each_pass_is_named() {
         (slips.value - made).abs() < 5.0 * slips.std + 0.01,
         "{slips:?}"
     );
+}
+
+/// By the indicator that has it. What it will do in a further measurement hangs on what comes before there.
+#[test]
+fn a_plunger_that_sticks_is_named_and_not_predicted() {
+    let readings = measured("sticking-plunger", 0, 1.2, 101, 120).unwrap();
+    let diagnosis = diagnosed(&readings);
+    assert_eq!(
+        diagnosis.verdict.effects,
+        ["sticking-plunger"],
+        "{}",
+        diagnosis.verdict.statement
+    );
+    let mut all = diagnosis.candidates.iter();
+    let own = all.find(|c| c.effect == "sticking-plunger").unwrap();
+    assert!(
+        own.variant
+            .as_deref()
+            .is_some_and(|v| v.ends_with("indicator"))
+    );
+    let hold = &own.parameters[0];
+    assert!(
+        hold.name == "hold" && hold.value > 10.0 * hold.std,
+        "{hold:?}"
+    );
+    let model = Linearised::new(&readings, Assumptions::default()).unwrap();
+    let names = ["sticking-plunger".to_owned()];
+    let sealed = sealed(&model, &model, model.effects(), &names, &Options::default());
+    assert!(matches!(sealed, Err(NotSealed::DoneAnew(_))));
 }
 
 /// It is told in which trace it came, and where.

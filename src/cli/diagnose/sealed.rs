@@ -318,6 +318,9 @@ fn refused(why: &NotSealed, args: &Args, plan: &str) -> Message {
         NotSealed::Beyond { .. } => Message::bad_input(why.to_string())
             .in_file(place)
             .remedy("plan positions within those that were read"),
+        NotSealed::DoneAnew(_) => Message::not_determined(why.to_string())
+            .in_file(&args.data)
+            .remedy("leave --seal out, and measure again once the cause is removed"),
         NotSealed::NotCarried(_) | NotSealed::NotJoined(_) | NotSealed::Undetermined => {
             Message::not_determined(why.to_string())
                 .in_file(&args.data)

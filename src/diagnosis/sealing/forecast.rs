@@ -57,6 +57,11 @@ pub enum NotSealed {
     /// The causes cannot join the fit.
     #[error(transparent)]
     NotJoined(#[from] NotJoined),
+    /// A cause does at each reading what came before makes of it.
+    #[error(
+        "`{0}` does something else in every trace, and what it will do in a further measurement is not known"
+    )]
+    DoneAnew(String),
     /// Sizes are known only together.
     #[error("the planned readings do not determine the sizes of the causes")]
     Undetermined,
@@ -132,6 +137,10 @@ fn forecast(
     options: &Options,
 ) -> Result<Sealed, NotSealed> {
     let model = context.model;
+    if let Some(cause) = causes.iter().find(|cause| cause.choices > 0) {
+        let name = context.catalogue[cause.effect].name();
+        return Err(NotSealed::DoneAnew(name.to_owned()));
+    }
     let anew = plan.set_anew().ok_or(NotSealed::NotCarried(model.name()))?;
     let carried = Carried::new(model, plan)?;
     let known = Known::new(context, readings, causes).ok_or(NotSealed::Undetermined)?;

@@ -160,6 +160,8 @@ fn outcome(maker: &Maker, effect: &str, smallest: f64, told: &Told, seed: u64) -
             ));
         } else if severity.leaves_something() {
             said.push(format!("{effect} weak by what is left"));
+        } else if severity.beside_others {
+            said.push(format!("{effect} weak as one of several"));
         }
     }
     if wrong {

@@ -214,6 +214,35 @@ fn a_name_for_what_the_catalogue_lacks_is_weak_by_what_the_model_knows() {
     }
 }
 
+/// Two effects far above the noise: each alone would be strong, and what two may imitate together was not asked.
+#[test]
+fn of_several_names_none_is_strong() {
+    let line = calibration_line();
+    let smallest = |effect: &str| seen_from(line, effect, &options(0));
+    let put = [
+        ("drift", 6.0 * smallest("drift")),
+        ("quadratic", 6.0 * smallest("quadratic")),
+    ];
+    let diagnosis = line.diagnosed(&put, 7, &few(256));
+    let verdict = &diagnosis.verdict;
+    assert_eq!(verdict.severity.len(), 2, "{}", verdict.statement);
+    for severity in &verdict.severity {
+        assert!(
+            severity.beside_others && !severity.leaves_something(),
+            "{severity:?}"
+        );
+        assert_eq!(severity.confidence, Confidence::Weak);
+    }
+    let by_rivals = |s: &errsep::diagnosis::Severity| s.is_weak_by_rivals();
+    assert!(
+        !verdict.severity.iter().all(by_rivals),
+        "{:?}",
+        verdict.severity
+    );
+    let why = "each of several causes is judged alone";
+    assert!(verdict.statement.contains(why), "{}", verdict.statement);
+}
+
 /// Beside a drift far above the noise a bend that nobody listed leaves something, less than makes the drift inadequate:
 /// no rival is named alike, and the name is weak by what it leaves. Without the bend it is strong.
 #[test]

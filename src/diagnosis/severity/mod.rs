@@ -7,6 +7,9 @@
 //!
 //! Rivals are drawn of what is listed or smooth. A cause that nobody listed, and that is nearly the one named, is none of
 //! them, but is mostly not quite that one either: a name is strong only where what it leaves is such as noise leaves.
+//!
+//! Of several causes each is judged alone. What they may imitate together is more than what each may, and is not drawn:
+//! none of them is strong.
 
 pub(super) mod grounds;
 #[cfg(test)]
@@ -32,6 +35,9 @@ use crate::number::{percent, plain};
 /// One in so many of the rivals asked for must be drawn: a family that is mostly the name's own shape, or nothing of the
 /// size of the gap, is no rival of it.
 const FEWEST: usize = 4;
+/// Why none of several names is strong.
+pub(in crate::diagnosis) const TOGETHER: &str =
+    "each of several causes is judged alone, and what they may imitate together is not known";
 /// Rivals that a line tells.
 const TOLD: usize = 3;
 
@@ -39,7 +45,8 @@ const TOLD: usize = 3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Confidence {
-    /// The lower limit of the severity is 0.95 or more, and what the causes leave is such as noise leaves.
+    /// The lower limit of the severity is 0.95 or more, what the cause leaves is such as noise leaves, and it is named
+    /// alone.
     Strong,
     /// It is not.
     Weak,
@@ -56,7 +63,9 @@ pub struct Severity {
     pub lower: f64,
     /// Probability that as much as the causes leave, all of them together, would stand out with nothing else there.
     pub left: f64,
-    /// Strong where the lower limit reaches 0.95 and `left` is above 0.05.
+    /// Whether other causes are named beside it.
+    pub beside_others: bool,
+    /// Strong where the lower limit reaches 0.95, `left` is above 0.05 and no cause is named beside it.
     pub confidence: Confidence,
     /// The families of rivals, the greatest probability first.
     pub rivals: Vec<Rival>,
@@ -119,6 +128,7 @@ impl Severity {
                 "weak, as noise alone would leave as much beside it in only {} of cases",
                 percent(self.left)
             ),
+            Confidence::Weak if !self.is_weak_by_rivals() => format!("weak, as {TOGETHER}"),
             Confidence::Weak => "weak".to_owned(),
         };
         format!(
@@ -175,16 +185,17 @@ pub(in crate::diagnosis) fn severities(
 ) -> Vec<Severity> {
     let grounds = Grounds::of(context);
     let left = context.chance_beside(readings, &answer.causes);
+    let several = answer.causes.len() > 1;
     Name::all(context, readings, answer, options.false_alarm)
         .iter()
-        .map(|name| severity(context, (&grounds, left), name, options))
+        .map(|name| severity(context, (&grounds, left, several), name, options))
         .collect()
 }
 
-/// The severity of one name, beside what all causes leave.
+/// The severity of one name, beside what all causes leave, and whether they are several.
 fn severity(
     context: &Context<'_>,
-    (grounds, left): (&Grounds, f64),
+    (grounds, left, several): (&Grounds, f64, bool),
     name: &Name,
     options: &Options,
 ) -> Severity {
@@ -206,7 +217,8 @@ fn severity(
         value: 1.0 - most,
         lower,
         left,
-        confidence: if lower >= STRONG && left > SUSPECT {
+        beside_others: several,
+        confidence: if lower >= STRONG && left > SUSPECT && !several {
             Confidence::Strong
         } else {
             Confidence::Weak

@@ -3,7 +3,7 @@
 use crate::diagnosis::attribution::reported::{Candidate, ParameterOut};
 use crate::diagnosis::levels::MOSTLY;
 use crate::diagnosis::planning::splitting::Split;
-use crate::diagnosis::severity::Confidence;
+use crate::diagnosis::severity::{Confidence, TOGETHER};
 use crate::diagnosis::verdict::told::for_people;
 use crate::diagnosis::verdict::types::{Fingerprint, Gap, Hidden, Kind, Verdict, Where};
 use crate::number::{percent, plain, probability};
@@ -163,14 +163,15 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
     )
 }
 
-/// Of each weak name what else would be given it, or how rare it is that noise leaves as much; nothing where all are strong.
+/// Of each weak name what else would be given it, or how rare it is that noise leaves as much, and of several that they are
+/// several; nothing where all are strong.
 fn weakness(verdict: &Verdict) -> String {
     let alone = verdict.effects.len() == 1;
     let weak = verdict
         .severity
         .iter()
         .filter(|s| s.confidence == Confidence::Weak);
-    let each: Vec<String> = weak
+    let mut each: Vec<String> = weak
         .map(|severity| {
             let name = match (alone, verdict.indistinguishable.is_empty()) {
                 (true, true) => "this name".to_owned(),
@@ -198,7 +199,11 @@ fn weakness(verdict: &Verdict) -> String {
             }
             reasons.join(", and ")
         })
+        .filter(|reasons| !reasons.is_empty())
         .collect();
+    if verdict.severity.iter().any(|s| s.beside_others) {
+        each.push(TOGETHER.to_owned());
+    }
     if each.is_empty() {
         String::new()
     } else {

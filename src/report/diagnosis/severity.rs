@@ -38,7 +38,7 @@ fn rivals(severity: &Severity, worst: &[(String, f64)]) -> Figure {
     Figure::new(
         format!("What else would be given the name {}", severity.effect),
         "How often a gap of the same size, made by each of these, would be given the same name. A name is \
-         strong where all of them are surely below the dotted line and nothing stands out of what it leaves. Filled: \
+         strong where all of them are surely below the dotted line, nothing stands out of what it leaves and no cause is named beside it. Filled: \
          beyond the line.",
         Bars::new(Axis::new("named the same", "% of cases"))
             .small()

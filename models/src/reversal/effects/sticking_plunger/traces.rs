@@ -13,8 +13,6 @@ use crate::model::FittedModel;
 /// Holds that a first search goes through, as parts of the one that the mean tells, and those of a later one.
 const FIRST: [f64; 11] = [0.35, 0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0];
 const LATER: [f64; 5] = [0.85, 0.93, 1.0, 1.07, 1.15];
-/// How often what the stylus sees is found by what the pointers show of it.
-const ROUNDS: usize = 1;
 
 /// Follows the pointer of an indicator from a hold, which it finds anew; none of its traces where, beside another
 /// indicator, its mean says as much. `is_known`: whether the hold is from a search before.
@@ -30,7 +28,7 @@ pub(super) fn followed_by(
         .map(|(number, rows)| Followed::new(model, readings, number, &rows))
         .collect();
     let parts: &[f64] = if is_known { &LATER } else { &FIRST };
-    let (mut size, mut best) = likeliest(&traces, hold.size, parts)?;
+    let (size, best) = likeliest(&traces, hold.size, parts)?;
     if beside_others {
         // Of a greater hold more of the path itself would be taken for its mean.
         let sizes = parts.iter().filter(|part| **part <= 1.0);
@@ -42,10 +40,8 @@ pub(super) fn followed_by(
             return Some(Vec::new());
         }
     }
-    for _ in 0..ROUNDS {
-        shown_again(&mut traces, &best.paths, model.positions());
-        (size, best) = likeliest(&traces, size, &LATER)?;
-    }
+    shown_again(&mut traces, &best.paths, model.positions());
+    let (size, best) = likeliest(&traces, size, &LATER)?;
     let seen = traces.iter().map(|trace| &trace.seen[..]);
     (hold.size, hold.std) = threshold(seen.zip(&best.paths), size);
     let ways = traces.iter().zip(best.paths).map(|(trace, path)| Way {
@@ -71,15 +67,19 @@ impl Shown {
             readings: vec![Vec::new(); n],
         };
         for way in &track.ways {
-            let trace = &model.traces()[way.trace];
-            let place = &model.places()[trace.start];
+            // A track of another measurement has traces that this one has not.
+            let own = model.traces().get(way.trace).filter(|t| t.len() == n);
+            let Some((trace, place)) = own.map(|trace| (trace, &model.places()[trace.start]))
+            else {
+                continue;
+            };
             if place.channel != channel {
                 continue;
             }
             let forward = place.direction > 0.0;
             let at = |k: usize| if forward { k } else { n - 1 - k };
-            for (from, until) in way.path.stands(n) {
-                let rows = (from..until).map(|k| trace.start + at(k));
+            for (from, until) in way.path.stands(n).filter(|(from, _)| *from < n) {
+                let rows = (from..until.min(n)).map(|k| trace.start + at(k));
                 shown.readings[at(from)].extend(rows);
             }
             shown.traces.push(trace.clone());

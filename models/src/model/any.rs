@@ -347,7 +347,12 @@ impl<M: FittedModel + 'static> Effect<AnyModel> for AnyEffect<M> {
     fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
         self.0.settled(shape, amplitudes)
     }
-    fn traced(&self, model: &AnyModel, readings: &DVector<f64>, shape: &Shape) -> Option<Shape> {
+    fn traced(
+        &self,
+        model: &AnyModel,
+        readings: &dyn Fn() -> Option<DVector<f64>>,
+        shape: &Shape,
+    ) -> Option<Shape> {
         self.0.traced(model.known(), readings, shape)
     }
     fn choices(&self, shape: &Shape) -> usize {

@@ -229,8 +229,13 @@ pub trait Effect<M>: Send + Sync {
     }
 
     /// The shape as the readings themselves tell it, from those without what other causes change in them, for an
-    /// effect that does at each reading what came before makes of it.
-    fn traced(&self, _model: &M, _readings: &DVector<f64>, _shape: &Shape) -> Option<Shape> {
+    /// effect that does at each reading what came before makes of it; the others do not ask for them.
+    fn traced(
+        &self,
+        _model: &M,
+        _readings: &dyn Fn() -> Option<DVector<f64>>,
+        _shape: &Shape,
+    ) -> Option<Shape> {
         None
     }
 

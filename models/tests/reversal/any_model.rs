@@ -124,8 +124,9 @@ fn all_is_passed_on() {
         assert_eq!(through.carried(&any, &any, shape, &sizes), carried);
         let own_changed = effect.changed(&own, shape, 1);
         assert_eq!(through.changed(&any, shape, 1), own_changed);
-        let traced = effect.traced(&own, &other, shape);
-        assert_eq!(through.traced(&any, &other, shape), traced);
+        let left = || Some(other.clone());
+        let traced = effect.traced(&own, &left, shape);
+        assert_eq!(through.traced(&any, &left, shape), traced);
         let followed = traced.as_ref().unwrap_or(shape);
         assert_eq!(through.choices(followed), effect.choices(followed));
         assert_eq!(through.open(&any, followed), effect.open(&own, followed));

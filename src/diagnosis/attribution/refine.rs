@@ -230,21 +230,19 @@ impl<'s> Seen<'s> {
 
     /// A shape as the readings tell it, less what the other causes change in them when all are fitted together.
     fn traced(&self, shape: &Shape) -> Option<Shape> {
-        // Most effects are not told so, which is known from the readings as they are.
-        let first = self.effect.traced(self.state, self.readings, shape)?;
-        if self.beside.is_empty() {
-            return Some(first);
-        }
-        let columns = self.effect.columns(self.state, shape);
-        let own = self.context.space.forward_columns(&columns).0;
-        let basis = orthonormal(
-            &own,
-            &own.column_iter().map(|c| c.norm()).collect::<Vec<_>>(),
-        );
-        let without = self
-            .context
-            .amplitudes_beside(self.readings, self.beside, &basis)?;
-        let left = self.readings - self.context.change(self.beside, &without);
+        let left = || {
+            if self.beside.is_empty() {
+                return Some(self.readings.clone());
+            }
+            let columns = self.effect.columns(self.state, shape);
+            let own = self.context.space.forward_columns(&columns).0;
+            let sizes: Vec<f64> = own.column_iter().map(|c| c.norm()).collect();
+            let basis = orthonormal(&own, &sizes);
+            let others = self
+                .context
+                .amplitudes_beside(self.readings, self.beside, &basis)?;
+            Some(self.readings - self.context.change(self.beside, &others))
+        };
         self.effect.traced(self.state, &left, shape)
     }
 

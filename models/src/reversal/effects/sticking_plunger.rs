@@ -109,13 +109,19 @@ impl Effect<Linearised> for StickingPlunger {
         track.holds.iter().map(of).collect()
     }
 
-    fn traced(&self, model: &Linearised, readings: &DVector<f64>, shape: &Shape) -> Option<Shape> {
+    fn traced(
+        &self,
+        model: &Linearised,
+        readings: &dyn Fn() -> Option<DVector<f64>>,
+        shape: &Shape,
+    ) -> Option<Shape> {
         let mut track = Track::read(shape)?;
+        let readings = readings()?;
         let beside_others = track.holds.len() > 1;
         let known = std::mem::take(&mut track.ways);
         for hold in &mut track.holds {
             let is_known = known.iter().any(|way| way.indicator == hold.indicator);
-            let own = followed_by(model, readings, hold, is_known, beside_others)?;
+            let own = followed_by(model, &readings, hold, is_known, beside_others)?;
             track.ways.extend(own);
         }
         Some(track.written(shape.variant))

@@ -4,6 +4,7 @@ mod agreement;
 #[path = "../command/mod.rs"]
 mod command;
 mod designs;
+mod different_grids;
 mod effect_signatures;
 mod invariance;
 mod laws;

@@ -300,6 +300,13 @@ pub fn notes(model: &Linearised) -> Vec<String> {
             gathered.cells,
             number::plain(gathered.readings_per_cell, 2)
         ));
+        let between = gathered.between_grids();
+        if between > 0.0 {
+            notes.push(format!(
+                "Channels are read at positions of their own: what the forms may be between those of one and those of another, {} µm (standard deviation in a place, from what neighbouring places differ by), counts as form.",
+                number::plain(between, 2)
+            ));
+        }
     }
     let filled = model
         .gathered

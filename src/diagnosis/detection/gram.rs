@@ -104,6 +104,7 @@ impl Space {
         Part {
             returned: along(&self.returned),
             absorbed: along(&self.absorbed),
+            loose: along(&self.loose.in_squares),
             square: whitened.norm_squared(),
             sums,
             touched,
@@ -138,6 +139,7 @@ impl Space {
             for (along, basis) in [
                 (&mut new.returned, &self.returned),
                 (&mut new.absorbed, &self.absorbed),
+                (&mut new.loose, &self.loose.in_squares),
             ] {
                 for (along, direction) in along.iter_mut().zip(basis.column_iter()) {
                     *along += direction.rows(from, length).dot(&change);
@@ -173,6 +175,7 @@ pub(in crate::diagnosis) struct Part {
     sums: DMatrix<f64>,
     returned: DVector<f64>,
     absorbed: DVector<f64>,
+    loose: DVector<f64>,
     square: f64,
 }
 
@@ -200,5 +203,6 @@ impl Part {
         };
         whole - self.sums.dot(&other.sums) + self.returned.dot(&other.returned)
             - self.absorbed.dot(&other.absorbed)
+            - self.loose.dot(&other.loose)
     }
 }

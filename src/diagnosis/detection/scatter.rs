@@ -8,8 +8,37 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
+use crate::diagnosis::detection::shared_scatter::SharedRoot;
+
 /// Scatter of less than this part of the noise's variance is none.
 const SLIGHT: f64 = 1e-9;
+
+/// The inverse root of the scatter that a model expects.
+#[derive(Debug, Clone)]
+pub(in crate::diagnosis) enum Scatter {
+    /// Of points, each by its own.
+    Points(ScatterRoot),
+    /// Common to traces.
+    Shared(SharedRoot),
+}
+
+impl Scatter {
+    /// The root times a vector, in place.
+    pub fn apply(&self, vector: &mut [f64]) {
+        match self {
+            Self::Points(root) => root.apply(vector),
+            Self::Shared(root) => root.apply(vector),
+        }
+    }
+
+    /// The transposed root times a vector, in place.
+    pub fn apply_transposed(&self, vector: &mut [f64]) {
+        match self {
+            Self::Points(root) => root.apply_transposed(vector),
+            Self::Shared(root) => root.apply(vector),
+        }
+    }
+}
 
 /// A direction in some readings, of unit length, and the part of it that is taken away.
 #[derive(Debug, Clone)]

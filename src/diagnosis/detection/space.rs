@@ -11,7 +11,9 @@ use std::sync::Arc;
 use errsep_models::model::{AnyModel, Column, FittedModel, Freedom, Profiles, Record};
 use nalgebra::{DMatrix, DVector};
 
-use crate::diagnosis::detection::scatter::ScatterRoot;
+use crate::diagnosis::detection::loose::Loose;
+use crate::diagnosis::detection::scatter::{Scatter, ScatterRoot};
+use crate::diagnosis::detection::shared_scatter::SharedRoot;
 use crate::diagnosis::noise::law::NoiseLaw;
 use crate::diagnosis::noise::whitening::Whitening;
 
@@ -31,15 +33,22 @@ pub struct Space {
     /// L⁻¹ of each trace.
     pub(super) whitening: Vec<Arc<Whitening>>,
     /// What makes the scatter that the model expects one with the noise.
-    pub(super) scatter: Option<ScatterRoot>,
+    pub(super) scatter: Option<Scatter>,
     /// Orthonormal patterns over the traces, traces × functions.
     pub(super) patterns: Option<DMatrix<f64>>,
     /// Directions inside the patterns that the model does not have, given back; orthonormal.
     pub(super) returned: DMatrix<f64>,
     /// The rest of what the fit absorbs; orthonormal.
     pub(super) absorbed: DMatrix<f64>,
+    /// Scatter beside what the fit absorbs that is not of single positions.
+    pub(super) loose: Loose,
     /// Number of directions the fit absorbs.
     pub rank: usize,
+}
+
+/// Whether scatter is of one position of some traces.
+fn is_of_a_position(column: &Column, record: &Record) -> bool {
+    column.rows.len() <= record.traces.len()
 }
 
 impl Space {
@@ -50,7 +59,7 @@ impl Space {
     }
 
     /// The space of all readings, in units of the noise and of the scatter that the model expects.
-    /// (Profiles that are free at every position and such scatter do not go together.)
+    /// (Beside profiles that are free at every position that scatter is common to traces.)
     pub fn expecting(model: &AnyModel, law: &NoiseLaw) -> Self {
         let all: Vec<usize> = (0..model.traces().len()).collect();
         Self::made(
@@ -121,20 +130,10 @@ impl Space {
             patterns: None,
             returned: DMatrix::zeros(start, 0),
             absorbed: DMatrix::zeros(start, 0),
+            loose: Loose::none(start),
             rank: 0,
         };
-        if !scatter.is_empty() {
-            let whitened = scatter.iter().map(|column| {
-                let mut all = DVector::<f64>::zeros(record.places.len());
-                for (&row, &value) in column.rows.iter().zip(&column.values) {
-                    all[row] += value;
-                }
-                let mut dense = DMatrix::from_fn(start, 1, |k, _| all[rows[k]]);
-                space.whiten(&mut dense);
-                dense.column(0).clone_owned()
-            });
-            space.scatter = Some(ScatterRoot::new(whitened));
-        }
+        space.scatter = space.scatter_root(scatter, freedom, record, &rows);
         let columns = freedom.columns.select_rows(&rows);
         let mut whitened = columns;
         space.whiten(&mut whitened);
@@ -149,11 +148,55 @@ impl Space {
         space.project_profiles(&mut whitened);
         space.absorbed = orthonormal(&whitened, &sizes);
         space.rank += space.absorbed.ncols();
+        if let Some(Scatter::Shared(_)) = &space.scatter {
+            let along = scatter.iter().filter(|c| !is_of_a_position(c, record));
+            let dense = along.map(|column| column.dense(record.places.len()).select_rows(&rows));
+            let dense: Vec<DVector<f64>> = dense.collect();
+            if !dense.is_empty() {
+                let (seen, _) = space.forward(DMatrix::from_columns(&dense));
+                space.loose = Loose::new(&seen);
+            }
+        }
         space
     }
 
+    /// The inverse root of some scatter in whitened readings; `rows`: of the readings among all.
+    fn scatter_root(
+        &self,
+        scatter: &[Column],
+        freedom: &Freedom,
+        record: &Record,
+        rows: &[usize],
+    ) -> Option<Scatter> {
+        if scatter.is_empty() {
+            return None;
+        }
+        if freedom.profiles.is_some() {
+            let whitening = self.whitening.first()?;
+            let own = scatter.iter().filter(|c| is_of_a_position(c, record));
+            let root = SharedRoot::new(own, &self.traces, rows, whitening);
+            return Some(Scatter::Shared(root));
+        }
+        let whitened = scatter.iter().map(|column| {
+            let mut all = DVector::<f64>::zeros(record.places.len());
+            for (&row, &value) in column.rows.iter().zip(&column.values) {
+                all[row] += value;
+            }
+            let mut dense = DMatrix::from_fn(self.readings, 1, |k, _| all[rows[k]]);
+            self.whiten(&mut dense);
+            dense.column(0).clone_owned()
+        });
+        Some(Scatter::Points(ScatterRoot::new(whitened)))
+    }
+
     fn free_profiles(&mut self, profiles: &Profiles, chosen: &[usize], covariance: &DMatrix<f64>) {
-        let patterns = profiles.patterns.select_rows(chosen);
+        let mut patterns = profiles.patterns.select_rows(chosen);
+        if let Some(Scatter::Shared(root)) = &self.scatter {
+            for mut pattern in patterns.column_iter_mut() {
+                let left = root.of_traces(&pattern.clone_owned());
+                pattern.copy_from(&left);
+            }
+        }
         let sizes: Vec<f64> = patterns.column_iter().map(|c| c.norm()).collect();
         let basis = orthonormal(&patterns, &sizes);
         let length = self.traces.first().map_or(0, Range::len);
@@ -251,6 +294,7 @@ impl Space {
             let along = inner_products(&self.absorbed, columns);
             columns.gemm(-1.0, &self.absorbed, &along, 1.0);
         }
+        self.loose.take(columns);
     }
 
     /// P L⁻¹ of each column; also the whitened lengths before the projection.

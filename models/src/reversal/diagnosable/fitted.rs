@@ -5,7 +5,9 @@ use nalgebra::{DMatrix, DVector};
 use super::Linearised;
 use super::arrangement::Seat;
 use super::state::{Gauge, Smoothing};
-use crate::model::{Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record};
+use crate::model::{
+    Column, Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record,
+};
 use crate::reversal::designs::{Determined, SLOPES, Zero};
 use crate::reversal::effects;
 
@@ -166,6 +168,10 @@ impl FittedModel for Linearised {
             let share = gathered.filled() as f64 / self.record.places.len() as f64;
             1.0 / (1.0 - share) + share
         })
+    }
+
+    fn expected_scatter(&self) -> &[Column] {
+        &self.scatter
     }
 
     fn refit(&self, observed: DVector<f64>) -> Self {

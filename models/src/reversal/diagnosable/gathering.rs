@@ -7,15 +7,17 @@
 //! positions in common, the readings that single traces lack are put in (`filling.rs`) and every position stays.
 //! Cost is linear in readings.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::arrangement::Arrangement;
+use super::between_grids;
+use super::carrier::{Carrier, Route};
+use super::edges::{by_cell, drop_short, edges_of_all, edges_to_fill, spread_of_ends};
 use super::filling::{self, Lane};
-use super::sorting::{TraceKey, position_key, trace_key};
+use super::sorting::{TraceKey, trace_key};
 use super::{Assumptions, NotDiagnosable};
-use crate::reversal::designs::{self, DesignFit, DesignObservations, DesignOptions, DesignReading};
-use crate::reversal::simultaneous::{self, Knots, Noise, Options, Simultaneous, Thickness};
-use crate::reversal::{Channel, Direction, Observations, Reading};
+use crate::reversal::Direction;
+use crate::reversal::designs::{DesignChannel, DesignObservations, DesignReading};
 
 /// Gathered readings of all traces, about: what a diagnosis takes a second for.
 const MOST_READINGS: usize = 5000;
@@ -41,12 +43,22 @@ pub struct Gathered {
     pub(super) spans: Vec<f64>,
     /// The readings made that were put in, ascending.
     pub(super) lacking: Vec<usize>,
+    /// Variance of what the forms differ by in a cell from channel to channel (`between_grids.rs`).
+    pub(super) scatter: f64,
+    /// Over how much the first positions of the traces spread, and the last, mm: a cell at most.
+    pub(super) ends: [f64; 2],
 }
 
 impl Gathered {
     /// Readings that single traces lack, which were put in.
     pub fn filled(&self) -> usize {
         self.lacking.len()
+    }
+
+    /// What the forms differ by in a cell from channel to channel, where these are read at positions of their own:
+    /// standard deviation, µm.
+    pub fn between_grids(&self) -> f64 {
+        self.scatter.sqrt()
     }
 
     /// The same of a measurement that is not made yet.
@@ -77,95 +89,18 @@ pub(super) fn is_needed(traces: usize, shared: usize, readings: usize) -> bool {
         || shared as f64 > WORTH * most_cells(traces) as f64
 }
 
-fn most_cells(traces: usize) -> usize {
+/// Most cells of each of so many traces.
+pub(super) fn most_cells(traces: usize) -> usize {
     (MOST_READINGS / traces.max(1)).clamp(CELLS.0, CELLS.1)
-}
-
-/// A simultaneous fit of the readings.
-pub(super) enum Carrier<'a> {
-    /// Of the four channels.
-    Four(&'a Simultaneous),
-    /// Of another design.
-    Design(&'a DesignFit),
-}
-
-impl Carrier<'_> {
-    /// What a channel would read at a slide position, µm.
-    fn predict(&self, channel: usize, name: &str, x: f64) -> Result<f64, NotDiagnosable> {
-        let predicted = match self {
-            Self::Design(fit) => fit.predict(channel, x),
-            Self::Four(fit) => match Channel::from_name(name) {
-                Some(four) => fit.predict(four, x).map(|there| there.value),
-                None => return Err(NotDiagnosable::NoFit(format!("{name} is no channel of it"))),
-            },
-        };
-        predicted.map_err(|why| NotDiagnosable::NoFit(why.to_string()))
-    }
-
-    fn residuals(&self) -> &[f64] {
-        match self {
-            Self::Four(fit) => &fit.residuals,
-            Self::Design(fit) => &fit.residuals,
-        }
-    }
-}
-
-/// The simultaneous fit of the four channels under the same assumptions.
-pub(super) fn fit_four(
-    observations: &DesignObservations,
-    assumptions: Assumptions,
-) -> Result<Simultaneous, NotDiagnosable> {
-    let options = Options {
-        convention: assumptions.convention,
-        thickness: assumptions
-            .thickness
-            .map_or(Thickness::NotKnown, Thickness::Known),
-        noise: assumptions.noise.map_or(Noise::Estimated, Noise::Declared),
-        knots: Knots::Chosen,
-        ..Options::default()
-    };
-    simultaneous::fit(&as_four(observations), &options)
-        .map_err(|why| NotDiagnosable::NoFit(why.to_string()))
-}
-
-/// Readings of 1A, 1B, 2A, 2B as theirs.
-fn as_four(observations: &DesignObservations) -> Observations {
-    let channels = observations.design.channels();
-    let reading = |r: &DesignReading| {
-        Some(Reading {
-            channel: Channel::from_name(&channels[r.channel].name)?,
-            repeat: r.repeat,
-            direction: r.direction,
-            time: r.time,
-            x: r.x,
-            value: r.value,
-        })
-    };
-    Observations {
-        readings: observations.readings.iter().filter_map(reading).collect(),
-    }
-}
-
-/// The simultaneous fit of another design.
-pub(super) fn fit_design(
-    observations: &DesignObservations,
-    arrangement: &Arrangement,
-    assumptions: Assumptions,
-) -> Result<DesignFit, NotDiagnosable> {
-    let options = DesignOptions {
-        zero: arrangement.zero(),
-        thickness_mm: assumptions.thickness.unwrap_or(0.0),
-        noise: assumptions.noise.map_or(Noise::Estimated, Noise::Declared),
-        ..DesignOptions::default()
-    };
-    designs::fit(observations, &options).map_err(|why| NotDiagnosable::NoFit(why.to_string()))
 }
 
 /// Gathers readings by a fit to them.
 pub(super) fn gather(
     observations: &DesignObservations,
     mut traces: Traces,
-    fit: &Carrier<'_>,
+    fit: Carrier<'_>,
+    arrangement: &Arrangement,
+    assumptions: Assumptions,
 ) -> Result<(DesignObservations, Gathered), NotDiagnosable> {
     let readings = &observations.readings;
     for rows in traces.values_mut() {
@@ -173,16 +108,17 @@ pub(super) fn gather(
     }
     let mut kept = traces.clone();
     drop_short(&mut kept, readings);
-    let strict = edges(&kept, readings);
+    let strict = edges_of_all(&kept, readings);
     let cells = strict.as_ref().map_or(0, |edges| edges.len() - 1);
-    let edges = match edges_to_fill(&traces, readings) {
-        Some(edges) if (edges.len() - 1) as f64 > WORTH_FILLING * cells as f64 => edges,
+    let (edges, ends) = match edges_to_fill(&traces, readings) {
+        Some(edges) if (edges.len() - 1) as f64 > WORTH_FILLING * cells as f64 => (edges, [0.0; 2]),
         _ => {
             traces = kept;
-            strict.ok_or(NotDiagnosable::RangesDiffer)?
+            let ends = spread_of_ends(&traces, readings);
+            (strict.ok_or(NotDiagnosable::RangesDiffer)?, ends)
         }
     };
-    let members: Vec<(TraceKey, Vec<&[usize]>)> = (traces.iter())
+    let mut members: Vec<(TraceKey, Vec<&[usize]>)> = (traces.iter())
         .map(|(key, rows)| (*key, by_cell(rows, readings, &edges)))
         .collect();
     let cells = edges.len() - 1;
@@ -194,7 +130,21 @@ pub(super) fn gather(
         }
     }
     let centres: Vec<f64> = sums.iter().map(|(sum, count)| sum / count).collect();
+    let names = observations.design.channels();
+    let width = (edges[cells] - edges[0]) / cells as f64;
+    let routes = routes(&members, readings, &centres, names);
+    let fit = fit.refined(observations, assumptions, most_cells(traces.len()), &routes);
     let residuals = fit.residuals();
+    let told = fit.told();
+    let from = centres.partition_point(|x| *x < told[0]);
+    let to = centres.partition_point(|x| *x <= told[1]).max(from);
+    let (centres, sums, cells) = (&centres[from..to], &sums[from..to], to - from);
+    if cells < super::FEWEST_POSITIONS {
+        return Err(NotDiagnosable::RangesDiffer);
+    }
+    for (_, inside) in &mut members {
+        *inside = inside[from..to].to_vec();
+    }
     let lanes: Vec<Lane> = (members.iter())
         .map(|(key, inside)| {
             let left = |own: &&[usize]| mean(own, |k| residuals[k]);
@@ -202,7 +152,6 @@ pub(super) fn gather(
         })
         .collect();
     let left = filling::filled(&lanes);
-    let names = observations.design.channels();
     let mut made = Vec::new();
     let mut spans = Vec::new();
     for ((key, inside), left) in members.iter().zip(&left) {
@@ -230,18 +179,59 @@ pub(super) fn gather(
     let lacking: Vec<usize> = (own.filter(|(_, own)| own.is_empty()))
         .map(|(k, _)| k)
         .collect();
+    let lanes: Vec<between_grids::Lane> = (members.iter().zip(made.chunks(cells)))
+        .map(|((key, inside), own)| between_grids::Lane {
+            channel: key.0,
+            offsets: (inside.iter().zip(centres))
+                .map(|(own, centre)| {
+                    mean(own, |k| readings[k].x).map_or(0.0, |x| (x - centre) / width)
+                })
+                .collect(),
+            values: own.iter().map(|reading| reading.value).collect(),
+        })
+        .collect();
     let gathered = Gathered {
         cells,
         readings_per_cell: held / (made.len() - lacking.len()) as f64,
         beyond: readings.len() - held as usize,
         spans,
         lacking,
+        scatter: between_grids::variance(&lanes, &arrangement.patterns().0),
+        ends: ends.map(|spread| spread.min(width)),
     };
     let made = DesignObservations {
         design: observations.design.clone(),
         readings: made,
     };
     Ok((made, gathered))
+}
+
+/// From where each channel's readings in a cell are carried.
+fn routes(
+    members: &[(TraceKey, Vec<&[usize]>)],
+    readings: &[DesignReading],
+    centres: &[f64],
+    channels: &[DesignChannel],
+) -> Vec<Route> {
+    let mut routes = Vec::new();
+    for (channel, named) in channels.iter().enumerate() {
+        let own: Vec<&Vec<&[usize]>> = (members.iter())
+            .filter(|(key, _)| key.0 == channel)
+            .map(|(_, inside)| inside)
+            .collect();
+        for (k, centre) in centres.iter().enumerate() {
+            let rows: Vec<usize> = own.iter().flat_map(|cells| cells[k]).copied().collect();
+            if let Some(from) = mean(&rows, |k| readings[k].x) {
+                routes.push(Route {
+                    channel: named.name.clone(),
+                    from,
+                    to: *centre,
+                    traces: own.len() as f64,
+                });
+            }
+        }
+    }
+    routes
 }
 
 /// The mean over rows, where there are any.
@@ -290,190 +280,4 @@ fn span_of(own: &[usize], readings: &[DesignReading]) -> f64 {
         let last = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         ((last - first) * count / (count - 1.0)).max(0.0)
     })
-}
-
-/// Leaves out traces so short that the others together lose more readings by them than they bring;
-/// of every channel the longest stays.
-fn drop_short(traces: &mut Traces, readings: &[DesignReading]) {
-    let span = |rows: &[usize]| match (rows.first(), rows.last()) {
-        (Some(first), Some(last)) => readings[*last].x - readings[*first].x,
-        _ => 0.0,
-    };
-    let mut order: Vec<(f64, TraceKey)> = traces
-        .iter()
-        .map(|(key, rows)| (span(rows), *key))
-        .collect();
-    order.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let longest: BTreeMap<usize, TraceKey> = order.iter().map(|(_, key)| (key.0, *key)).collect();
-    let spare: Vec<TraceKey> = order
-        .into_iter()
-        .map(|(_, key)| key)
-        .filter(|key| longest.get(&key.0) != Some(key))
-        .collect();
-    // Which is dropped first; the longest never are.
-    let turn: BTreeMap<&TraceKey, usize> = spare.iter().zip(0..).collect();
-    let turned: Vec<(usize, &Vec<usize>)> = traces
-        .iter()
-        .map(|(key, rows)| (turn.get(key).copied().unwrap_or(usize::MAX), rows))
-        .collect();
-    let kept = |dropped: usize| -> usize {
-        let others = || turned.iter().filter(|(turn, _)| *turn >= dropped);
-        let (low, high) = common(others().map(|(_, rows)| *rows), readings);
-        others()
-            .map(|(_, rows)| within(rows, readings, low, high).len())
-            .sum()
-    };
-    let best = (0..=spare.len())
-        .rev()
-        .max_by_key(|dropped| kept(*dropped))
-        .unwrap_or(0);
-    for key in &spare[..best] {
-        traces.remove(key);
-    }
-}
-
-/// The range that all traces have.
-fn common<'a>(
-    traces: impl Iterator<Item = &'a Vec<usize>>,
-    readings: &[DesignReading],
-) -> (f64, f64) {
-    traces.fold((f64::NEG_INFINITY, f64::INFINITY), |(low, high), rows| {
-        let at = |k: Option<&usize>| k.map_or(f64::NAN, |k| readings[*k].x);
-        (low.max(at(rows.first())), high.min(at(rows.last())))
-    })
-}
-
-/// Rows, in order of position, between two positions.
-fn within<'a>(rows: &'a [usize], readings: &[DesignReading], low: f64, high: f64) -> &'a [usize] {
-    let from = rows.partition_point(|k| readings[*k].x < low);
-    let to = rows.partition_point(|k| readings[*k].x <= high);
-    &rows[from..to.max(from)]
-}
-
-/// Edges of cells of which every trace has readings in each, the last cell with its upper edge in it.
-///
-/// Cells of equally many readings of all traces, and cells about each position of the trace with the fewest: those
-/// of the two that leave more once every cell without readings of some trace is joined to its neighbour.
-fn edges(traces: &Traces, readings: &[DesignReading]) -> Option<Vec<f64>> {
-    let (low, high) = common(traces.values(), readings);
-    // Ends of scanned traces differ by a spacing or so: what lies a spacing outside belongs to the end.
-    let spacing = traces
-        .values()
-        .map(|rows| (readings[rows[rows.len() - 1]].x - readings[rows[0]].x) / rows.len() as f64)
-        .fold(0.0, f64::max);
-    let (low, high) = (low - spacing, high + spacing);
-    let of = |rows: &Vec<usize>| -> Vec<f64> {
-        within(rows, readings, low, high)
-            .iter()
-            .map(|k| readings[*k].x)
-            .collect()
-    };
-    let positions: Vec<Vec<f64>> = traces.values().map(of).collect();
-    let coarsest = positions.iter().min_by_key(|x| x.len())?;
-    let cells = coarsest.len().min(most_cells(traces.len()));
-    let mut pooled: Vec<f64> = positions.iter().flatten().copied().collect();
-    pooled.sort_by(f64::total_cmp);
-    let even = (1..cells).map(|k| {
-        let at = k * pooled.len() / cells;
-        0.5 * (pooled[at - 1] + pooled[at])
-    });
-    let about = (1..cells).map(|k| {
-        let at = k * coarsest.len() / cells;
-        0.5 * (coarsest[at - 1] + coarsest[at])
-    });
-    let ends = |inner: Vec<f64>| {
-        let mut edges = vec![low];
-        edges.extend(inner.into_iter().filter(|x| *x > low && *x < high));
-        edges.push(high);
-        edges.dedup();
-        joined(edges, &positions)
-    };
-    let (even, about) = (ends(even.collect()), ends(about.collect()));
-    let best = if about.len() > even.len() {
-        about
-    } else {
-        even
-    };
-    (best.len() > super::FEWEST_POSITIONS).then_some(best)
-}
-
-/// Edges of cells about the positions that at least half of the traces have, where there are few and what
-/// single traces lack can be put in.
-fn edges_to_fill(traces: &Traces, readings: &[DesignReading]) -> Option<Vec<f64>> {
-    let mut read: BTreeMap<i64, (f64, usize)> = BTreeMap::new();
-    for k in traces.values().flatten() {
-        let x = readings[*k].x;
-        read.entry(position_key(x)).or_insert((x, 0)).1 += 1;
-        if read.len() > most_cells(traces.len()) {
-            return None;
-        }
-    }
-    let kept: Vec<(i64, f64)> = (read.into_iter())
-        .filter(|(_, (_, count))| 2 * count >= traces.len())
-        .map(|(key, (x, _))| (key, x))
-        .collect();
-    if kept.len() <= super::FEWEST_POSITIONS {
-        return None;
-    }
-    let present = |rows: &Vec<usize>| {
-        let own: BTreeSet<i64> = rows.iter().map(|k| position_key(readings[*k].x)).collect();
-        kept.iter().map(|(key, _)| own.contains(key)).collect()
-    };
-    let by_trace: Vec<(TraceKey, Vec<bool>)> = (traces.iter())
-        .map(|(key, rows)| (*key, present(rows)))
-        .collect();
-    if !filling::can_be_told(&by_trace) {
-        return None;
-    }
-    let half = |a: usize, b: usize| 0.5 * (kept[a].1 + kept[b].1);
-    let last = kept.len() - 1;
-    let mut edges = vec![2.0 * kept[0].1 - half(0, 1)];
-    edges.extend((0..last).map(|k| half(k, k + 1)));
-    edges.push(2.0 * kept[last].1 - half(last - 1, last));
-    Some(edges)
-}
-
-/// Edges without those that leave a trace without readings in a cell.
-fn joined(edges: Vec<f64>, positions: &[Vec<f64>]) -> Vec<f64> {
-    let mut kept = vec![edges[0]];
-    let last = edges[edges.len() - 1];
-    let filled = |from: f64, to: f64| {
-        positions.iter().all(|x| {
-            let first = x.partition_point(|v| *v < from);
-            x.get(first)
-                .is_some_and(|v| *v < to || (to == last && *v <= to))
-        })
-    };
-    for edge in &edges[1..] {
-        let from = kept[kept.len() - 1];
-        if *edge == last {
-            // The last cell takes its neighbours in until it is filled.
-            while kept.len() > 1 && !filled(kept[kept.len() - 1], last) {
-                kept.pop();
-            }
-            kept.push(last);
-        } else if filled(from, *edge) {
-            kept.push(*edge);
-        }
-    }
-    kept
-}
-
-/// The rows of a trace in each cell.
-fn by_cell<'a>(rows: &'a [usize], readings: &[DesignReading], edges: &[f64]) -> Vec<&'a [usize]> {
-    let mut at = rows.partition_point(|k| readings[*k].x < edges[0]);
-    let cells = edges.len() - 1;
-    (0..cells)
-        .map(|cell| {
-            let upper = edges[cell + 1];
-            let next = if cell + 1 == cells {
-                rows.partition_point(|k| readings[*k].x <= upper)
-            } else {
-                rows.partition_point(|k| readings[*k].x < upper)
-            };
-            let own = &rows[at..next.max(at)];
-            at = next.max(at);
-            own
-        })
-        .collect()
 }

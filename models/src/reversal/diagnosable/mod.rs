@@ -11,7 +11,10 @@
 
 mod arrangement;
 mod between;
+mod between_grids;
+mod carrier;
 mod chords;
+mod edges;
 mod filling;
 mod fitted;
 mod further;
@@ -20,7 +23,9 @@ mod means;
 mod sorting;
 mod state;
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use nalgebra::DVector;
 use thiserror::Error;
@@ -31,7 +36,7 @@ use super::smooth_profile::{SmoothProfile, Smoother};
 use super::{Convention, Observations};
 use crate::model::{Column, FittedModel, Place, Record};
 pub use arrangement::{Arrangement, Seat, indicator_name};
-use gathering::Carrier;
+use carrier::Carrier;
 pub use gathering::Gathered;
 use sorting::Sorted;
 use state::ChannelLine;
@@ -99,6 +104,8 @@ pub struct Linearised {
     pub left_out: usize,
     /// How readings were gathered, where they were.
     pub gathered: Option<Gathered>,
+    /// What the forms differ by from channel to channel, where these are read at positions of their own.
+    scatter: Arc<[Column]>,
 }
 
 impl Linearised {
@@ -138,7 +145,7 @@ impl Linearised {
         assumptions: Assumptions,
     ) -> Result<Self, NotDiagnosable> {
         let arrangement = Arrangement::new(observations.design.clone(), zero, None);
-        let carrier = fit.map(Carrier::Design);
+        let carrier = fit.map(|fit| Carrier::Design(Cow::Borrowed(fit)));
         Self::beside(observations, arrangement, assumptions, carrier)
     }
 
@@ -162,7 +169,7 @@ impl Linearised {
             readings: observations.readings.iter().map(reading).collect(),
         };
         let arrangement = Arrangement::new(design, Zero::Reset, Some(assumptions.convention));
-        let carrier = fit.map(Carrier::Four);
+        let carrier = fit.map(|fit| Carrier::Four(Cow::Borrowed(fit)));
         Self::beside(&observations, arrangement, assumptions, carrier)
     }
 
@@ -179,19 +186,12 @@ impl Linearised {
             let sorted = Sorted::new(observations, &positions, &shared);
             return Self::sorted(sorted, arrangement, assumptions, None);
         }
-        let (four, design);
         let fit = match fit {
             Some(fit) => fit,
-            None if arrangement.is_four() => {
-                four = gathering::fit_four(observations, assumptions)?;
-                Carrier::Four(&four)
-            }
-            None => {
-                design = gathering::fit_design(observations, &arrangement, assumptions)?;
-                Carrier::Design(&design)
-            }
+            None => Carrier::new(observations, &arrangement, assumptions)?,
         };
-        let (made, gathered) = gathering::gather(observations, traces, &fit)?;
+        let (made, gathered) =
+            gathering::gather(observations, traces, fit, &arrangement, assumptions)?;
         let shared = sorting::shared(&made, gathering::traces_of(&made).len());
         let sorted = Sorted::new(&made, &positions, &shared);
         Self::sorted(sorted, arrangement, assumptions, Some(gathered))
@@ -228,6 +228,9 @@ impl Linearised {
             offset: 0.0,
         };
         let repeats: BTreeSet<u32> = sorted.places.iter().map(|p| p.repeat).collect();
+        let scatter = (gathered.as_ref()).map_or_else(Vec::new, |gathered| {
+            between_grids::scatter(&sorted, &arrangement, gathered)
+        });
         let last = sorted.places.iter().map(|p| p.time).fold(0.0, f64::max);
         Ok(Self {
             span: 1.0,
@@ -249,6 +252,7 @@ impl Linearised {
             timed: sorted.timed,
             left_out: (gathered.as_ref()).map_or(sorted.left_out, |gathered| gathered.beyond),
             gathered,
+            scatter: scatter.into(),
         }
         .refit(DVector::from_vec(sorted.values)))
     }

@@ -1,5 +1,7 @@
 //! What a solution says of a reading that was not taken, and the derivatives of all that were.
 
+use std::collections::BTreeMap;
+
 use errsep_solvers::problem::NoValue;
 use nalgebra::DMatrix;
 
@@ -83,6 +85,28 @@ impl Simultaneous {
             band,
             border,
         })
+    }
+
+    /// Standard uncertainty of the difference between what a channel would read at two slide positions, µm, of
+    /// readings with the noise of the weights.
+    ///
+    /// # Errors
+    /// As [`Self::predict`].
+    pub fn difference_std(&self, channel: Channel, from: f64, to: f64) -> Result<f64, NoValue> {
+        let (from, to) = (self.predict(channel, from)?, self.predict(channel, to)?);
+        let mut band: BTreeMap<usize, f64> = BTreeMap::new();
+        for (sign, prediction) in [(-1.0, &from), (1.0, &to)] {
+            for (unknown, derivative) in &prediction.band {
+                *band.entry(*unknown).or_default() += sign * derivative;
+            }
+        }
+        let band: Vec<(usize, f64)> = band.into_iter().collect();
+        let pairs = from.border.iter().zip(&to.border).enumerate();
+        let border: Vec<(usize, f64)> = pairs
+            .map(|(unknown, (from, to))| (unknown, to - from))
+            .filter(|(_, derivative)| *derivative != 0.0)
+            .collect();
+        Ok(self.covariance.variance(&band, &border).max(0.0).sqrt())
     }
     /// unit), dense, readings × unknowns: coefficients of the forms with the gauge taken into
     /// account, then tilts (rad), offsets (µm), where fitted the thickness (mm), and the effects' own.

@@ -1,0 +1,325 @@
+//! What readings of channels that are read at positions of their own differ by, though each form is one.
+//!
+//! A reading is carried to the centre of its cell by a smooth form. What the form is beside that between the
+//! positions goes with the channel: it comes back in all of its traces, and where another channel was read
+//! elsewhere it is another there. No combination of channels in which every form cancels is free of it. How
+//! great it is these combinations say themselves, by what neighbouring cells of theirs differ by beyond the
+//! noise of the repeats: what is smooth in them, as most errors are, has no part in that.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Gathered;
+use super::arrangement::Arrangement;
+use super::sorting::Sorted;
+use super::state::Gauge;
+use crate::model::{Column, Place};
+
+/// Distance of a channel's positions from the centres of the cells, in parts of a cell, root mean square, up to
+/// which the channels are read at the same places.
+const ALIKE: f64 = 0.05;
+/// Cells at an end of which a profile's value and slope there are taken.
+const AT_END: usize = 3;
+/// Weights of a second difference of white values, of their own variance.
+const SECOND: [f64; 3] = [
+    0.408_248_290_463_863,
+    -0.816_496_580_927_726,
+    0.408_248_290_463_863,
+];
+
+/// One trace: its channel, and for every cell how far from the centre its readings are, in parts of a cell, and
+/// the value made of them.
+pub(super) struct Lane {
+    pub channel: usize,
+    pub offsets: Vec<f64>,
+    pub values: Vec<f64>,
+}
+
+/// What readings at different places leave open: the forms between the positions of the channels, and the straight
+/// line that they do not have.
+pub(super) fn scatter(
+    sorted: &Sorted,
+    arrangement: &Arrangement,
+    gathered: &Gathered,
+) -> Vec<Column> {
+    let mut all = columns(&sorted.places, gathered.scatter);
+    let (patterns, withheld) = arrangement.patterns();
+    let n = sorted.positions.len();
+    let middle = sorted.positions.iter().sum::<f64>() / n as f64;
+    for function in withheld {
+        let weights: Vec<f64> = patterns.column(function).iter().copied().collect();
+        let mut profile = DVector::zeros(n);
+        for (trace, channel) in sorted.traces.iter().zip(&sorted.trace_channels) {
+            let values = DVector::from_column_slice(&sorted.values[trace.clone()]);
+            profile.axpy(weights[*channel], &values, 1.0);
+        }
+        let whole: f64 = (sorted.trace_channels.iter())
+            .map(|channel| weights[*channel].powi(2))
+            .sum();
+        profile /= whole;
+        let slope = looseness(&profile, &sorted.positions, gathered.ends);
+        if slope > 0.0 {
+            let column = line_column(&sorted.places, &weights, middle, slope);
+            all.push(column);
+        }
+    }
+    all
+}
+
+/// Variance of what the forms differ by in a cell from channel to channel, in the unit of the readings squared;
+/// zero where they are read at the same places. `patterns`: channels × forms, how each form is read.
+pub(super) fn variance(lanes: &[Lane], patterns: &DMatrix<f64>) -> f64 {
+    let channels = patterns.nrows();
+    let of = |channel: usize| lanes.iter().filter(move |lane| lane.channel == channel);
+    let apart = |channel: usize| {
+        let mean = mean(of(channel).map(|lane| &lane.offsets));
+        mean.norm() > ALIKE * (mean.len() as f64).sqrt()
+    };
+    let closures = closing(patterns);
+    if closures.ncols() == 0 || !(0..channels).any(apart) {
+        return 0.0;
+    }
+    let second = |lane: &Lane| -> Vec<f64> {
+        let weigh = |w: &[f64]| SECOND.iter().zip(w).map(|(s, v)| s * v).sum();
+        lane.values.windows(3).map(weigh).collect()
+    };
+    let level = |lane: &Lane| -> Vec<f64> {
+        let values = &lane.values;
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|value| value - mean).collect()
+    };
+    let excess = |of: &dyn Fn(&Lane) -> Vec<f64>| {
+        let rows: Vec<(usize, Vec<f64>)> =
+            lanes.iter().map(|lane| (lane.channel, of(lane))).collect();
+        excess(&rows, &closures)
+    };
+    // Errors that turn from cell to cell count too much in their differences.
+    excess(&second).min(excess(&level)).max(0.0)
+}
+
+/// Mean square of what rows of the channels' traces have in common beyond their noise, where no form is left.
+fn excess(rows: &[(usize, Vec<f64>)], closures: &DMatrix<f64>) -> f64 {
+    let of = |channel: usize| rows.iter().filter(move |own| own.0 == channel);
+    let means: Vec<DVector<f64>> = (0..closures.nrows())
+        .map(|channel| mean(of(channel).map(|own| &own.1)))
+        .collect();
+    // The noise of a trace, pooled over the channels.
+    let (mut squares, mut free) = (0.0, 0.0);
+    for (channel, values) in rows {
+        let left = DVector::from_column_slice(values) - &means[*channel];
+        squares += left.norm_squared();
+    }
+    for (channel, mean) in means.iter().enumerate() {
+        free += (of(channel).count() as f64 - 1.0) * mean.len() as f64;
+    }
+    if free < 1.0 {
+        return 0.0;
+    }
+    let noise = squares / free;
+    let mut excess = 0.0;
+    for closure in closures.column_iter() {
+        let mut sum = DVector::zeros(means[0].len());
+        let mut expected = 0.0;
+        for (channel, weight) in closure.iter().enumerate() {
+            sum.axpy(*weight, &means[channel], 1.0);
+            expected += weight * weight * noise / of(channel).count() as f64;
+        }
+        excess += sum.norm_squared() / sum.len() as f64 - expected;
+    }
+    excess / closures.ncols() as f64
+}
+
+/// How sure the straight line of a profile is, µm/mm, whose readings begin and end at different places:
+/// standard deviation. `profile`: by cell, at these centres; `ends`: over how much the traces' first positions
+/// spread, and their last, mm.
+///
+/// The line of a travel L that ends a length δ later turns by 6/L² (f δ + f′ δ²/2), f how far the profile is from
+/// its line there; where it ends is taken as anywhere within that spread with equal probability.
+fn looseness(profile: &DVector<f64>, centres: &[f64], ends: [f64; 2]) -> f64 {
+    let n = profile.len();
+    if n < 2 * AT_END {
+        return 0.0;
+    }
+    let line = Gauge::of(centres);
+    let (height, slope) = (line.height.dot(profile), line.slope.dot(profile));
+    let left = |k: usize| profile[k] - height - slope * (centres[k] - line.center);
+    let travel = centres[n - 1] - centres[0];
+    let turn = |from: usize, spread: f64, to: f64| {
+        let own: Vec<usize> = (from..from + AT_END).collect();
+        let count = own.len() as f64;
+        let middle = own.iter().map(|k| centres[*k]).sum::<f64>() / count;
+        let level = own.iter().map(|k| left(*k)).sum::<f64>() / count;
+        let moment: f64 = own.iter().map(|k| (centres[*k] - middle) * left(*k)).sum();
+        let width: f64 = own.iter().map(|k| (centres[*k] - middle).powi(2)).sum();
+        let steep = moment / width;
+        let value = level + steep * (to - middle);
+        6.0 / (travel * travel) * (value.abs() * spread + steep.abs() * spread * spread / 2.0)
+    };
+    let turns = [
+        turn(0, ends[0], centres[0]),
+        turn(n - AT_END, ends[1], centres[n - 1]),
+    ];
+    (turns.iter().map(|t| t * t).sum::<f64>() / 3.0).sqrt()
+}
+
+/// The change of all readings by one standard deviation of such a line; `weights`: of the channels.
+fn line_column(places: &[Place], weights: &[f64], middle: f64, slope: f64) -> Column {
+    Column::from_places(places, |_, place| {
+        slope * weights[place.channel] * (place.x - middle)
+    })
+}
+
+/// The change of the readings by one standard deviation in each cell of each channel.
+fn columns(places: &[Place], variance: f64) -> Vec<Column> {
+    if variance <= 0.0 {
+        return Vec::new();
+    }
+    let cells = places.iter().map(|place| place.cell + 1).max().unwrap_or(0);
+    let mut columns = vec![
+        Column {
+            rows: Vec::new(),
+            values: Vec::new(),
+        };
+        cells
+    ];
+    for (row, place) in places.iter().enumerate() {
+        columns[place.cell].rows.push(row);
+        columns[place.cell].values.push(variance.sqrt());
+    }
+    columns
+}
+
+/// Orthonormal combinations of the channels in which no form is left.
+fn closing(patterns: &DMatrix<f64>) -> DMatrix<f64> {
+    let channels = patterns.nrows();
+    let mut basis: Vec<DVector<f64>> = Vec::new();
+    let mut closing = Vec::new();
+    let each = DMatrix::identity(channels, channels);
+    for (k, column) in patterns.column_iter().chain(each.column_iter()).enumerate() {
+        let mut rest: DVector<f64> = column.clone_owned();
+        for _ in 0..2 {
+            for known in &basis {
+                let along = known.dot(&rest);
+                rest.axpy(-along, known, 1.0);
+            }
+        }
+        let left = rest.norm();
+        if left > 1e-6 * column.norm() {
+            let unit = rest / left;
+            if k >= patterns.ncols() {
+                closing.push(unit.clone());
+            }
+            basis.push(unit);
+        }
+    }
+    if closing.is_empty() {
+        DMatrix::zeros(channels, 0)
+    } else {
+        DMatrix::from_columns(&closing)
+    }
+}
+
+/// The mean of rows of equal lengths.
+fn mean<'a>(rows: impl Iterator<Item = &'a Vec<f64>> + Clone) -> DVector<f64> {
+    let count = rows.clone().count().max(1) as f64;
+    let length = rows.clone().next().map_or(0, Vec::len);
+    let mut sum = DVector::zeros(length);
+    for row in rows {
+        sum += DVector::from_column_slice(row);
+    }
+    sum / count
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, Normal};
+
+    use super::*;
+
+    /// 1A, 1B, 2A, 2B: M, S_A − S_B, S_A + S_B.
+    fn four() -> DMatrix<f64> {
+        DMatrix::from_row_slice(
+            4,
+            3,
+            &[
+                1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, 1.0,
+            ],
+        )
+    }
+
+    /// Eight traces a channel of 150 cells: a smooth error of channels, what the channels' traces share, and noise.
+    fn lanes(shared: f64, apart: f64, seed: u64) -> Vec<Lane> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let normal = Normal::new(0.0, 1.0).unwrap();
+        let mut made = Vec::new();
+        for channel in 0..4 {
+            let common: Vec<f64> = (0..150)
+                .map(|k| {
+                    let smooth = 0.2 * (f64::from(k) / 30.0 + channel as f64).sin();
+                    smooth + shared * normal.sample(&mut random)
+                })
+                .collect();
+            for _ in 0..8 {
+                made.push(Lane {
+                    channel,
+                    offsets: vec![apart * (channel as f64 - 1.5); 150],
+                    values: (common.iter())
+                        .map(|c| c + 0.5 * normal.sample(&mut random))
+                        .collect(),
+                });
+            }
+        }
+        made
+    }
+
+    #[test]
+    fn what_traces_of_a_channel_share_is_told_beside_noise_and_smooth_errors() {
+        let found: Vec<f64> = (0..40)
+            .map(|seed| variance(&lanes(0.3, 0.2, seed), &four()))
+            .collect();
+        let mean = found.iter().sum::<f64>() / 40.0;
+        // Statistical: a closure of 150 second differences, each like 1.94 of its neighbours, tells a variance of
+        // 0.09 + 0.5²/8 to 16 %, 40 of them to 2.5 %; four of these. The lesser of two estimates is no higher.
+        assert!((mean - 0.09).abs() < 4.0 * 0.025 * 0.121, "{mean}");
+        let none: Vec<f64> = (0..40)
+            .map(|seed| variance(&lanes(0.0, 0.2, seed), &four()))
+            .collect();
+        // The same of none at all: 16 % of 0.5²/8, cut off at zero.
+        let mean = none.iter().sum::<f64>() / 40.0;
+        assert!(mean < 0.5 * 0.16 * 0.031 + 4.0 * 0.025 * 0.031, "{mean}");
+    }
+
+    #[test]
+    fn channels_that_are_read_at_the_same_places_share_their_forms() {
+        // Definition.
+        assert_eq!(variance(&lanes(0.3, 0.01, 1), &four()), 0.0);
+    }
+
+    /// A profile that is a straight line over its travel and bends beyond is not loose; one of t³ is, by what its line
+    /// over a longer travel is.
+    #[test]
+    fn a_line_is_as_loose_as_its_ends() {
+        let centres: Vec<f64> = (0..400).map(|k| 0.5 * f64::from(k)).collect();
+        let line = DVector::from_iterator(400, centres.iter().map(|x| 3.0 - 0.02 * x));
+        // Rounding.
+        assert!(looseness(&line, &centres, [1.0, 1.0]) < 1e-12);
+        let cubic = |x: f64| ((x - 100.0) / 100.0).powi(3);
+        let slope_to = |end: f64| {
+            let n = 20_000;
+            let (mut product, mut square) = (0.0, 0.0);
+            for k in 0..n {
+                let x = end * (f64::from(k) + 0.5) / f64::from(n);
+                let from_middle = x - 0.5 * end;
+                product += from_middle * cubic(x);
+                square += from_middle * from_middle;
+            }
+            product / square
+        };
+        let profile = DVector::from_iterator(400, centres.iter().map(|x| cubic(*x)));
+        let loose = looseness(&profile, &centres, [0.0, 1.0]);
+        let turned = (slope_to(200.5) - slope_to(199.5)).abs() / 3.0f64.sqrt();
+        // The value and slope at the end are those of its last three cells: 2 %.
+        assert!((loose / turned - 1.0).abs() < 0.03, "{loose} {turned}");
+    }
+}

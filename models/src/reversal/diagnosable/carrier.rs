@@ -1,0 +1,213 @@
+//! The simultaneous fit that carries readings to common places.
+
+use std::borrow::Cow;
+
+use super::arrangement::Arrangement;
+use super::{Assumptions, NotDiagnosable};
+use crate::reversal::designs::{
+    self, DesignFit, DesignObservations, DesignOptions, DesignReading, Zero,
+};
+use crate::reversal::simultaneous::{self, Knots, Noise, Options, Simultaneous, Thickness};
+use crate::reversal::{Channel, Observations, Reading};
+
+/// From one number of cells to the next, about.
+const FINER: f64 = 1.2;
+/// An end cell longer than so many others is long.
+const LONG: f64 = 1.5;
+
+/// A simultaneous fit of the readings.
+pub(super) enum Carrier<'a> {
+    /// Of the four channels.
+    Four(Cow<'a, Simultaneous>),
+    /// Of another design.
+    Design(Cow<'a, DesignFit>),
+}
+
+/// From where a channel's readings in a cell are carried to where, mm.
+pub(super) struct Route {
+    pub channel: String,
+    pub from: f64,
+    pub to: f64,
+    /// Number of traces of the channel.
+    pub traces: f64,
+}
+
+impl Carrier<'_> {
+    /// The fit under the same assumptions.
+    pub fn new(
+        observations: &DesignObservations,
+        arrangement: &Arrangement,
+        assumptions: Assumptions,
+    ) -> Result<Self, NotDiagnosable> {
+        if arrangement.is_four() {
+            let fit = fit_four(&as_four(observations), assumptions, Knots::Chosen)?;
+            return Ok(Self::Four(Cow::Owned(fit)));
+        }
+        let fit = fit_design(observations, arrangement.zero(), assumptions)?;
+        Ok(Self::Design(Cow::Owned(fit)))
+    }
+
+    /// The same of four channels with more cells, at most so many, as long as the criterion that chose the knots
+    /// says that it is better.
+    ///
+    /// That choice ends where a channel has three positions a cell, as its forms' bands are to be told. Channels read
+    /// at positions of their own tell the forms between those of each: what a finer form is there need not be told
+    /// well, as long as `routes`, over less than a spacing, are.
+    pub fn refined(
+        self,
+        observations: &DesignObservations,
+        assumptions: Assumptions,
+        most: usize,
+        routes: &[Route],
+    ) -> Self {
+        match self {
+            Self::Four(fit) if fit.effects.is_empty() => {
+                let observations = as_four(observations);
+                Self::Four(finer(fit, &observations, assumptions, (most, routes)))
+            }
+            other => other,
+        }
+    }
+
+    /// From where to where the forms' cells are as narrow as elsewhere, mm: beyond what all traces have few channels
+    /// tell the forms, and the last cells are long.
+    pub fn told(&self) -> [f64; 2] {
+        let breaks = match self {
+            Self::Four(fit) => &fit.knots.breaks,
+            Self::Design(fit) => &fit.knots.breaks,
+        };
+        let n = breaks.len();
+        if n < 4 {
+            return [f64::NEG_INFINITY, f64::INFINITY];
+        }
+        let wide = LONG * (breaks[n - 2] - breaks[1]) / (n - 3) as f64;
+        let low = if breaks[1] - breaks[0] > wide {
+            breaks[1]
+        } else {
+            f64::NEG_INFINITY
+        };
+        let high = if breaks[n - 1] - breaks[n - 2] > wide {
+            breaks[n - 2]
+        } else {
+            f64::INFINITY
+        };
+        [low, high]
+    }
+
+    /// What a channel would read at a slide position, µm.
+    pub fn predict(&self, channel: usize, name: &str, x: f64) -> Result<f64, NotDiagnosable> {
+        let predicted = match self {
+            Self::Design(fit) => fit.predict(channel, x),
+            Self::Four(fit) => match Channel::from_name(name) {
+                Some(four) => fit.predict(four, x).map(|there| there.value),
+                None => return Err(NotDiagnosable::NoFit(format!("{name} is no channel of it"))),
+            },
+        };
+        predicted.map_err(|why| NotDiagnosable::NoFit(why.to_string()))
+    }
+
+    /// Reading less model, µm.
+    pub fn residuals(&self) -> &[f64] {
+        match self {
+            Self::Four(fit) => &fit.residuals,
+            Self::Design(fit) => &fit.residuals,
+        }
+    }
+}
+
+/// The fit with more cells as long as that is better and carries readings as surely as they are.
+fn finer<'a>(
+    first: Cow<'a, Simultaneous>,
+    observations: &Observations,
+    assumptions: Assumptions,
+    (most, routes): (usize, &[Route]),
+) -> Cow<'a, Simultaneous> {
+    let mut best = first;
+    loop {
+        let cells = most.min((FINER * cells_of(&best) as f64).round() as usize);
+        if cells <= cells_of(&best) {
+            return best;
+        }
+        let Ok(finer) = fit_four(observations, assumptions, Knots::Cells(cells)) else {
+            return best;
+        };
+        let better = criterion(&finer) < criterion(&best) && carries(&finer, routes);
+        if cells_of(&finer) <= cells_of(&best) || !better {
+            return best;
+        }
+        best = Cow::Owned(finer);
+    }
+}
+
+fn cells_of(fit: &Simultaneous) -> usize {
+    fit.knots.breaks.len().saturating_sub(1).max(1)
+}
+
+/// The corrected Akaike criterion (Hurvich and Tsai, Biometrika 76, 1989).
+fn criterion(fit: &Simultaneous) -> f64 {
+    let squares: f64 = fit.residuals.iter().map(|r| r * r).sum();
+    let readings = fit.residuals.len() as f64;
+    let (free, unknowns) = (fit.degrees_of_freedom, readings - fit.degrees_of_freedom);
+    readings * (squares / readings).ln() + 2.0 * unknowns * readings / (free - 1.0)
+}
+
+/// Whether a fit carries what the traces of a channel have in common no less surely than these tell it.
+fn carries(fit: &Simultaneous, routes: &[Route]) -> bool {
+    let noise = fit.noise.iter().map(|own| own.sigma).fold(0.0, f64::max);
+    routes.iter().all(|route| {
+        Channel::from_name(&route.channel)
+            .and_then(|channel| fit.difference_std(channel, route.from, route.to).ok())
+            .is_some_and(|std| std <= noise / route.traces.sqrt())
+    })
+}
+
+/// The simultaneous fit of the four channels under the same assumptions.
+fn fit_four(
+    observations: &Observations,
+    assumptions: Assumptions,
+    knots: Knots,
+) -> Result<Simultaneous, NotDiagnosable> {
+    let options = Options {
+        convention: assumptions.convention,
+        thickness: assumptions
+            .thickness
+            .map_or(Thickness::NotKnown, Thickness::Known),
+        noise: assumptions.noise.map_or(Noise::Estimated, Noise::Declared),
+        knots,
+        ..Options::default()
+    };
+    simultaneous::fit(observations, &options).map_err(|why| NotDiagnosable::NoFit(why.to_string()))
+}
+
+/// Readings of 1A, 1B, 2A, 2B as theirs.
+fn as_four(observations: &DesignObservations) -> Observations {
+    let channels = observations.design.channels();
+    let reading = |r: &DesignReading| {
+        Some(Reading {
+            channel: Channel::from_name(&channels[r.channel].name)?,
+            repeat: r.repeat,
+            direction: r.direction,
+            time: r.time,
+            x: r.x,
+            value: r.value,
+        })
+    };
+    Observations {
+        readings: observations.readings.iter().filter_map(reading).collect(),
+    }
+}
+
+/// The simultaneous fit of another design.
+fn fit_design(
+    observations: &DesignObservations,
+    zero: Zero,
+    assumptions: Assumptions,
+) -> Result<DesignFit, NotDiagnosable> {
+    let options = DesignOptions {
+        zero,
+        thickness_mm: assumptions.thickness.unwrap_or(0.0),
+        noise: assumptions.noise.map_or(Noise::Estimated, Noise::Declared),
+        ..DesignOptions::default()
+    };
+    designs::fit(observations, &options).map_err(|why| NotDiagnosable::NoFit(why.to_string()))
+}

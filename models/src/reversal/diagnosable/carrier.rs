@@ -18,9 +18,9 @@ const LONG: f64 = 1.5;
 /// A simultaneous fit of the readings.
 pub(super) enum Carrier<'a> {
     /// Of the four channels.
-    Four(Cow<'a, Simultaneous>),
+    Four(Box<Cow<'a, Simultaneous>>),
     /// Of another design.
-    Design(Cow<'a, DesignFit>),
+    Design(Box<Cow<'a, DesignFit>>),
 }
 
 /// From where a channel's readings in a cell are carried to where, mm.
@@ -41,10 +41,10 @@ impl Carrier<'_> {
     ) -> Result<Self, NotDiagnosable> {
         if arrangement.is_four() {
             let fit = fit_four(&as_four(observations), assumptions, Knots::Chosen)?;
-            return Ok(Self::Four(Cow::Owned(fit)));
+            return Ok(Self::Four(Box::new(Cow::Owned(fit))));
         }
         let fit = fit_design(observations, arrangement.zero(), assumptions)?;
-        Ok(Self::Design(Cow::Owned(fit)))
+        Ok(Self::Design(Box::new(Cow::Owned(fit))))
     }
 
     /// The same of four channels with more cells, at most so many, as long as the criterion that chose the knots
@@ -63,7 +63,12 @@ impl Carrier<'_> {
         match self {
             Self::Four(fit) if fit.effects.is_empty() => {
                 let observations = as_four(observations);
-                Self::Four(finer(fit, &observations, assumptions, (most, routes)))
+                Self::Four(Box::new(finer(
+                    *fit,
+                    &observations,
+                    assumptions,
+                    (most, routes),
+                )))
             }
             other => other,
         }

@@ -145,7 +145,7 @@ impl Linearised {
         assumptions: Assumptions,
     ) -> Result<Self, NotDiagnosable> {
         let arrangement = Arrangement::new(observations.design.clone(), zero, None);
-        let carrier = fit.map(|fit| Carrier::Design(Cow::Borrowed(fit)));
+        let carrier = fit.map(|fit| Carrier::Design(Box::new(Cow::Borrowed(fit))));
         Self::beside(observations, arrangement, assumptions, carrier)
     }
 
@@ -169,7 +169,7 @@ impl Linearised {
             readings: observations.readings.iter().map(reading).collect(),
         };
         let arrangement = Arrangement::new(design, Zero::Reset, Some(assumptions.convention));
-        let carrier = fit.map(|fit| Carrier::Four(Cow::Borrowed(fit)));
+        let carrier = fit.map(|fit| Carrier::Four(Box::new(Cow::Borrowed(fit))));
         Self::beside(&observations, arrangement, assumptions, carrier)
     }
 

@@ -30,6 +30,9 @@ const WORTH_FILLING: f64 = 1.2;
 /// Least share of the readings at positions that all traces have for the rest to be left out.
 const SHARED: f64 = 0.95;
 
+/// Least share of the cells to keep where those at the ends are left out.
+const KEPT: f64 = 0.95;
+
 /// How readings were gathered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gathered {
@@ -138,10 +141,13 @@ pub(super) fn gather(
     let told = fit.told();
     let from = centres.partition_point(|x| *x < told[0]);
     let to = centres.partition_point(|x| *x <= told[1]).max(from);
+    // Where forms are smooth the fit's cells are long.
+    let (from, to) = if (to - from) as f64 >= KEPT * cells as f64 {
+        (from, to)
+    } else {
+        (0, cells)
+    };
     let (centres, sums, cells) = (&centres[from..to], &sums[from..to], to - from);
-    if cells < super::FEWEST_POSITIONS {
-        return Err(NotDiagnosable::RangesDiffer);
-    }
     for (_, inside) in &mut members {
         *inside = inside[from..to].to_vec();
     }

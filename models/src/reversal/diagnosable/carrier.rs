@@ -7,6 +7,7 @@ use super::{Assumptions, NotDiagnosable};
 use crate::reversal::designs::{
     self, DesignFit, DesignObservations, DesignOptions, DesignReading, Zero,
 };
+use crate::reversal::simultaneous::knots::trial;
 use crate::reversal::simultaneous::{self, Knots, Noise, Options, Simultaneous, Thickness};
 use crate::reversal::{Channel, Observations, Reading};
 
@@ -148,21 +149,25 @@ fn cells_of(fit: &Simultaneous) -> usize {
     fit.knots.breaks.len().saturating_sub(1).max(1)
 }
 
-/// The corrected Akaike criterion (Hurvich and Tsai, Biometrika 76, 1989).
+/// The corrected Akaike criterion, as the number of knots is chosen by.
 fn criterion(fit: &Simultaneous) -> f64 {
     let squares: f64 = fit.residuals.iter().map(|r| r * r).sum();
-    let readings = fit.residuals.len() as f64;
-    let (free, unknowns) = (fit.degrees_of_freedom, readings - fit.degrees_of_freedom);
-    readings * (squares / readings).ln() + 2.0 * unknowns * readings / (free - 1.0)
+    let readings = fit.residuals.len();
+    let unknowns = (readings as f64 - fit.degrees_of_freedom).round() as usize;
+    trial(cells_of(fit), readings, unknowns, squares).aicc
 }
 
 /// Whether a fit carries what the traces of a channel have in common no less surely than these tell it.
 fn carries(fit: &Simultaneous, routes: &[Route]) -> bool {
-    let noise = fit.noise.iter().map(|own| own.sigma).fold(0.0, f64::max);
     routes.iter().all(|route| {
-        Channel::from_name(&route.channel)
-            .and_then(|channel| fit.difference_std(channel, route.from, route.to).ok())
-            .is_some_and(|std| std <= noise / route.traces.sqrt())
+        let noise = fit
+            .noise
+            .iter()
+            .find(|own| own.channel.name() == route.channel);
+        noise.is_some_and(|own| {
+            let std = fit.difference_std(own.channel, route.from, route.to);
+            std.is_ok_and(|std| std <= own.sigma / route.traces.sqrt())
+        })
     })
 }
 

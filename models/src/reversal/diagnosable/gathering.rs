@@ -196,13 +196,14 @@ pub(super) fn gather(
             values: own.iter().map(|reading| reading.value).collect(),
         })
         .collect();
+    let closures: Vec<Vec<f64>> = arrangement.closures().map(|own| own.weights).collect();
     let gathered = Gathered {
         cells,
         readings_per_cell: held / (made.len() - lacking.len()) as f64,
         beyond: readings.len() - held as usize,
         spans,
         lacking,
-        scatter: between_grids::variance(&lanes, &arrangement.patterns().0),
+        scatter: between_grids::variance(&lanes, &closures),
         ends: ends.map(|spread| spread.min(width)),
     };
     let made = DesignObservations {

@@ -92,7 +92,12 @@ impl Simultaneous {
     ///
     /// # Errors
     /// As [`Self::predict`].
-    pub fn difference_std(&self, channel: Channel, from: f64, to: f64) -> Result<f64, NoValue> {
+    pub(in crate::reversal) fn difference_std(
+        &self,
+        channel: Channel,
+        from: f64,
+        to: f64,
+    ) -> Result<f64, NoValue> {
         let (from, to) = (self.predict(channel, from)?, self.predict(channel, to)?);
         let mut band: BTreeMap<usize, f64> = BTreeMap::new();
         for (sign, prediction) in [(-1.0, &from), (1.0, &to)] {

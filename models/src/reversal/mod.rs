@@ -18,6 +18,7 @@ pub mod simulate;
 pub mod simultaneous;
 mod smooth_profile;
 pub mod staged;
+mod straight_line;
 pub mod turning;
 pub mod turning_bar;
 

@@ -5,6 +5,7 @@ use super::levels::Levels;
 use super::traces::{self, Group, Trace};
 use crate::reversal::Direction;
 use crate::reversal::simultaneous::Noise;
+use crate::reversal::straight_line;
 
 /// The readings by trace, and the repeats.
 pub struct Survey<'a> {
@@ -45,6 +46,15 @@ impl<'a> Survey<'a> {
     /// Number of channels.
     pub fn channels(&self) -> usize {
         self.x.len()
+    }
+
+    /// Over how much the first positions of the traces spread, and the last, mm.
+    pub fn spread_of_ends(&self) -> [f64; 2] {
+        let traces = self.x.iter().zip(&self.traces);
+        straight_line::spread_of_ends(traces.flat_map(|(x, traces)| {
+            let ends = |t: &Trace| [x[t.row(0)], x[t.row(t.len() - 1)]];
+            traces.iter().filter(|t| t.len() > 0).map(ends)
+        }))
     }
 
     /// The mean of a channel's values in each cell of a trace of a group; NaN in empty cells.

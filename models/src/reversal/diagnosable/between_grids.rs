@@ -11,14 +11,12 @@ use nalgebra::DVector;
 use super::Gathered;
 use super::arrangement::Arrangement;
 use super::sorting::Sorted;
-use super::state::Gauge;
 use crate::model::{Column, Place};
+use crate::reversal::straight_line;
 
 /// Distance of a channel's positions from the centres of the cells, in parts of a cell, root mean square, up to
 /// which the channels are read at the same places.
 const ALIKE: f64 = 0.05;
-/// Cells at an end of which a profile's value and slope there are taken.
-const AT_END: usize = 3;
 /// One trace: its channel, and for every cell how far from the centre its readings are, in parts of a cell, and
 /// the value made of them.
 pub(super) struct Lane {
@@ -49,7 +47,7 @@ pub(super) fn scatter(
             .map(|channel| weights[*channel].powi(2))
             .sum();
         profile /= whole;
-        let slope = looseness(&profile, &sorted.positions, gathered.ends);
+        let slope = straight_line::looseness(&profile, &sorted.positions, gathered.ends);
         if slope > 0.0 {
             let column = line_column(&sorted.places, &weights, middle, slope);
             all.push(column);
@@ -137,39 +135,6 @@ fn excess(rows: &[(usize, Vec<f64>)], closures: &[Vec<f64>]) -> f64 {
         excess += (sum.norm_squared() / sum.len() as f64 - expected) / whole;
     }
     excess / closures.len() as f64
-}
-
-/// How sure the straight line of a profile is, µm/mm, whose readings begin and end at different places:
-/// standard deviation. `profile`: by cell, at these centres; `ends`: over how much the traces' first positions
-/// spread, and their last, mm.
-///
-/// The line of a travel L that ends a length δ later turns by 6/L² (f δ + f′ δ²/2), f how far the profile is from
-/// its line there; where it ends is taken as anywhere within that spread with equal probability.
-fn looseness(profile: &DVector<f64>, centres: &[f64], ends: [f64; 2]) -> f64 {
-    let n = profile.len();
-    if n < 2 * AT_END {
-        return 0.0;
-    }
-    let line = Gauge::of(centres);
-    let (height, slope) = (line.height.dot(profile), line.slope.dot(profile));
-    let left = |k: usize| profile[k] - height - slope * (centres[k] - line.center);
-    let travel = centres[n - 1] - centres[0];
-    let turn = |from: usize, spread: f64, to: f64| {
-        let own: Vec<usize> = (from..from + AT_END).collect();
-        let count = own.len() as f64;
-        let middle = own.iter().map(|k| centres[*k]).sum::<f64>() / count;
-        let level = own.iter().map(|k| left(*k)).sum::<f64>() / count;
-        let moment: f64 = own.iter().map(|k| (centres[*k] - middle) * left(*k)).sum();
-        let width: f64 = own.iter().map(|k| (centres[*k] - middle).powi(2)).sum();
-        let steep = moment / width;
-        let value = level + steep * (to - middle);
-        6.0 / (travel * travel) * (value.abs() * spread + steep.abs() * spread * spread / 2.0)
-    };
-    let turns = [
-        turn(0, ends[0], centres[0]),
-        turn(n - AT_END, ends[1], centres[n - 1]),
-    ];
-    (turns.iter().map(|t| t * t).sum::<f64>() / 3.0).sqrt()
 }
 
 /// The change of all readings by one standard deviation of such a line; `weights`: of the channels.
@@ -292,32 +257,5 @@ mod tests {
     fn channels_that_are_read_at_the_same_places_share_their_forms() {
         // Definition.
         assert_eq!(variance(&lanes([0.3, 0.2], 0.01, 1), &closure()), 0.0);
-    }
-
-    /// A profile that is a straight line over its travel and bends beyond is not loose; one of t³ is, by what its line
-    /// over a longer travel is.
-    #[test]
-    fn a_line_is_as_loose_as_its_ends() {
-        let centres: Vec<f64> = (0..400).map(|k| 0.5 * f64::from(k)).collect();
-        let line = DVector::from_iterator(400, centres.iter().map(|x| 3.0 - 0.02 * x));
-        // Rounding.
-        assert!(looseness(&line, &centres, [1.0, 1.0]) < 1e-12);
-        let cubic = |x: f64| ((x - 100.0) / 100.0).powi(3);
-        let slope_to = |end: f64| {
-            let n = 20_000;
-            let (mut product, mut square) = (0.0, 0.0);
-            for k in 0..n {
-                let x = end * (f64::from(k) + 0.5) / f64::from(n);
-                let from_middle = x - 0.5 * end;
-                product += from_middle * cubic(x);
-                square += from_middle * from_middle;
-            }
-            product / square
-        };
-        let profile = DVector::from_iterator(400, centres.iter().map(|x| cubic(*x)));
-        let loose = looseness(&profile, &centres, [0.0, 1.0]);
-        let turned = (slope_to(200.5) - slope_to(199.5)).abs() / 3.0f64.sqrt();
-        // The value and slope at the end are those of its last three cells: 3 %.
-        assert!((loose / turned - 1.0).abs() < 0.03, "{loose} {turned}");
     }
 }

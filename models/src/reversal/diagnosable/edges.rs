@@ -6,6 +6,7 @@ use super::filling;
 use super::gathering::{Traces, most_cells};
 use super::sorting::{TraceKey, position_key};
 use crate::reversal::designs::DesignReading;
+use crate::reversal::straight_line;
 
 /// Leaves out traces so short that the others together lose more readings by them than they bring;
 /// of every channel the longest stays.
@@ -60,14 +61,11 @@ fn common<'a>(
 
 /// Over how much the first positions of the traces spread, and the last, mm.
 pub(super) fn spread_of_ends(traces: &Traces, readings: &[DesignReading]) -> [f64; 2] {
-    let spread = |end: fn(&Vec<usize>) -> Option<&usize>| {
-        let at = traces.values().filter_map(end).map(|k| readings[*k].x);
-        let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-            (low.min(x), high.max(x))
-        });
-        (high - low).max(0.0)
-    };
-    [spread(|rows| rows.first()), spread(|rows| rows.last())]
+    let ends = traces.values().filter_map(|rows| {
+        let (first, last) = rows.first().zip(rows.last())?;
+        Some([first, last].map(|k| readings[*k].x))
+    });
+    straight_line::spread_of_ends(ends)
 }
 
 /// Rows, in order of position, between two positions.

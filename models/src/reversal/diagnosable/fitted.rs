@@ -4,12 +4,13 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Linearised;
 use super::arrangement::Seat;
-use super::state::{Gauge, Smoothing};
+use super::state::Smoothing;
 use crate::model::{
     Column, Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record,
 };
 use crate::reversal::designs::{Determined, SLOPES, Zero};
 use crate::reversal::effects;
+use crate::reversal::straight_line::StraightLine;
 
 impl FittedModel for Linearised {
     fn name(&self) -> &'static str {
@@ -51,7 +52,7 @@ impl FittedModel for Linearised {
                 columns[(k, offsets)] = self.seat(place).theta[0] * (place.x - mean_x);
             }
         }
-        let line = Gauge::of(&self.positions).slope;
+        let line = StraightLine::of(&self.positions).slope;
         let withheld = withheld.into_iter().map(|k| (k, line.clone())).collect();
         Freedom {
             columns,
@@ -115,7 +116,7 @@ impl FittedModel for Linearised {
         let closing: Vec<f64> = (self.positions.iter())
             .map(|x| (x - mean_x) / sxx)
             .collect();
-        let gauge = Gauge::of(&self.positions);
+        let gauge = StraightLine::of(&self.positions);
         let of_slope = |name: &str, sign: fn(&Seat) -> f64, slope: &[f64]| {
             self.slope_quantity(name, slope, |c| sign(&self.present()[c]) / 4.0)
         };
@@ -278,7 +279,7 @@ impl Linearised {
     fn slopes_of_design(&self) -> Vec<Quantity> {
         let slopes = &self.arrangement.determined().slopes;
         let weights = slopes.weights();
-        let gauge = Gauge::of(&self.positions);
+        let gauge = StraightLine::of(&self.positions);
         let mut names: Vec<(usize, String)> =
             Determined::names(slopes).into_iter().enumerate().collect();
         // Those of the slide first.

@@ -2,8 +2,8 @@
 
 use nalgebra::DVector;
 
-use super::super::cells::cell_width;
 use super::super::smooth_profile::{SmoothProfile, Spot};
+use super::super::straight_line::StraightLine;
 use super::Linearised;
 
 /// How the forms of a fitted state are smoothed.
@@ -29,7 +29,7 @@ impl Linearised {
     pub(super) fn fit(&mut self, smoothing: Smoothing) {
         let means = self.channel_means(&self.record.observed, None);
         let n = self.positions.len();
-        let gauge = Gauge::of(&self.positions);
+        let gauge = StraightLine::of(&self.positions);
         let mut residual: Vec<Option<DVector<f64>>> = vec![None; means.len()];
         for (k, mean) in means.iter().enumerate() {
             let Some(mean) = mean else { continue };
@@ -134,32 +134,5 @@ impl Linearised {
             high = high.max(value);
         }
         (high - low).max(f64::MIN_POSITIVE)
-    }
-}
-
-/// The straight line of a profile, each position weighted by the width of its cell, as the fits have it.
-pub(super) struct Gauge {
-    /// Where the height is taken, mm.
-    pub(super) center: f64,
-    /// Weights of the height.
-    pub(super) height: DVector<f64>,
-    /// Weights of the slope, 1/mm.
-    pub(super) slope: DVector<f64>,
-}
-
-impl Gauge {
-    pub(super) fn of(positions: &[f64]) -> Self {
-        let x = DVector::from_column_slice(positions);
-        let widths = (0..x.len()).map(|k| cell_width(positions, k));
-        let widths = DVector::from_iterator(x.len(), widths);
-        let height = &widths / widths.sum();
-        let center = height.dot(&x);
-        let turn = height.component_mul(&x.add_scalar(-center));
-        let spread = turn.dot(&x.add_scalar(-center));
-        Self {
-            center,
-            slope: turn / spread,
-            height,
-        }
     }
 }

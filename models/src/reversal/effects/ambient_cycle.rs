@@ -6,8 +6,8 @@
 
 use nalgebra::DMatrix;
 
-use super::Linearised;
 use super::indicators::{ALL, Indicators};
+use super::{Linearised, rounded};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Parameter, Shape};
 
 /// See the head of the file. Variants: the indicators.
@@ -99,7 +99,7 @@ impl Effect<Linearised> for AmbientCycle {
 
     fn variant_name(&self, model: &Linearised, shape: &Shape) -> Option<String> {
         let cycles = shape.values.first()?;
-        Some(format!("period {:.4} s", model.duration() / cycles))
+        Some(format!("period {} s", rounded(model.duration() / cycles)))
     }
 
     fn estimates(

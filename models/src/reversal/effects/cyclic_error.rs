@@ -10,7 +10,7 @@
 use nalgebra::DMatrix;
 
 use super::indicators::{ALL, Indicators};
-use super::{Linearised, part_of_travel};
+use super::{Linearised, part_of_travel, rounded};
 use crate::model::{About, Column, Effect, Estimate, FittedModel, Link, Parameter, Shape};
 use crate::reversal::designs::angle_name;
 use crate::reversal::diagnosable::Arrangement;
@@ -209,8 +209,8 @@ impl Effect<Linearised> for CyclicError {
                 Some(angle) => format!(", spindle at {}°", angle_name(*angle)),
             };
             return Some(format!(
-                "period {:.4} mm of the travel{at}",
-                model.travel() / cycles
+                "period {} mm of the travel{at}",
+                rounded(model.travel() / cycles)
             ));
         }
         let of = match shape.variant {
@@ -218,8 +218,8 @@ impl Effect<Linearised> for CyclicError {
             one => format!("{} indicator's reading", self.indicators.name(one - 1)),
         };
         Some(format!(
-            "period {:.4} µm of the {of}",
-            model.reading_span() / cycles
+            "period {} µm of the {of}",
+            rounded(model.reading_span() / cycles)
         ))
     }
 

@@ -130,6 +130,13 @@ fn part_of_travel(model: &Linearised, x: f64) -> f64 {
     2.0 * (x - first) / model.travel() - 1.0
 }
 
+/// A number to four significant digits, for the words of a variant: its uncertainty is told of the parameter that it is
+/// made of.
+fn rounded(value: f64) -> String {
+    let decimals = (3.0 - value.abs().log10().floor()).clamp(0.0, 12.0);
+    format!("{value:.*}", decimals as usize)
+}
+
 /// Standard uncertainty of a weighted sum of parameters.
 fn spread(covariance: &DMatrix<f64>, weights: &[(usize, f64)]) -> f64 {
     let at = |i: usize, j: usize| covariance.get((i, j)).map_or(f64::NAN, |v| *v);

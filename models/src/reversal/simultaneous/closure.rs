@@ -1,21 +1,30 @@
 //! What the one redundancy of four channels says after a fit.
 
 use errsep_solvers::structured::StructuredFit;
+use nalgebra::DVector;
 
+use super::gauge::range;
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
-use super::solution::Closure;
-use crate::reversal::channel_noise::scatter::Scatter;
+use super::solution::{Closure, Simultaneous};
+use super::unknowns::Form;
 use crate::reversal::staged::Value;
+use crate::reversal::straight_line;
+use crate::units::mm_from_um;
+
+/// Places at which forms are looked at to tell their straight line.
+const PLACES: usize = 200;
 
 /// The closure: the contrast the convention holds at zero, if it were released; and the closure
-/// profile (R1A + R1B − R2A − R2B)/4 of the residuals.
+/// profile (R1A + R1B − R2A − R2B)/4 of the residuals. `ends`: over how much the traces' first positions
+/// spread, and their last, mm.
 pub fn of(
     problem: &Reversal,
     result: &StructuredFit,
     channels: &[ChannelReadings],
     residuals: &[Vec<f64>],
-    scatter: &Scatter,
+    solution: &Simultaneous,
+    ends: [f64; 2],
 ) -> Option<Closure> {
     let index = problem.unknowns.closure_index()?;
     let released = result.released(problem, index);
@@ -24,8 +33,9 @@ pub fn of(
     }
     let slope = released.map(|(value, covariance)| {
         let own = covariance.variance(&[], &[(index, 1.0)]);
-        let scatter = scatter.released(value * value / own);
+        let scatter = solution.scatter.released(value * value / own);
         let (std, freedom) = scatter.spread(&covariance, &[], &[(index, 1.0)]);
+        let std = std.hypot(looseness(problem, solution, channels, ends));
         (Value { value, std }, freedom)
     });
     let (x, profile) = profile(problem, channels, residuals);
@@ -37,6 +47,39 @@ pub fn of(
         profile,
         rms,
     })
+}
+
+/// How far the contrast hangs on where the traces begin and end, rad: the forms have no straight line over the
+/// travel of all of them together, and another one over that of each.
+fn looseness(
+    problem: &Reversal,
+    solution: &Simultaneous,
+    channels: &[ChannelReadings],
+    ends: [f64; 2],
+) -> f64 {
+    let unknowns = &problem.unknowns;
+    let Some(contrast) = unknowns.closure.filter(|_| ends != [0.0; 2]) else {
+        return 0.0;
+    };
+    let mut weights = vec![0.0; unknowns.forms.len()];
+    for own in channels {
+        let weight = contrast.sign(own.channel) / channels.len() as f64;
+        weights[unknowns.side_of(own.channel)] += weight;
+        if let Some(slide) = unknowns.place(Form::Slide) {
+            weights[slide] += weight * own.channel.indicator_sign();
+        }
+    }
+    let (low, high) = range(channels);
+    let step = (high - low) / PLACES as f64;
+    let places: Vec<f64> = (0..PLACES).map(|k| low + (k as f64 + 0.5) * step).collect();
+    let of = |x: &f64| -> f64 {
+        let forms = weights.iter().enumerate();
+        forms
+            .map(|(form, w)| w * solution.value_of(form, *x).0)
+            .sum()
+    };
+    let profile = DVector::from_iterator(PLACES, places.iter().map(of));
+    mm_from_um(straight_line::looseness(&profile, &places, ends))
 }
 
 /// Point by point where the four traces share their positions, otherwise by means over cells.

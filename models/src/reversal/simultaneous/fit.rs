@@ -113,7 +113,8 @@ fn solve(
         learn_from_repeats(&mut solution, &problem, survey, &settled, &sigmas)?;
     }
     let (fit, residuals) = (&settled.fit, &settled.residuals);
-    solution.closure = closure::of(&problem, fit, channels, residuals, &solution.scatter);
+    let ends = survey.spread_of_ends();
+    solution.closure = closure::of(&problem, fit, channels, residuals, &solution, ends);
     if problem.joined.is_some() {
         solution.effects = told::effects(&solution, &problem)?;
         solution.effect_changes = told::changes(&solution, &problem)?;

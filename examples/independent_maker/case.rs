@@ -34,6 +34,8 @@ pub struct Truth {
     pub visible: f64,
     /// Its size with its unit, where a catalogue may state it in the same sense.
     pub size: Option<(f64, &'static str)>,
+    /// What it changes by itself in each reading of each trace, µm.
+    pub change: Vec<Vec<f64>>,
 }
 
 /// Readings with what is known of them.
@@ -96,6 +98,7 @@ pub fn made(order: &Order) -> Case {
     }
     let mut truths = Vec::new();
     let mut sources: Vec<Disturbance> = Vec::new();
+    let mut alone: Vec<Vec<Disturbance>> = Vec::new();
     for (source, recipe, wanted) in &recipes {
         let size = if source.absorbed {
             1.0
@@ -103,11 +106,13 @@ pub fn made(order: &Order) -> Case {
             sized(recipe, wanted * noise.sigma, |size| shows(recipe, size))
         };
         sources.extend((recipe.make)(size));
+        alone.push((recipe.make)(size));
         truths.push(Truth {
             name: source.name,
             what: recipe.what,
             visible: shows(recipe, size),
             size: recipe.size.as_ref().map(|(of, unit)| (of(size), *unit)),
+            change: Vec::new(),
         });
     }
     let schedule = order.design.of(&shared, &mut chance);
@@ -116,6 +121,9 @@ pub fn made(order: &Order) -> Case {
     let clean = rig.readings(&schedule, &sources);
     let written = noise.upon(&clean, &schedule, &mut chance);
     let change = difference(&clean, &undisturbed);
+    for (truth, own) in truths.iter_mut().zip(&alone) {
+        truth.change = difference(&rig.readings(&schedule, own), &undisturbed);
+    }
     Case {
         observations: observed(&schedule, &written),
         undisturbed: observed(&schedule, &undisturbed),

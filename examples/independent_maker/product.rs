@@ -9,7 +9,7 @@ use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::{Channel, Observations};
 use serde_json::Value;
 
-use crate::case::Case;
+use crate::case::{Case, Truth};
 use crate::design::Schedule;
 use crate::rig::Moment;
 
@@ -195,11 +195,13 @@ pub fn catalogue(readings: &Observations) -> Result<Vec<String>, String> {
         .collect())
 }
 
-/// Standard deviations between the effect of a case, which is so many standard deviations from nothing, and the
+/// Standard deviations between each effect of a case, which are so many standard deviations from nothing, and the
 /// effect most like it, after the product's own certificate for the law of the case's noise; none where the
 /// certificate gives none.
-pub fn apart(case: &Case, seen: f64) -> Option<f64> {
-    let model = model(&case.undisturbed, case.thickness).ok()?;
+pub fn apart(case: &Case, seen: &[f64]) -> Vec<Option<f64>> {
+    let Ok(model) = model(&case.undisturbed, case.thickness) else {
+        return vec![None; seen.len()];
+    };
     let noise = &case.noise;
     let variance = noise.sigma * noise.sigma;
     let law = NoiseLaw::stated(Components {
@@ -213,9 +215,11 @@ pub fn apart(case: &Case, seen: f64) -> Option<f64> {
         ..Options::default()
     };
     let rows = certificate(&model, model.effects(), &law, &options);
-    let effect = case.truths.first()?.name;
-    let row = rows.into_iter().find(|row| row.effect == effect)?;
-    // The certificate's visible root mean square, in units of the noise, belongs to the detectable amplitude.
-    let length = row.visible_rms? / law.sigma() * (model.places().len() as f64).sqrt();
-    Some(4.65 * seen / (length * row.identifiable? / row.detectable?))
+    let of = |(truth, seen): (&Truth, &f64)| {
+        let row = rows.iter().find(|row| row.effect == truth.name)?;
+        // The certificate's visible root mean square, in units of the noise, belongs to the detectable amplitude.
+        let length = row.visible_rms? / law.sigma() * (model.places().len() as f64).sqrt();
+        Some(4.65 * seen / (length * row.identifiable? / row.detectable?))
+    };
+    case.truths.iter().zip(seen).map(of).collect()
 }

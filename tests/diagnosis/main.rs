@@ -12,6 +12,7 @@ mod models;
 mod noise;
 #[path = "../other_models/mod.rs"]
 mod other_models;
+mod pairs;
 #[path = "../plate/mod.rs"]
 mod plate;
 mod plates;

@@ -351,37 +351,62 @@ pub fn measured(
     seed: u64,
     positions: usize,
 ) -> Option<Observations> {
+    together(&[(effect, way, visible)], seed, positions)
+}
+
+/// Readings with several effects, what each changes added to what the others do; visible parts as in [`measured`].
+pub fn together(
+    effects: &[(&str, usize, f64)],
+    seed: u64,
+    positions: usize,
+) -> Option<Observations> {
     // An indicator with periods goes on where its stylus goes on: its span is wide.
-    let tilt = if effect == "cyclic-error" {
+    let tilt = if effects.iter().any(|e| e.0 == "cyclic-error") {
         1.5e-4
     } else {
         1.5e-5
     };
     let mut world = World::random(positions, seed, tilt);
-    if ROUGH.contains(&(effect, way)) {
+    if effects
+        .iter()
+        .any(|(effect, way, _)| ROUGH.contains(&(effect, *way)))
+    {
         world = world.roughened(seed);
     }
     let bare = world.run(|w, n| w.plain(n));
     let mut readings = bare.clone();
-    if visible > 0.0 {
-        let target = visible * world.sigma();
-        let mut size = 0.02;
-        for _ in 0..25 {
-            let mut shown = made(effect, way, size, seed)?;
-            readings = world.run(&mut shown);
-            let left = world.unabsorbed(&bare, &readings);
-            if (left / target - 1.0).abs() < 0.05 {
-                break;
-            }
-            size *= (target / left).clamp(0.2, 5.0);
-        }
-        let left = world.unabsorbed(&bare, &readings);
-        if (left / target - 1.0).abs() > 0.1 {
-            return None;
+    for (effect, way, visible) in effects.iter().filter(|e| e.2 > 0.0) {
+        let shown = sized(&mut world, &bare, (effect, *way, *visible), seed)?;
+        let changed = shown.readings.iter().zip(&bare.readings);
+        for (reading, (with, without)) in readings.readings.iter_mut().zip(changed) {
+            reading.value += with.value - without.value;
         }
     }
     world.noise(seed + 77, &mut readings);
     Some(readings)
+}
+
+/// Readings without noise with one effect, of such a size that its visible part is so many times the noise.
+fn sized(
+    world: &mut World,
+    bare: &Observations,
+    (effect, way, visible): (&str, usize, f64),
+    seed: u64,
+) -> Option<Observations> {
+    let target = visible * world.sigma();
+    let mut size = 0.02;
+    let mut readings = bare.clone();
+    for _ in 0..25 {
+        let mut shown = made(effect, way, size, seed)?;
+        readings = world.run(&mut shown);
+        let left = world.unabsorbed(bare, &readings);
+        if (left / target - 1.0).abs() < 0.05 {
+            break;
+        }
+        size *= (target / left).clamp(0.2, 5.0);
+    }
+    let left = world.unabsorbed(bare, &readings);
+    ((left / target - 1.0).abs() <= 0.1).then_some(readings)
 }
 
 /// Only noise.

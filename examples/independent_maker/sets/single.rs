@@ -136,7 +136,7 @@ fn one(
     let mut separation = String::new();
     if arguments.certificate && class == Class::Listed {
         let seen = Seen::new(&case.schedule, &case.noise);
-        let apart = seen.and_then(|seen| apart(&case, seen.of(&case.change)));
+        let apart = seen.and_then(|seen| apart(&case, &[seen.of(&case.change)])[0]);
         row.separable = Some(apart.is_some_and(|sd| sd >= APART));
         separation = apart.map_or(", not to be told apart".to_owned(), |sd| {
             format!(", {sd:.1} sd apart")

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use crate::diagnosis::attribution::confidence::{Answer, confidence_set, possible, without};
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder, finer};
+use crate::diagnosis::attribution::fewer::in_fewest;
 use crate::diagnosis::levels::{
     BETTER, EARNED, FAR, FREELY, HOPELESS, IN_REACH, MOST_CAUSES, NO_BETTER, PAIR_REACH, PAIRS,
     POLISHED, REFINED, STALLED,
@@ -22,7 +23,7 @@ pub(in crate::diagnosis) fn attribute(
     first: &Remainder,
     begun: &[Cause],
 ) -> Option<Answer> {
-    let strongest_alone = strongest(context, readings, first, &[]);
+    let strongest_alone = strongest(context, readings, first, (&[], begun));
     if let [only] = begun {
         let start = finer(&only.shape);
         let (cause, t) = context.refine(context.model, readings, only.effect, &start, &[]);
@@ -38,6 +39,7 @@ pub(in crate::diagnosis) fn attribute(
         context,
         readings,
         first,
+        begun,
         partial: None,
         stalled: false,
     };
@@ -45,6 +47,7 @@ pub(in crate::diagnosis) fn attribute(
         .forward(strongest_alone, 1..=FREELY)
         .or_else(|| search.by_pairs())
         .or_else(|| search.forward(None, FREELY + 1..=MOST_CAUSES))
+        .map(|answer| in_fewest(context, readings, answer))
         .or(search.partial)
 }
 
@@ -53,6 +56,7 @@ struct Search<'s> {
     context: &'s Context<'s>,
     readings: &'s DVector<f64>,
     first: &'s Remainder,
+    begun: &'s [Cause],
     partial: Option<Answer>,
     /// Whether the last cause left most of what was there.
     stalled: bool,
@@ -77,14 +81,14 @@ impl Search<'_> {
             let here = partial.map_or(self.first, |answer| &answer.remainder);
             let next = match size {
                 1 => alone.take(),
-                _ => strongest(context, readings, here, &causes),
+                _ => strongest(context, readings, here, (&causes, self.begun)),
             };
             let Some((next, _)) = next else {
                 break;
             };
             causes.push(next);
             if size > 1 {
-                polish(context, readings, &mut causes);
+                polish(context, readings, &mut causes, self.begun);
             }
             let answer = confidence_set(context, readings, &causes);
             if answer.complete {
@@ -119,7 +123,7 @@ impl Search<'_> {
             answer.remainder.residual.norm_squared()
         });
         let least = judged + HOPELESS;
-        pairs(context, readings, self.first)
+        pairs(context, readings, self.first, self.begun)
             .into_iter()
             .filter(|causes| {
                 let known = partial.is_some_and(|a| same(&a.causes, causes));
@@ -170,12 +174,12 @@ pub(in crate::diagnosis) fn roughly(
     let mut left: Option<Remainder> = None;
     for _ in 0..FREELY {
         let here = left.as_ref().unwrap_or(first);
-        let Some((next, _)) = strongest(context, readings, here, &causes) else {
+        let Some((next, _)) = strongest(context, readings, here, (&causes, &[])) else {
             break;
         };
         causes.push(next);
         if causes.len() > 1 {
-            polish(context, readings, &mut causes);
+            polish(context, readings, &mut causes, &[]);
         }
         causes = context.relinearised(readings, &causes, f64::INFINITY);
         let remainder = context.judged(readings, &causes);
@@ -189,7 +193,12 @@ pub(in crate::diagnosis) fn roughly(
 
 /// Pairs of effects of which each stands out beside the other though neither need do so alone, the
 /// best fits first.
-fn pairs(context: &Context<'_>, readings: &DVector<f64>, first: &Remainder) -> Vec<Vec<Cause>> {
+fn pairs(
+    context: &Context<'_>,
+    readings: &DVector<f64>,
+    first: &Remainder,
+    begun: &[Cause],
+) -> Vec<Vec<Cause>> {
     let beside_each = |effect: usize| {
         let mut found: Vec<(f64, Vec<Cause>)> = Vec::new();
         let Some(start) = context.start(first, effect) else {
@@ -218,7 +227,7 @@ fn pairs(context: &Context<'_>, readings: &DVector<f64>, first: &Remainder) -> V
     found.retain(|(misfit, _)| *misfit <= reach);
     found.truncate(PAIRS);
     let polished = found.into_par_iter().map(|(_, mut pair)| {
-        polish(context, readings, &mut pair);
+        polish(context, readings, &mut pair, begun);
         (context.misfit(readings, &pair), pair)
     });
     let mut polished: Vec<(f64, Vec<Cause>)> = polished.collect();
@@ -242,23 +251,25 @@ fn same(one: &[Cause], other: &[Cause]) -> bool {
     one.len() == other.len() && one.iter().all(holds)
 }
 
-/// The refined effect of greatest evidence beside the causes, and its statistic.
+/// The refined effect of greatest evidence beside the causes, and its statistic; sought from where those begun with
+/// stand too.
 fn strongest(
     context: &Context<'_>,
     readings: &DVector<f64>,
     remainder: &Remainder,
-    causes: &[Cause],
+    (causes, begun): (&[Cause], &[Cause]),
 ) -> Option<(Cause, f64)> {
-    let refined = standing_out(context, readings, remainder, causes);
+    let refined = standing_out(context, readings, remainder, (causes, begun));
     greatest(context, readings, causes, refined, 0.0)
 }
 
-/// The effects that stand out most beside the causes, refined.
+/// The effects that stand out most beside the causes, refined, and those that were begun with: from the best entry of
+/// the family, and from where they stood. What follows the readings may find its way from there alone.
 fn standing_out(
     context: &Context<'_>,
     readings: &DVector<f64>,
     remainder: &Remainder,
-    causes: &[Cause],
+    (causes, begun): (&[Cause], &[Cause]),
 ) -> Vec<(Cause, f64)> {
     let mut ranked: Vec<(f64, usize)> = (0..context.catalogue.len())
         .filter(|effect| causes.iter().all(|c| c.effect != *effect))
@@ -269,12 +280,20 @@ fn standing_out(
         })
         .collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-    ranked.truncate(REFINED);
+    let known = |effect: usize| begun.iter().find(|cause| cause.effect == effect);
+    let mut refined = 0..;
+    ranked.retain(|(_, effect)| refined.next() < Some(REFINED) || known(*effect).is_some());
     ranked
         .into_par_iter()
         .filter_map(|(_, effect)| {
-            let start = context.start(remainder, effect)?;
-            Some(context.refine(context.model, readings, effect, start, causes))
+            let refine =
+                |start: &Shape| context.refine(context.model, readings, effect, start, causes);
+            let (found, again) = rayon::join(
+                || context.start(remainder, effect).map(refine),
+                || known(effect).map(|cause| refine(&finer(&cause.shape))),
+            );
+            let both = found.into_iter().chain(again);
+            both.max_by(|a, b| paid(context, a).total_cmp(&paid(context, b)))
         })
         .collect()
 }
@@ -311,7 +330,7 @@ fn paid(context: &Context<'_>, (cause, t): &(Cause, f64)) -> f64 {
 
 /// Refines each cause beside the others, and swaps it for any effect that explains more, itself
 /// begun elsewhere among them; not again where the others leave what they left before.
-fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause]) {
+fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause], begun: &[Cause]) {
     let mut tried: Vec<f64> = vec![f64::INFINITY; causes.len()];
     for _ in 0..POLISHED {
         let mut changed = false;
@@ -328,7 +347,7 @@ fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause]) 
                 || {
                     again.then(|| {
                         let remainder = context.remainder(readings, &others);
-                        standing_out(context, readings, &remainder, &others)
+                        standing_out(context, readings, &remainder, (&others, begun))
                     })
                 },
             );

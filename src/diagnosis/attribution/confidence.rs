@@ -11,14 +11,14 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder, raw_signatures};
+use crate::diagnosis::attribution::leading::led;
 use crate::diagnosis::attribution::limits::is_beyond_limit;
 use crate::diagnosis::attribution::outweighed::{Member, drop_outweighed};
 use crate::diagnosis::attribution::shrink::held_out_square;
 use crate::diagnosis::attribution::sizes::{Sizes, first_amplitude};
 use crate::diagnosis::detection::space::{Space, orthonormal};
 use crate::diagnosis::levels::{
-    BENT, EARNED, EQUAL_EVIDENCE, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, STANDS, WEIGHTY,
-    chi_squared_of_two,
+    BENT, EARNED, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, STANDS, WEIGHTY, chi_squared_of_two,
 };
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
 
@@ -60,13 +60,7 @@ pub(in crate::diagnosis) fn confidence_set(
             members = alternatives(context, readings, &best, k, BENT);
             members.retain(|m| m.left.residual.norm_squared() < least);
         }
-        let mut group: Vec<Alternative> = members
-            .iter()
-            .map(|m| Alternative {
-                cause: m.causes[k].clone(),
-                evidence: m.evidence,
-            })
-            .collect();
+        let mut group = group_of(&members, k);
         if let Some(first) = members.into_iter().next() {
             best = first.causes;
             remainder = first.left;
@@ -79,13 +73,44 @@ pub(in crate::diagnosis) fn confidence_set(
         }
         groups.push(group);
     }
-    led_by_evidence(context, readings, &mut groups, &mut best, &mut remainder);
-    Answer {
-        complete: context.adequate(&best, &remainder) && stand_together(context, readings, &best),
+    let answer = Answer {
         causes: best,
         groups,
         remainder,
-    }
+        complete: false,
+    };
+    led(context, readings, answer)
+}
+
+/// The effects that pass in the place of each of some causes, itself first.
+pub(in crate::diagnosis) fn groups_beside(
+    context: &Context<'_>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+) -> Vec<Vec<Alternative>> {
+    let beside = |k: usize| {
+        let members = alternatives(context, readings, causes, k, HOPELESS_PART);
+        let mut group = group_of(&members, k);
+        if group.iter().all(|a| a.cause.effect != causes[k].effect) {
+            let misfit = context.misfit(readings, causes);
+            group.push(Alternative {
+                cause: causes[k].clone(),
+                evidence: evidence(context, readings, causes, k, misfit),
+            });
+        }
+        group.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        group.sort_by_key(|a| a.cause.effect != causes[k].effect);
+        group
+    };
+    (0..causes.len()).map(beside).collect()
+}
+
+fn group_of(members: &[Member], k: usize) -> Vec<Alternative> {
+    let of = |m: &Member| Alternative {
+        cause: m.causes[k].clone(),
+        evidence: m.evidence,
+    };
+    members.iter().map(of).collect()
 }
 
 /// Whether each of some causes is needed beside the others, is no other effect at its limit, and has a size
@@ -155,10 +180,9 @@ fn weighty(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) -> 
 /// Whether each of several causes makes the prediction of held-out repeats better; a cause that
 /// happened once cannot be judged so.
 fn predicts(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) -> bool {
-    let noise = context.law.sigma().powi(2);
     let square = |causes: &[Cause]| {
         let signatures = raw_signatures(context, causes);
-        held_out_square(context.model, readings, &signatures, noise)
+        held_out_square(context.model, readings, &signatures)
     };
     let Some(with) = square(causes) else {
         return true;
@@ -263,46 +287,6 @@ fn alternatives(
         })
     });
     members
-}
-
-/// Brings the greatest evidence of each group to its front and makes it the cause, where these causes
-/// pass together too; else the cause that was kept goes first.
-fn led_by_evidence(
-    context: &Context<'_>,
-    readings: &DVector<f64>,
-    groups: &mut [Vec<Alternative>],
-    best: &mut Vec<Cause>,
-    remainder: &mut Remainder,
-) {
-    for group in groups.iter_mut() {
-        let rounded = |a: &Alternative| (a.evidence / EQUAL_EVIDENCE).round();
-        group.sort_by(|a, b| rounded(b).total_cmp(&rounded(a)));
-    }
-    let leaders: Vec<Cause> = best
-        .iter()
-        .zip(groups.iter())
-        .map(|(kept, group)| match group.first() {
-            Some(first) if first.cause.effect != kept.effect => first.cause.clone(),
-            _ => kept.clone(),
-        })
-        .collect();
-    let of = |causes: &[Cause]| -> Vec<usize> { causes.iter().map(|c| c.effect).collect() };
-    let (led, kept) = (of(&leaders), of(best));
-    if led == kept {
-        return;
-    }
-    let distinct = led.iter().enumerate().all(|(k, e)| !led[..k].contains(e));
-    if distinct {
-        let trial = context.relinearised(readings, &leaders, f64::INFINITY);
-        let left = context.judged(readings, &trial);
-        if context.adequate(&trial, &left) && context.amplitudes(readings, &trial).is_some() {
-            (*best, *remainder) = (trial, left);
-            return;
-        }
-    }
-    for (group, kept) in groups.iter_mut().zip(best.iter()) {
-        group.sort_by_key(|a| a.cause.effect != kept.effect);
-    }
 }
 
 /// Logarithm of the evidence for cause `k` beside the others against nothing in its place, by the

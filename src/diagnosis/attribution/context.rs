@@ -17,6 +17,8 @@ use crate::diagnosis::detection::space::{Space, inner_products, orthonormal};
 use crate::diagnosis::levels::{ADEQUATE, FAR, SEPARABLE, SLACK, SUSPECT};
 use crate::diagnosis::noise::law::NoiseLaw;
 
+/// A column of which less than this part, squared, is left beside the others is a sum of them and rounding.
+const ROUNDING: f64 = 1e-10;
 /// Vectors that signatures are multiplied with at once.
 const WIDTH: usize = 8;
 
@@ -325,14 +327,21 @@ impl<'a> Context<'a> {
             .map_or(1.0, |f| self.null.family(f, self.best(remainder, f).0))
     }
 
-    /// Amplitudes of causes fitted together, with their covariance.
+    /// Amplitudes of causes fitted together, with their covariance; nothing where one of the signatures is a sum of
+    /// the others.
     pub fn amplitudes(
         &self,
         readings: &DVector<f64>,
         causes: &[Cause],
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let stacked = stack(causes, self.space.readings());
-        let covariance = stacked.tr_mul(&stacked).cholesky()?.inverse();
+        let gram = stacked.tr_mul(&stacked);
+        let factor = gram.clone().cholesky()?;
+        let pivots = factor.l_dirty().diagonal().map(|pivot| pivot * pivot);
+        if (pivots.iter().zip(gram.diagonal().iter())).any(|(pivot, own)| *pivot < ROUNDING * own) {
+            return None;
+        }
+        let covariance = factor.inverse();
         let score = stacked.tr_mul(&self.residual(readings));
         Some((&covariance * score, covariance))
     }

@@ -10,6 +10,8 @@ pub(super) mod confidence;
 pub(super) mod context;
 pub(super) mod doubt;
 pub(super) mod examined;
+mod fewer;
+mod leading;
 pub(super) mod limits;
 pub(super) mod mixing;
 pub(super) mod outweighed;

@@ -169,19 +169,19 @@ impl GapMeter {
     }
 }
 
-/// Mean square of what a model with effects misses of held-out repeats; nothing where they are
-/// too few, or where an effect does not show in every half.
+/// Mean square of what a model with effects misses of held-out readings, their noise included; nothing where the
+/// repeats are too few, or where an effect does not show in every half. (Products of different repeats would be free
+/// of the noise, but below zero where what is missed turns its sign from repeat to repeat.)
 pub(in crate::diagnosis) fn held_out_square(
     model: &AnyModel,
     readings: &DVector<f64>,
     signatures: &DMatrix<f64>,
-    noise: f64,
 ) -> Option<f64> {
     let mut sum = 0.0;
     let splits = splits(model)?;
     for split in &splits {
         let fit = split.fit(signatures).filter(|fit| fit.shows(signatures))?;
-        sum += split.square(readings, &fit.predict(readings), noise);
+        sum += split.mean_square(readings, &fit.predict(readings));
     }
     Some(sum / splits.len() as f64)
 }
@@ -326,6 +326,16 @@ impl Split {
         let of =
             |group: &Vec<f64>| group.iter().map(|p| value(*p)).sum::<f64>() / group.len() as f64;
         predicted.iter().map(of).sum::<f64>() / predicted.len() as f64
+    }
+
+    /// Mean square of what the predictions miss, with the noise of the held-out readings.
+    fn mean_square(&self, readings: &DVector<f64>, predicted: &[Vec<f64>]) -> f64 {
+        let of = |(group, predicted): (&Vec<(usize, usize)>, &Vec<f64>)| {
+            let missed = group.iter().zip(predicted);
+            let squares = missed.map(|((row, _), p)| (readings[*row] - p).powi(2));
+            squares.sum::<f64>() / group.len() as f64
+        };
+        self.groups.iter().zip(predicted).map(of).sum::<f64>() / self.groups.len() as f64
     }
 
     /// Mean square of what the predictions miss, without the noise of the held-out readings: by

@@ -1,0 +1,97 @@
+//! Which members of the groups are the causes: of greatest evidence those that stand together.
+
+use nalgebra::DVector;
+
+use crate::diagnosis::attribution::confidence::{
+    Alternative, Answer, groups_beside, stand_together,
+};
+use crate::diagnosis::attribution::context::{Cause, Context};
+use crate::diagnosis::levels::{EQUAL_EVIDENCE, TOGETHER};
+
+/// Brings the greatest evidence of each group to its front and makes it the cause, where these causes pass
+/// together too; else the cause that was kept goes first. Where those leave nothing that stands out but do not
+/// stand together, other members of the groups may.
+pub(in crate::diagnosis) fn led(
+    context: &Context<'_>,
+    readings: &DVector<f64>,
+    mut answer: Answer,
+) -> Answer {
+    for group in &mut answer.groups {
+        let rounded = |a: &Alternative| (a.evidence / EQUAL_EVIDENCE).round();
+        group.sort_by(|a, b| rounded(b).total_cmp(&rounded(a)));
+    }
+    let leaders: Vec<Cause> = (answer.causes.iter().zip(&answer.groups))
+        .map(|(kept, group)| match group.first() {
+            Some(first) if first.cause.effect != kept.effect => first.cause.clone(),
+            _ => kept.clone(),
+        })
+        .collect();
+    let kept = effects_of(&answer.causes);
+    let led = effects_of(&leaders);
+    if led != kept && distinct(&led) {
+        let trial = context.relinearised(readings, &leaders, f64::INFINITY);
+        let left = context.judged(readings, &trial);
+        if context.adequate(&trial, &left) && context.amplitudes(readings, &trial).is_some() {
+            (answer.causes, answer.remainder) = (trial, left);
+        }
+    }
+    for (group, cause) in answer.groups.iter_mut().zip(&answer.causes) {
+        group.sort_by_key(|a| a.cause.effect != cause.effect);
+    }
+    if !context.adequate(&answer.causes, &answer.remainder) {
+        return answer;
+    }
+    answer.complete = stand_together(context, readings, &answer.causes);
+    if answer.complete {
+        return answer;
+    }
+    others(context, readings, &answer, &[kept, led]).unwrap_or(answer)
+}
+
+/// Other members of the groups that stand together, those of greatest evidence first.
+fn others(
+    context: &Context<'_>,
+    readings: &DVector<f64>,
+    answer: &Answer,
+    tried: &[Vec<usize>],
+) -> Option<Answer> {
+    let mut sets: Vec<(f64, Vec<Cause>)> = vec![(0.0, Vec::new())];
+    for group in &answer.groups {
+        let with = |(evidence, causes): &(f64, Vec<Cause>), member: &Alternative| {
+            let mut causes = causes.clone();
+            causes.push(member.cause.clone());
+            (evidence + member.evidence, causes)
+        };
+        sets = (sets.iter())
+            .flat_map(|set| group.iter().map(move |member| with(set, member)))
+            .collect();
+        sets.sort_by(|a, b| b.0.total_cmp(&a.0));
+        sets.truncate(TOGETHER);
+    }
+    let untried = sets.into_iter().map(|(_, causes)| causes).filter(|causes| {
+        let effects = effects_of(causes);
+        distinct(&effects) && !tried.contains(&effects)
+    });
+    for causes in untried {
+        let causes = context.relinearised(readings, &causes, f64::INFINITY);
+        let remainder = context.judged(readings, &causes);
+        if context.adequate(&causes, &remainder) && stand_together(context, readings, &causes) {
+            return Some(Answer {
+                groups: groups_beside(context, readings, &causes),
+                causes,
+                remainder,
+                complete: true,
+            });
+        }
+    }
+    None
+}
+
+fn effects_of(causes: &[Cause]) -> Vec<usize> {
+    causes.iter().map(|c| c.effect).collect()
+}
+
+fn distinct(effects: &[usize]) -> bool {
+    let mut earlier = effects.iter().enumerate();
+    earlier.all(|(k, effect)| !effects[..k].contains(effect))
+}

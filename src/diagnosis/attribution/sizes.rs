@@ -293,3 +293,45 @@ fn with_state(own: DMatrix<f64>, added: &DMatrix<f64>) -> DMatrix<f64> {
     eigen.eigenvalues.apply(|v| *v = v.max(LEAST));
     own + &root * eigen.recompose() * root.transpose()
 }
+
+#[cfg(test)]
+mod tests {
+    use errsep_models::model::{AnyModel, FittedModel};
+    use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
+    use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::Sizes;
+    use crate::diagnosis::attribution::context::Context;
+    use crate::diagnosis::detection::estimate::estimate;
+
+    /// *Definition*: two causes of one signature have no sizes, whatever rounding leaves of it; each by itself has.
+    #[test]
+    fn no_size_is_told_of_what_is_a_sum_of_others() {
+        let noise = SceneNoise {
+            white: 0.1,
+            ..SceneNoise::default()
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let scene = Scene::random(40, 3, 1e-5, 2.0, noise, &mut random);
+        let fitted = Linearised::new(&scene.measured(5), Assumptions::default()).unwrap();
+        let model = AnyModel::new(&fitted);
+        let catalogue = model.effects();
+        let readings = model.linearised();
+        let law = estimate(&model, &readings);
+        let context = Context::new(&model, &catalogue, law, 40, 1);
+        let of = |name: &str| {
+            let effect = catalogue.iter().position(|e| e.name() == name).unwrap();
+            let first = catalogue[effect].grid(&model).into_iter().next().unwrap();
+            context.cause(&model, effect, first)
+        };
+        let gain = of("gain-mismatch");
+        assert!(Sizes::fitted(&context, &readings, std::slice::from_ref(&gain)).is_some());
+        for part in 1..40 {
+            let mut again = gain.clone();
+            again.projected *= 1.0 + 0.1 * f64::from(part);
+            assert!(Sizes::fitted(&context, &readings, &[gain.clone(), again]).is_none());
+        }
+    }
+}

@@ -311,7 +311,7 @@ impl Space {
         self.forward(matrix).0.column(0).clone_owned()
     }
 
-    /// P L⁻¹ of signatures; nothing of those that the fit takes up, of which rounding is left.
+    /// P L⁻¹ of signatures.
     pub fn forward_columns(&self, columns: &[Column]) -> (DMatrix<f64>, Vec<f64>) {
         let mut dense = DMatrix::zeros(self.readings, columns.len());
         for (k, column) in columns.iter().enumerate() {
@@ -319,13 +319,7 @@ impl Space {
                 dense[(row, k)] += value;
             }
         }
-        let (mut projected, sizes) = self.forward(dense);
-        for (mut column, size) in projected.column_iter_mut().zip(&sizes) {
-            if column.norm() <= DEPENDENT * size {
-                column.fill(0.0);
-            }
-        }
-        (projected, sizes)
+        self.forward(dense)
     }
 
     /// L⁻ᵀ P of each column: what a signature is multiplied with to get its score.

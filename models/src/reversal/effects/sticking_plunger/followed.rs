@@ -18,6 +18,8 @@ const STANDS: usize = 16;
 const SPREADS: [f64; 6] = [0.01, 0.02, 0.04, 0.08, 0.15, 0.3];
 const STEPS: usize = 40;
 const NARROW: f64 = 1e-3;
+/// Part of the hold that is rounding.
+const ROUNDING: f64 = 1e-9;
 /// Most ways that are followed side by side, and how far behind the likeliest, in variances.
 const MOST: usize = 32;
 const HOPELESS: f64 = 40.0;
@@ -167,7 +169,13 @@ pub(super) fn mean_lag(seen: &[f64], hold: f64) -> Vec<f64> {
                 *pointer = *stylus;
             }
         }
-        pointers.iter().map(|pointer| pointer - stylus).sum::<f64>() / STANDS as f64
+        let lag = pointers.iter().map(|pointer| pointer - stylus).sum::<f64>() / STANDS as f64;
+        // Where it may stand at first is on either side alike: of that a mean has rounding only.
+        if lag.abs() > ROUNDING * hold {
+            lag
+        } else {
+            0.0
+        }
     };
     seen.iter().map(mean).collect()
 }
@@ -235,6 +243,18 @@ mod tests {
     fn form() -> Vec<f64> {
         let at = |k: usize| k as f64 / 40.0;
         (0..200).map(|k| 6.0 * at(k).sin() + 0.3 * at(k)).collect()
+    }
+
+    /// *Exact*: a hold that every step of the stylus overcomes has no lag, not even of rounding, which a fit would
+    /// multiply by 10¹⁶.
+    #[test]
+    fn a_hold_below_every_step_has_no_lag() {
+        // About powers of two what is above and below is rounded unlike.
+        for from in [0.5, 1.0, 2.0, 4.0, 8.0, 16.0] {
+            let seen: Vec<f64> = (0..50).map(|k| from + 0.3 * f64::from(k)).collect();
+            assert!(mean_lag(&seen, 0.061).iter().all(|lag| *lag == 0.0));
+            assert!(mean_lag(&seen, 1.0).iter().any(|lag| *lag < -0.1));
+        }
     }
 
     /// *Exact*: without noise every jump is found, and nothing is left; the start is a sixteenth of two holds.

@@ -26,6 +26,10 @@ pub(super) struct CyclicError {
 /// The variant of another phase in each position of the spindle in words.
 pub(super) const OWN_PHASES: &str = "of another phase in each spindle position";
 
+/// Line of a wave of one cycle and amplitude 1 over the travel is at most 3/π; between two spindle positions twice as
+/// much; as much again may be what noise makes of it. What is more is no part of a wave.
+const STRAIGHT: f64 = 4.0 * 3.0 / std::f64::consts::PI;
+
 impl CyclicError {
     pub fn new(channels: &Arrangement) -> Self {
         Self {
@@ -181,7 +185,13 @@ impl Effect<Linearised> for CyclicError {
         };
         let steepest = std::f64::consts::TAU * cycles / model.reading_span();
         let holds = |wave: &[f64]| wave[0].hypot(wave[1]) * steepest < STEEPEST;
-        self.drive(shape.variant).is_some() || amplitudes.chunks_exact(2).all(holds)
+        match (self.drive(shape.variant), amplitudes) {
+            (Some(_), [cosine, sine, line]) => {
+                line.abs() <= STRAIGHT / cycles * cosine.hypot(*sine)
+            }
+            (Some(_), _) => true,
+            (None, waves) => waves.chunks_exact(2).all(holds),
+        }
     }
 
     /// A period of the reading is told by its cycles over the span of the readings.

@@ -14,7 +14,7 @@ fn verdict(effects: &[(&str, usize, f64)], seed: u64) -> Verdict {
     diagnose(&model, &options).verdict
 }
 
-/// *Simulated truth*: both are named, and nothing else.
+/// *Simulated truth*, of one seed: both are named, and nothing else.
 fn both_are_named(effects: [(&str, usize, f64); 2], seed: u64) {
     let verdict = verdict(&effects, seed);
     let mut said = verdict.effects.clone();
@@ -48,8 +48,8 @@ fn a_plunger_that_sticks_is_found_again_beside_dirt() {
     );
 }
 
-/// Of a group the member of greatest evidence does not stand beside the other cause, as none of its sizes is known;
-/// another one does.
+/// *Simulated truth*, of one seed: of a group the member of greatest evidence does not stand beside the other cause, as
+/// none of its sizes is known; another one does.
 #[test]
 fn members_of_a_group_that_stand_together_are_named() {
     let verdict = verdict(&[("reversal-shift", 1, 1.5), ("gain-mismatch", 1, 1.0)], 2);
@@ -63,8 +63,8 @@ fn members_of_a_group_that_stand_together_are_named() {
     );
 }
 
-/// A bar that is off its crest at mid travel too is one cause, and not a crest at mid travel and a cone or what is
-/// like one.
+/// *Simulated truth*, of one seed: a bar that is off its crest at mid travel too is one cause, and not a crest at mid
+/// travel and a cone or what is like one.
 #[test]
 fn what_one_cause_does_is_not_told_as_two() {
     let effects = [

@@ -4,6 +4,8 @@ use nalgebra::DVector;
 
 use super::cells::cell_width;
 
+/// Part of the longest trace from which on a trace counts as one over the whole travel.
+const WHOLE: f64 = 0.9;
 /// Cells at an end of which a profile's value and slope there are taken.
 const AT_END: usize = 3;
 
@@ -35,23 +37,29 @@ impl StraightLine {
     }
 }
 
-/// Over how much the first positions of traces spread, and the last, mm; of the first and last of each.
+/// Over how much the first positions of traces spread, and the last, mm; of the first and last of each. A repeat over
+/// part of the travel says nothing of where the travel ends.
 pub fn spread_of_ends(traces: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
-    let none = [f64::INFINITY, f64::NEG_INFINITY];
-    let [first, last] = traces.fold([none; 2], |[first, last], [from, to]| {
-        let with = |[low, high]: [f64; 2], x: f64| [low.min(x), high.max(x)];
-        [with(first, from), with(last, to)]
-    });
-    [first, last].map(|[low, high]| (high - low).max(0.0))
+    let all: Vec<[f64; 2]> = traces.collect();
+    let longest = all.iter().map(|[from, to]| to - from).fold(0.0, f64::max);
+    let whole = || all.iter().filter(|[from, to]| to - from >= WHOLE * longest);
+    let spread = |end: usize| {
+        let at = whole().map(|ends| ends[end]);
+        let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+        (high - low).max(0.0)
+    };
+    [spread(0), spread(1)]
 }
 
-/// How sure the straight line of a profile is, µm/mm, whose readings begin and end at different places:
-/// standard deviation. `profile`: by cell, at these centres; `ends`: over how much the traces' first positions
-/// spread, and their last, mm.
+/// Definitional uncertainty (VIM 2.27) of the straight line of a profile, µm/mm, whose readings begin and end at
+/// different places: standard deviation. `profile`: by cell, at these centres; `ends`: over how much the traces' first
+/// positions spread, and their last, mm.
 ///
 /// The line of a travel L that ends a length δ later turns by 6/L² (f δ + f′ δ²/2), f how far the profile is from
 /// its line there; where it ends is taken as anywhere within that spread with equal probability.
-pub fn looseness(profile: &DVector<f64>, centres: &[f64], ends: [f64; 2]) -> f64 {
+pub fn definitional_std(profile: &DVector<f64>, centres: &[f64], ends: [f64; 2]) -> f64 {
     let n = profile.len();
     if n < 2 * AT_END || ends == [0.0; 2] {
         return 0.0;
@@ -82,14 +90,21 @@ pub fn looseness(profile: &DVector<f64>, centres: &[f64], ends: [f64; 2]) -> f64
 mod tests {
     use super::*;
 
-    /// A profile that is a straight line over its travel and bends beyond is not loose; one of t³ is, by what its line
-    /// over a longer travel is.
+    /// *Definition*: a repeat over a part of the travel does not move its ends.
     #[test]
-    fn a_line_is_as_loose_as_its_ends() {
+    fn ends_are_those_of_whole_traces() {
+        let traces = [[0.0, 300.0], [1.0, 298.5], [100.0, 120.0]];
+        assert_eq!(spread_of_ends(traces.into_iter()), [1.0, 1.5]);
+        assert_eq!(spread_of_ends(std::iter::empty()), [0.0; 2]);
+    }
+
+    /// *Limit*: the line of a line does not hang on its ends; that of t³ does, by what its line over a longer travel is.
+    #[test]
+    fn a_line_is_as_sure_as_its_ends() {
         let centres: Vec<f64> = (0..400).map(|k| 0.5 * f64::from(k)).collect();
         let line = DVector::from_iterator(400, centres.iter().map(|x| 3.0 - 0.02 * x));
         // Rounding.
-        assert!(looseness(&line, &centres, [1.0, 1.0]) < 1e-12);
+        assert!(definitional_std(&line, &centres, [1.0, 1.0]) < 1e-12);
         let cubic = |x: f64| ((x - 100.0) / 100.0).powi(3);
         let slope_to = |end: f64| {
             let n = 20_000;
@@ -103,9 +118,9 @@ mod tests {
             product / square
         };
         let profile = DVector::from_iterator(400, centres.iter().map(|x| cubic(*x)));
-        let loose = looseness(&profile, &centres, [0.0, 1.0]);
+        let found = definitional_std(&profile, &centres, [0.0, 1.0]);
         let turned = (slope_to(200.5) - slope_to(199.5)).abs() / 3.0f64.sqrt();
         // The value and slope at the end are those of its last three cells: 3 %.
-        assert!((loose / turned - 1.0).abs() < 0.03, "{loose} {turned}");
+        assert!((found / turned - 1.0).abs() < 0.03, "{found} {turned}");
     }
 }

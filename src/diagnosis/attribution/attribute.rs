@@ -8,9 +8,10 @@ use errsep_models::model::Shape;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::diagnosis::attribution::confidence::{Answer, confidence_set, possible, without};
+use crate::diagnosis::attribution::confidence::{Answer, confidence_set};
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder, finer};
 use crate::diagnosis::attribution::fewer::in_fewest;
+use crate::diagnosis::attribution::standing::{possible, without};
 use crate::diagnosis::levels::{
     BETTER, EARNED, FAR, FREELY, HOPELESS, IN_REACH, MOST_CAUSES, NO_BETTER, PAIR_REACH, PAIRS,
     POLISHED, REFINED, STALLED,
@@ -281,11 +282,13 @@ fn standing_out(
         .collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     let known = |effect: usize| begun.iter().find(|cause| cause.effect == effect);
-    let mut refined = 0..;
-    ranked.retain(|(_, effect)| refined.next() < Some(REFINED) || known(*effect).is_some());
-    ranked
+    let sought: Vec<usize> = (ranked.iter().enumerate())
+        .filter(|(rank, (_, effect))| *rank < REFINED || known(*effect).is_some())
+        .map(|(_, (_, effect))| *effect)
+        .collect();
+    sought
         .into_par_iter()
-        .filter_map(|(_, effect)| {
+        .filter_map(|effect| {
             let refine =
                 |start: &Shape| context.refine(context.model, readings, effect, start, causes);
             let (found, again) = rayon::join(

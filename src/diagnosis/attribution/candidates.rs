@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use errsep_models::model::Shape;
 use nalgebra::DVector;
 
-use crate::diagnosis::attribution::confidence::{Alternative, possible, without};
+use crate::diagnosis::attribution::alternatives::Alternative;
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
 use crate::diagnosis::attribution::reported::{Candidate, Elsewhere};
 use crate::diagnosis::attribution::sizes::Sizes;
+use crate::diagnosis::attribution::standing::{possible, without};
 use crate::diagnosis::detection::dictionary::statistic;
 use crate::diagnosis::levels::chi_squared_of_two;
 

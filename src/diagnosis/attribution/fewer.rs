@@ -2,11 +2,13 @@
 
 use nalgebra::DVector;
 
-use crate::diagnosis::attribution::confidence::{Answer, confidence_set, without};
+use crate::diagnosis::attribution::confidence::{Answer, confidence_set};
 use crate::diagnosis::attribution::context::{Cause, Context};
+use crate::diagnosis::attribution::standing::without;
 use crate::diagnosis::levels::chi_squared_quantile;
 
-/// The answer with one cause less, where a relative of another fits as well as both; else the answer.
+/// The answer with one cause less, where a relative of another, with no more unknowns than both, fits as well; else
+/// the answer.
 pub(in crate::diagnosis) fn in_fewest(
     context: &Context<'_>,
     readings: &DVector<f64>,
@@ -32,9 +34,11 @@ pub(in crate::diagnosis) fn in_fewest(
             for relative in freer {
                 let mut trial = others.clone();
                 trial.insert(k, relative);
-                let spared = most.saturating_sub(unknowns(&trial)).max(1);
+                let Some(spared) = most.checked_sub(unknowns(&trial)) else {
+                    continue;
+                };
                 let worse = context.misfit(readings, &trial) - misfit;
-                if worse > chi_squared_quantile(0.99, spared) {
+                if worse > chi_squared_quantile(0.99, spared.max(1)) {
                     continue;
                 }
                 let found = confidence_set(context, readings, &trial);

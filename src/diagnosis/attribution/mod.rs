@@ -2,6 +2,7 @@
 //! them.
 
 pub(super) mod allowed;
+pub(super) mod alternatives;
 pub(super) mod attribute;
 pub(super) mod bias;
 mod by_traces;
@@ -11,7 +12,6 @@ pub(super) mod context;
 pub(super) mod doubt;
 pub(super) mod examined;
 mod fewer;
-mod leading;
 pub(super) mod limits;
 pub(super) mod mixing;
 pub(super) mod outweighed;
@@ -20,3 +20,4 @@ pub(super) mod refit;
 pub(super) mod reported;
 pub(super) mod shrink;
 pub(super) mod sizes;
+pub(super) mod standing;

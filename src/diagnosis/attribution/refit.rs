@@ -6,9 +6,9 @@ use std::borrow::Cow;
 use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 
-use crate::diagnosis::attribution::confidence::has_possible_sizes;
 use crate::diagnosis::attribution::context::{Cause, Context, finer};
 use crate::diagnosis::attribution::mixing::Mixing;
+use crate::diagnosis::attribution::standing::has_possible_sizes;
 
 /// Relative change of the amplitudes at which refining stops.
 const AT_REST: f64 = 1e-4;

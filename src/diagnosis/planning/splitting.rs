@@ -8,7 +8,8 @@
 use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 
-use crate::diagnosis::attribution::confidence::{Alternative, Answer};
+use crate::diagnosis::attribution::alternatives::Alternative;
+use crate::diagnosis::attribution::confidence::Answer;
 use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::detection::space::{Space, orthonormal};
 use crate::diagnosis::levels::{TELL, normal_quantile};

@@ -5,11 +5,11 @@ use errsep_models::calibration_line::CalibrationLine;
 use errsep_models::calibration_line::simulate::{CalibrationSimulation, Disturbance, simulate};
 use errsep_models::model::{AnyModel, FittedModel};
 
-use crate::diagnosis::attribution::confidence::possible;
 use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::attribution::doubt::FEW_DRAWS;
 use crate::diagnosis::attribution::examined::examined;
 use crate::diagnosis::attribution::outweighed::{holds, outweighed};
+use crate::diagnosis::attribution::standing::possible;
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::null::rows_of;
 use crate::diagnosis::levels::{EARNED, REFINED, UNSEARCHED};

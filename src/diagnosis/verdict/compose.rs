@@ -3,9 +3,9 @@
 use errsep_models::model::FittedModel;
 use nalgebra::DVector;
 
+use crate::diagnosis::attribution::alternatives::Alternative;
 use crate::diagnosis::attribution::bias::biases;
 use crate::diagnosis::attribution::candidates::candidates;
-use crate::diagnosis::attribution::confidence::Alternative;
 use crate::diagnosis::attribution::context::{Cause, Context, raw_signatures};
 use crate::diagnosis::attribution::examined::Examined;
 use crate::diagnosis::attribution::reported::Candidate;

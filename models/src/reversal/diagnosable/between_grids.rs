@@ -47,7 +47,7 @@ pub(super) fn scatter(
             .map(|channel| weights[*channel].powi(2))
             .sum();
         profile /= whole;
-        let slope = straight_line::looseness(&profile, &sorted.positions, gathered.ends);
+        let slope = straight_line::definitional_std(&profile, &sorted.positions, gathered.ends);
         if slope > 0.0 {
             let column = line_column(&sorted.places, &weights, middle, slope);
             all.push(column);

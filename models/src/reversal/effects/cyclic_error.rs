@@ -26,9 +26,11 @@ pub(super) struct CyclicError {
 /// The variant of another phase in each position of the spindle in words.
 pub(super) const OWN_PHASES: &str = "of another phase in each spindle position";
 
-/// Line of a wave of one cycle and amplitude 1 over the travel is at most 3/π; between two spindle positions twice as
-/// much; as much again may be what noise makes of it. What is more is no part of a wave.
-const STRAIGHT: f64 = 4.0 * 3.0 / std::f64::consts::PI;
+/// Greatest line beside waves of phases of their own, in amplitudes of the wave that is seen, times the cycles. The
+/// line of a wave of n cycles over the travel is 3/(πn) of its amplitude at most; that of one indicator in either
+/// position is half of that in the mean of four channels. What is seen of the waves is their difference: less where
+/// the phases are nearly alike, down to an eighth, at 7°, below which hardly a wave is left. A greater line is a cone.
+const STRAIGHT: f64 = 8.0 * 0.5 * 3.0 / std::f64::consts::PI;
 
 impl CyclicError {
     pub fn new(channels: &Arrangement) -> Self {

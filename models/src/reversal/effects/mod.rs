@@ -130,8 +130,8 @@ fn part_of_travel(model: &Linearised, x: f64) -> f64 {
     2.0 * (x - first) / model.travel() - 1.0
 }
 
-/// A number to four significant digits, for the words of a variant: its uncertainty is told of the parameter that it is
-/// made of.
+/// A number to four significant digits, or to whole ones, for the words of a variant: its uncertainty is told of the
+/// parameter that it is made of.
 fn rounded(value: f64) -> String {
     let decimals = (3.0 - value.abs().log10().floor()).clamp(0.0, 12.0);
     format!("{value:.*}", decimals as usize)
@@ -144,4 +144,16 @@ fn spread(covariance: &DMatrix<f64>, weights: &[(usize, f64)]) -> f64 {
         .iter()
         .flat_map(|(i, w)| weights.iter().map(move |(j, v)| w * v * at(*i, *j)));
     terms.sum::<f64>().clamp(0.0, f64::INFINITY).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rounded;
+
+    #[test]
+    fn periods_have_four_digits() {
+        // Definition.
+        let told = [5489.3209, 38.3051, 0.012_346_1, 86_400.4].map(rounded);
+        assert_eq!(told, ["5489", "38.31", "0.01235", "86400"]);
+    }
 }

@@ -35,7 +35,7 @@ pub fn of(
         let own = covariance.variance(&[], &[(index, 1.0)]);
         let scatter = solution.scatter.released(value * value / own);
         let (std, freedom) = scatter.spread(&covariance, &[], &[(index, 1.0)]);
-        let std = std.hypot(looseness(problem, solution, channels, ends));
+        let std = std.hypot(by_ends(solution, channels, ends));
         (Value { value, std }, freedom)
     });
     let (x, profile) = profile(problem, channels, residuals);
@@ -49,15 +49,10 @@ pub fn of(
     })
 }
 
-/// How far the contrast hangs on where the traces begin and end, rad: the forms have no straight line over the
-/// travel of all of them together, and another one over that of each.
-fn looseness(
-    problem: &Reversal,
-    solution: &Simultaneous,
-    channels: &[ChannelReadings],
-    ends: [f64; 2],
-) -> f64 {
-    let unknowns = &problem.unknowns;
+/// The definitional uncertainty of the contrast, rad: the forms have no straight line over the travel of all traces
+/// together, and another one over that of each.
+fn by_ends(solution: &Simultaneous, channels: &[ChannelReadings], ends: [f64; 2]) -> f64 {
+    let unknowns = &solution.unknowns;
     let Some(contrast) = unknowns.closure.filter(|_| ends != [0.0; 2]) else {
         return 0.0;
     };
@@ -79,7 +74,7 @@ fn looseness(
             .sum()
     };
     let profile = DVector::from_iterator(PLACES, places.iter().map(of));
-    mm_from_um(straight_line::looseness(&profile, &places, ends))
+    mm_from_um(straight_line::definitional_std(&profile, &places, ends))
 }
 
 /// Point by point where the four traces share their positions, otherwise by means over cells.

@@ -32,6 +32,8 @@ pub struct Said {
     pub sizes: Vec<(String, f64, f64, String)>,
     /// What the effects named change in the readings, in the order of the traces; empty where none is named.
     pub change: Vec<Vec<f64>>,
+    /// Whether what differs from repeat to repeat is said to be no noise of independent readings.
+    pub dependent: bool,
     /// How long it took, s.
     pub seconds: f64,
 }
@@ -182,6 +184,10 @@ fn heard(json: &Value, seconds: f64) -> Option<Said> {
         gap: json.get("gap")?.get("before")?.get("rms")?.as_f64()?,
         sizes,
         change: Vec::new(),
+        dependent: ["alike", "periodic"].iter().any(|key| {
+            json.get("noise")
+                .is_some_and(|noise| noise.get(key).is_some())
+        }),
         seconds,
     })
 }

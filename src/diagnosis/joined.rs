@@ -20,8 +20,10 @@ use crate::diagnosis::attribution::shrink::{GapMeter, HeldOut, Size, shrink};
 use crate::diagnosis::attribution::sizes::{Sizes, first_amplitude};
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::levels::{INVISIBLE, POLISHED, SEPARABLE, WEAK};
+use crate::diagnosis::noise::dependence::Dependence;
 use crate::diagnosis::noise::spikes::calmed;
 use crate::diagnosis::options::Options;
+use crate::diagnosis::verdict::told::no_noise;
 use crate::diagnosis::verdict::types::NoiseOut;
 
 /// Fits of noise and state without the effects: the second begins with sizes that are nearly right.
@@ -323,6 +325,8 @@ fn told(
     let meter = GapMeter::new(context.model, &context.law, options.seed);
     let clean = readings - &change;
     let (before, after) = (meter.size(readings, 0), meter.size(&clean, unknowns));
+    let dependence = Dependence::of(context.model, &context.law, &clean);
+    notes.extend(no_noise(context.model, &dependence));
     let (quantities, moved) = biases(context, readings, causes);
     let quantities = answers_widened(context, readings, quantities, &moved, &allowed);
     let profiles = context.model.profiles().into_iter().zip(moved);
@@ -339,7 +343,7 @@ fn told(
             held_out: meter.held_out(context.model, readings, &raw_signatures(context, causes)),
             remains_p,
         },
-        noise: NoiseOut::from(&context.law),
+        noise: NoiseOut::of(context.model, &context.law, &dependence),
         quantities,
         profiles: profiles
             .map(|(profile, (name, before, after))| JoinedProfile {

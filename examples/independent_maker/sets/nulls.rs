@@ -26,13 +26,17 @@ pub fn run(arguments: &Arguments) -> Result<(), String> {
         .collect();
     let answers = answers?;
     let line = |name: &str, mine: &dyn Fn(&str) -> bool| {
-        let mine: Vec<f64> = answers
+        let mine: Vec<(f64, bool)> = answers
             .iter()
             .filter(|(law, _)| mine(law))
-            .filter_map(|(_, p)| *p)
+            .filter_map(|(_, said)| *said)
             .collect();
-        let below = |level: f64| rate(mine.iter().filter(|p| **p < level).count(), mine.len());
-        vec![name.to_owned(), below(0.01), below(0.05)]
+        let of = |holds: &dyn Fn(&(f64, bool)) -> bool| {
+            rate(mine.iter().filter(|said| holds(said)).count(), mine.len())
+        };
+        let below = |level: f64| of(&|(p, _)| *p < level);
+        let dependent = of(&|(_, dependent)| *dependent);
+        vec![name.to_owned(), below(0.01), below(0.05), dependent]
     };
     let mut lines: Vec<Vec<String>> = Law::ALL
         .iter()
@@ -45,6 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<(), String> {
             "noise",
             "alarms at 1 % (95 % limits)",
             "alarms at 5 % (95 % limits)",
+            "no noise of independent readings, at 0.2 %",
         ],
         &lines,
     );
@@ -56,8 +61,9 @@ pub fn run(arguments: &Arguments) -> Result<(), String> {
     Ok(())
 }
 
-/// The probability that the answer gives to as much with nothing there; none where it is refused.
-fn one(arguments: &Arguments, law: Law, number: u64) -> Result<Option<f64>, String> {
+/// The probability that the answer gives to as much with nothing there, and whether the noise is said to be dependent;
+/// none where it is refused.
+fn one(arguments: &Arguments, law: Law, number: u64) -> Result<Option<(f64, bool)>, String> {
     let order = Order {
         name: format!("null {} {number}", law.name()),
         seed: arguments.seed,
@@ -78,5 +84,5 @@ fn one(arguments: &Arguments, law: Law, number: u64) -> Result<Option<f64>, Stri
             said.in_words()
         );
     }
-    Ok(said.ok().map(|said| said.p_value))
+    Ok(said.ok().map(|said| (said.p_value, said.dependent)))
 }

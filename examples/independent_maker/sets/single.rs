@@ -33,6 +33,8 @@ struct Row {
     outcome: Outcome,
     /// Whether a name with the effect is strong, and one without it, where severity was asked for.
     strong: Option<[bool; 2]>,
+    /// Whether the noise is said to be none of independent readings, which it is.
+    dependent: bool,
     law: &'static str,
     gap: Option<bool>,
     size: Option<bool>,
@@ -113,6 +115,7 @@ fn one(
             let holds = |group: &[String]| group.iter().any(|name| name == source.name);
             [said.is_strong(holds), said.is_strong(|group| !holds(group))]
         }),
+        dependent: judged.is_some_and(|said| said.dependent),
         law: law.name(),
         gap: judged
             .filter(|_| class != Class::Absorbed)
@@ -252,6 +255,14 @@ fn overall(rows: &[&Row], class: Class) {
             yes(|row| row.strong.map(|[_, wrong]| wrong)),
         ]);
     }
+    let right: Vec<&&Row> = rows.iter().filter(|row| row.right()).collect();
+    lines.push(vec![
+        "right, and the noise is said to be none of independent readings".to_owned(),
+        rate(
+            right.iter().filter(|row| row.dependent).count(),
+            right.len(),
+        ),
+    ]);
     if class != Class::Absorbed {
         lines.push(vec![
             "gap before within 15 %".to_owned(),

@@ -16,7 +16,23 @@ pub(in crate::diagnosis) struct Contrasts {
 /// Contrasts of traces on the same positions.
 struct Group {
     positions: Vec<f64>,
-    rows: Vec<DVector<f64>>,
+    rows: Vec<Row>,
+}
+
+/// A contrast of the repeats of one channel in one direction.
+pub(in crate::diagnosis) struct Row {
+    pub channel: usize,
+    backward: bool,
+    /// Which of the contrasts of its repeats.
+    which: usize,
+    pub values: DVector<f64>,
+}
+
+impl Row {
+    /// Whether it is the same contrast of another channel.
+    pub fn is_beside(&self, other: &Self, channel: usize) -> bool {
+        self.channel == channel && self.backward == other.backward && self.which == other.which
+    }
 }
 
 /// What a law says of the contrasts, its scale left open.
@@ -44,18 +60,25 @@ impl Contrasts {
                 .map(|t| places[(*t).clone()].iter().map(|p| p.time).sum::<f64>() / t.len() as f64)
                 .collect();
             let positions: Vec<f64> = places[traces[0].clone()].iter().map(|p| p.x).collect();
-            for weights in steady_free(&times) {
-                let mut sum = DVector::zeros(positions.len());
+            let begin = places.get(traces[0].start);
+            for (which, weights) in steady_free(&times).into_iter().enumerate() {
+                let mut values = DVector::zeros(positions.len());
                 for (weight, trace) in weights.iter().zip(traces) {
-                    sum += *weight * readings.rows(trace.start, trace.len());
+                    values += *weight * readings.rows(trace.start, trace.len());
                 }
-                contrasts.add(&positions, sum);
+                let row = Row {
+                    channel: begin.map_or(0, |place| place.channel),
+                    backward: begin.is_some_and(|place| place.direction < 0.0),
+                    which,
+                    values,
+                };
+                contrasts.add(&positions, row);
             }
         }
         contrasts
     }
 
-    fn add(&mut self, positions: &[f64], row: DVector<f64>) {
+    fn add(&mut self, positions: &[f64], row: Row) {
         match self.groups.iter_mut().find(|g| g.positions == positions) {
             Some(group) => group.rows.push(row),
             None => self.groups.push(Group {
@@ -100,7 +123,23 @@ impl Contrasts {
     }
 
     fn rows(&self) -> impl Iterator<Item = &DVector<f64>> {
-        self.groups.iter().flat_map(|g| &g.rows)
+        let rows = self.groups.iter().flat_map(|g| &g.rows);
+        rows.map(|row| &row.values)
+    }
+
+    /// Positions with the contrasts on them.
+    pub fn groups(&self) -> impl Iterator<Item = (&[f64], &[Row])> {
+        let groups = self.groups.iter();
+        groups.map(|g| (g.positions.as_slice(), g.rows.as_slice()))
+    }
+
+    /// Changes the values of each contrast, knowing its positions.
+    pub fn each(&mut self, mut change: impl FnMut(&[f64], &mut DVector<f64>)) {
+        for group in &mut self.groups {
+            for row in &mut group.rows {
+                change(&group.positions, &mut row.values);
+            }
+        }
     }
 
     /// The likelihood of a correlated part and a shift, both in units of the white variance.
@@ -138,7 +177,7 @@ impl Contrasts {
             }
             for y in &group.rows {
                 let (mut state, mut yy, mut y1) = (0.0, 0.0, 0.0);
-                for (step, value) in steps.iter().zip(y.iter()) {
+                for (step, value) in steps.iter().zip(y.values.iter()) {
                     state *= step.decay;
                     let innovation = value - state;
                     yy += innovation * innovation * step.weight;

@@ -2,6 +2,7 @@
 //! repeats, with jumps and spikes told apart from it, and the whitening by that law.
 
 pub(super) mod contrasts;
+pub(super) mod dependence;
 pub(super) mod law;
 pub(super) mod posterior;
 pub(super) mod spikes;

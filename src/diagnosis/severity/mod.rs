@@ -8,6 +8,9 @@
 //! Rivals are drawn of what is listed or smooth. A cause that nobody listed, and that is nearly the one named, is none of
 //! them, but is mostly not quite that one either: a name is strong only where what it leaves is such as noise leaves.
 //!
+//! What a cause does anew in every repeat goes into the law of the noise by which it should be seen. Where what differs
+//! between repeats is no noise of independent readings (`noise/dependence.rs`) no name is strong.
+//!
 //! Of several causes each is judged alone. What they may imitate together is more than what each may, and is not drawn:
 //! none of them is strong.
 
@@ -26,6 +29,7 @@ use crate::diagnosis::attribution::confidence::Answer;
 use crate::diagnosis::attribution::context::Context;
 use crate::diagnosis::detection::null::BATCH;
 use crate::diagnosis::levels::{STRONG, SURE, SUSPECT};
+use crate::diagnosis::noise::dependence::Dependence;
 use crate::diagnosis::options::Options;
 use crate::diagnosis::severity::grounds::Grounds;
 use crate::diagnosis::severity::rivals::{Drawn, Family};
@@ -38,6 +42,9 @@ const FEWEST: usize = 4;
 /// Why none of several names is strong.
 pub(in crate::diagnosis) const TOGETHER: &str =
     "each of several causes is judged alone, and what they may imitate together is not known";
+/// Why no name is strong where the noise is not that of independent readings.
+pub(in crate::diagnosis) const NO_NOISE: &str =
+    "what differs from repeat to repeat is no noise of independent readings";
 /// Rivals that a line tells.
 const TOLD: usize = 3;
 
@@ -45,8 +52,8 @@ const TOLD: usize = 3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Confidence {
-    /// The lower limit of the severity is 0.95 or more, what the cause leaves is such as noise leaves, and it is named
-    /// alone.
+    /// The lower limit of the severity is 0.95 or more, what the cause leaves is such as noise leaves, what differs between
+    /// repeats is noise too, and it is named alone.
     Strong,
     /// It is not.
     Weak,
@@ -65,7 +72,10 @@ pub struct Severity {
     pub left: f64,
     /// Whether other causes are named beside it.
     pub beside_others: bool,
-    /// Strong where the lower limit reaches 0.95, `left` is above 0.05 and no cause is named beside it.
+    /// Whether what differs between repeats is no noise of independent readings.
+    pub dependent_noise: bool,
+    /// Strong where the lower limit reaches 0.95, `left` is above 0.05, no cause is named beside it and the noise is
+    /// that of independent readings.
     pub confidence: Confidence,
     /// The families of rivals, the greatest probability first.
     pub rivals: Vec<Rival>,
@@ -128,6 +138,7 @@ impl Severity {
                 "weak, as noise alone would leave as much beside it in only {} of cases",
                 percent(self.left)
             ),
+            Confidence::Weak if self.dependent_noise => format!("weak, as {NO_NOISE}"),
             Confidence::Weak if !self.is_weak_by_rivals() => format!("weak, as {TOGETHER}"),
             Confidence::Weak => "weak".to_owned(),
         };
@@ -181,21 +192,35 @@ pub(in crate::diagnosis) fn severities(
     context: &Context<'_>,
     readings: &DVector<f64>,
     answer: &Answer,
+    dependence: &Dependence,
     options: &Options,
 ) -> Vec<Severity> {
     let grounds = Grounds::of(context);
     let left = context.chance_beside(readings, &answer.causes);
-    let several = answer.causes.len() > 1;
+    let beside = Beside {
+        left,
+        several: answer.causes.len() > 1,
+        dependent_noise: dependence.is_seen(),
+    };
     Name::all(context, readings, answer, options.false_alarm)
         .iter()
-        .map(|name| severity(context, (&grounds, left, several), name, options))
+        .map(|name| severity(context, (&grounds, beside), name, options))
         .collect()
 }
 
-/// The severity of one name, beside what all causes leave, and whether they are several.
+/// What there is beside a name.
+#[derive(Debug, Clone, Copy)]
+struct Beside {
+    /// See [`Severity::left`].
+    left: f64,
+    several: bool,
+    dependent_noise: bool,
+}
+
+/// The severity of one name.
 fn severity(
     context: &Context<'_>,
-    (grounds, left, several): (&Grounds, f64, bool),
+    (grounds, beside): (&Grounds, Beside),
     name: &Name,
     options: &Options,
 ) -> Severity {
@@ -216,9 +241,14 @@ fn severity(
         effect: name.effect.clone(),
         value: 1.0 - most,
         lower,
-        left,
-        beside_others: several,
-        confidence: if lower >= STRONG && left > SUSPECT && !several {
+        left: beside.left,
+        beside_others: beside.several,
+        dependent_noise: beside.dependent_noise,
+        confidence: if lower >= STRONG
+            && beside.left > SUSPECT
+            && !beside.several
+            && !beside.dependent_noise
+        {
             Confidence::Strong
         } else {
             Confidence::Weak

@@ -12,6 +12,7 @@ use crate::diagnosis::attribution::reported::Candidate;
 use crate::diagnosis::attribution::shrink::GapMeter;
 use crate::diagnosis::detection::estimate::neighbour_scatter;
 use crate::diagnosis::levels::NOISE_DIFFERS;
+use crate::diagnosis::noise::dependence::Dependence;
 use crate::diagnosis::noise::law::{NoiseSource, of_repeats};
 use crate::diagnosis::noise::spikes::Calmed;
 use crate::diagnosis::options::Options;
@@ -22,7 +23,7 @@ use crate::diagnosis::verdict::hidden::hidden;
 use crate::diagnosis::verdict::places::places;
 use crate::diagnosis::verdict::shape::fingerprint;
 use crate::diagnosis::verdict::statement::{separating, statement};
-use crate::diagnosis::verdict::told::for_people;
+use crate::diagnosis::verdict::told::{for_people, no_noise};
 use crate::diagnosis::verdict::types::{Detail, Diagnosis, Kind, NoiseOut, Verdict};
 use crate::number::plain;
 
@@ -100,6 +101,7 @@ pub(in crate::diagnosis) fn compose(
     } else {
         Vec::new()
     };
+    let dependence = Dependence::of(context.model, &context.law, &(readings - &change));
     let mut verdict = Verdict {
         kind,
         effects: if kind == Kind::Effect {
@@ -109,7 +111,7 @@ pub(in crate::diagnosis) fn compose(
         },
         severity: match (found, kind) {
             (Some(answer), Kind::Effect) if options.severity > 0 => {
-                severities(context, readings, answer, options)
+                severities(context, readings, answer, &dependence, options)
             }
             _ => Vec::new(),
         },
@@ -139,12 +141,13 @@ pub(in crate::diagnosis) fn compose(
         model: context.model.name(),
         verdict,
         gap,
-        noise: NoiseOut::from(&context.law),
+        noise: NoiseOut::of(context.model, &context.law, &dependence),
         places,
         bias,
         hidden,
         notes: [
             notes(context, &(readings - &change), calm),
+            no_noise(context.model, &dependence).into_iter().collect(),
             elsewhere(&candidates),
         ]
         .concat(),

@@ -3,7 +3,7 @@
 use crate::diagnosis::attribution::reported::{Candidate, ParameterOut};
 use crate::diagnosis::levels::MOSTLY;
 use crate::diagnosis::planning::splitting::Split;
-use crate::diagnosis::severity::{Confidence, TOGETHER};
+use crate::diagnosis::severity::{Confidence, NO_NOISE, Severity, TOGETHER};
 use crate::diagnosis::verdict::told::for_people;
 use crate::diagnosis::verdict::types::{Fingerprint, Gap, Hidden, Kind, Verdict, Where};
 use crate::number::{percent, plain, probability};
@@ -163,8 +163,8 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
     )
 }
 
-/// Of each weak name what else would be given it, or how rare it is that noise leaves as much, and of several that they are
-/// several; nothing where all are strong.
+/// Of each weak name what else would be given it, or how rare it is that noise leaves as much, of several that they are
+/// several, and of all whether the noise is none; nothing where all are strong.
 fn weakness(verdict: &Verdict) -> String {
     let alone = verdict.effects.len() == 1;
     let weak = verdict
@@ -201,8 +201,12 @@ fn weakness(verdict: &Verdict) -> String {
         })
         .filter(|reasons| !reasons.is_empty())
         .collect();
-    if verdict.severity.iter().any(|s| s.beside_others) {
+    let of_any = |holds: fn(&Severity) -> bool| verdict.severity.iter().any(holds);
+    if of_any(|s| s.beside_others) {
         each.push(TOGETHER.to_owned());
+    }
+    if of_any(|s| s.dependent_noise) {
+        each.push(NO_NOISE.to_owned());
     }
     if each.is_empty() {
         String::new()

@@ -1,9 +1,13 @@
 //! Numbers and units as people read them: the same in the sentence, the text and the page.
 
+use errsep_models::model::{AnyModel, FittedModel};
+
 use crate::diagnosis::attribution::reported::ParameterOut;
 use crate::diagnosis::attribution::shrink::Size;
+use crate::diagnosis::levels::DEPENDENT;
+use crate::diagnosis::noise::dependence::Dependence;
 use crate::diagnosis::verdict::types::Gap;
-use crate::number::{measured, plain};
+use crate::number::{measured, percent, plain};
 
 /// Digits of a gap.
 const DIGITS: usize = 3;
@@ -94,6 +98,34 @@ impl Gap {
     pub fn noise_figure(&self) -> String {
         plain(self.noise, DIGITS)
     }
+}
+
+/// In what the differences between repeats are no noise of independent readings.
+pub(in crate::diagnosis) fn no_noise(model: &AnyModel, dependence: &Dependence) -> Option<String> {
+    let alike = dependence.alike.as_ref().map(|alike| {
+        let names = model.channel_names();
+        let [one, other] = alike.channels.map(|channel| names[channel].as_str());
+        let way = if alike.correlation > 0.0 {
+            "alike"
+        } else {
+            "with opposite signs"
+        };
+        let correlation = plain(alike.correlation, 2);
+        format!("{one} and {other} have it {way} (correlation {correlation})")
+    });
+    let periodic = dependence.periodic.as_ref().map(|periodic| {
+        let length = plain(periodic.length, 3);
+        format!(
+            "it comes back after {length} {}",
+            for_people(model.position_unit())
+        )
+    });
+    let ways: Vec<String> = alike.into_iter().chain(periodic).collect();
+    (!ways.is_empty()).then(|| format!(
+        "What differs from repeat to repeat is no noise of independent readings: {}, which such noise does in less than {} of cases. Something acts anew in every pass and is counted as noise here; probabilities and uncertainties hold for noise of independent readings only.",
+        ways.join(", and "),
+        percent(DEPENDENT)
+    ))
 }
 
 /// A unit as people write it.

@@ -8,6 +8,7 @@ use crate::diagnosis::attribution::shrink::{HeldOut, Size};
 use crate::diagnosis::detection::localise::Item;
 use crate::diagnosis::detection::smallest::SizesByShape;
 use crate::diagnosis::levels::INVISIBLE;
+use crate::diagnosis::noise::dependence::Dependence;
 use crate::diagnosis::noise::law::NoiseLaw;
 use crate::diagnosis::severity::Severity;
 use crate::diagnosis::verdict::told::for_people;
@@ -294,10 +295,40 @@ pub struct NoiseOut {
     /// How well it is known, and with it every standard uncertainty of the diagnosis; none where it
     /// is stated.
     pub degrees_of_freedom: Option<f64>,
+    /// Channels that have alike what differs from repeat to repeat: it is no noise of theirs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alike: Option<Alike>,
+    /// A period in what differs from repeat to repeat.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub periodic: Option<Periodic>,
 }
 
-impl From<&NoiseLaw> for NoiseOut {
-    fn from(law: &NoiseLaw) -> Self {
+/// What two channels have alike from repeat to repeat.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Alike {
+    /// The channels.
+    pub channels: [String; 2],
+    /// Correlation of what differs from repeat to repeat.
+    pub correlation: f64,
+    /// Probability of as much in noise of independent channels.
+    pub p_value: f64,
+}
+
+/// A period in what differs from repeat to repeat.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Periodic {
+    /// Its length, in the unit of the positions.
+    pub length: f64,
+    /// Probability of as much in noise of independent readings.
+    pub p_value: f64,
+}
+
+impl NoiseOut {
+    pub(in crate::diagnosis) fn of(
+        model: &AnyModel,
+        law: &NoiseLaw,
+        dependence: &Dependence,
+    ) -> Self {
         use crate::diagnosis::noise::law::NoiseSource;
         Self {
             white: law.white.sqrt(),
@@ -310,6 +341,18 @@ impl From<&NoiseLaw> for NoiseOut {
                 NoiseSource::Neighbours => "neighbours",
             },
             degrees_of_freedom: Some(law.freedom).filter(|freedom| freedom.is_finite()),
+            alike: dependence.alike.as_ref().map(|alike| {
+                let names = model.channel_names();
+                Alike {
+                    channels: alike.channels.map(|channel| names[channel].clone()),
+                    correlation: alike.correlation,
+                    p_value: alike.p_value,
+                }
+            }),
+            periodic: dependence.periodic.as_ref().map(|periodic| Periodic {
+                length: periodic.length,
+                p_value: periodic.p_value,
+            }),
         }
     }
 }

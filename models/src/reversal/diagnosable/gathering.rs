@@ -113,13 +113,15 @@ pub(super) fn gather(
     drop_short(&mut kept, readings);
     let strict = edges_of_all(&kept, readings);
     let cells = strict.as_ref().map_or(0, |edges| edges.len() - 1);
-    let (edges, ends) = match edges_to_fill(&traces, readings) {
-        Some(edges) if (edges.len() - 1) as f64 > WORTH_FILLING * cells as f64 => (edges, [0.0; 2]),
-        _ => {
-            traces = kept;
-            let ends = spread_of_ends(&traces, readings);
-            (strict.ok_or(NotDiagnosable::RangesDiffer)?, ends)
-        }
+    let to_fill = edges_to_fill(&traces, readings)
+        .filter(|edges| (edges.len() - 1) as f64 > WORTH_FILLING * cells as f64);
+    let on_one_grid = to_fill.is_some();
+    let (edges, ends) = if let Some(edges) = to_fill {
+        (edges, [0.0; 2])
+    } else {
+        traces = kept;
+        let ends = spread_of_ends(&traces, readings);
+        (strict.ok_or(NotDiagnosable::RangesDiffer)?, ends)
     };
     let mut members: Vec<(TraceKey, Vec<&[usize]>)> = (traces.iter())
         .map(|(key, rows)| (*key, by_cell(rows, readings, &edges)))
@@ -141,8 +143,8 @@ pub(super) fn gather(
     let told = fit.told();
     let from = centres.partition_point(|x| *x < told[0]);
     let to = centres.partition_point(|x| *x <= told[1]).max(from);
-    // Where forms are smooth the fit's cells are long.
-    let (from, to) = if (to - from) as f64 >= KEPT * cells as f64 {
+    // Where forms are smooth the fit's cells are long. Readings of one grid are carried nowhere.
+    let (from, to) = if !on_one_grid && (to - from) as f64 >= KEPT * cells as f64 {
         (from, to)
     } else {
         (0, cells)

@@ -78,6 +78,7 @@ trait Behind: Send + Sync {
     fn rounding(&self) -> f64;
     fn stated_noise(&self) -> Option<f64>;
     fn noise_allowance(&self) -> f64;
+    fn repeats_are_alike(&self) -> bool;
     fn refit(&self, observed: DVector<f64>) -> Box<dyn Behind>;
     fn refit_as_smooth(&self, observed: DVector<f64>) -> Box<dyn Behind>;
     fn as_read(&self) -> Box<dyn Behind>;
@@ -156,6 +157,9 @@ impl<M: FittedModel + 'static> Behind for M {
     }
     fn noise_allowance(&self) -> f64 {
         FittedModel::noise_allowance(self)
+    }
+    fn repeats_are_alike(&self) -> bool {
+        FittedModel::repeats_are_alike(self)
     }
     fn refit(&self, observed: DVector<f64>) -> Box<dyn Behind> {
         Box::new(FittedModel::refit(self, observed))
@@ -250,6 +254,9 @@ impl FittedModel for AnyModel {
     }
     fn noise_allowance(&self) -> f64 {
         self.0.noise_allowance()
+    }
+    fn repeats_are_alike(&self) -> bool {
+        self.0.repeats_are_alike()
     }
     fn refit(&self, observed: DVector<f64>) -> Self {
         Self(self.0.refit(observed))

@@ -317,6 +317,11 @@ pub trait FittedModel: Clone + Send + Sync {
         1.0
     }
 
+    /// Whether repeats of a trace were read at the same places, so that nothing but noise is in their differences.
+    fn repeats_are_alike(&self) -> bool {
+        true
+    }
+
     /// The same model fitted to other values of the same readings.
     fn refit(&self, observed: DVector<f64>) -> Self;
 

@@ -52,9 +52,9 @@ pub(in crate::diagnosis) struct Dependence {
 }
 
 impl Dependence {
-    /// Of readings free of causes, where repeats tell the noise.
+    /// Of readings free of causes, where repeats tell the noise and nothing else: read at other places they show forms too.
     pub fn of(model: &AnyModel, law: &NoiseLaw, clean: &DVector<f64>) -> Self {
-        if law.source != NoiseSource::Repeats {
+        if law.source != NoiseSource::Repeats || !model.repeats_are_alike() {
             return Self::default();
         }
         let mut contrasts = Contrasts::new(model.places(), model.traces(), clean);

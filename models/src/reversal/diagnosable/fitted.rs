@@ -171,6 +171,10 @@ impl FittedModel for Linearised {
         })
     }
 
+    fn repeats_are_alike(&self) -> bool {
+        (self.gathered.as_ref()).is_none_or(|gathered| gathered.repeated)
+    }
+
     fn expected_scatter(&self) -> &[Column] {
         &self.scatter
     }

@@ -50,6 +50,8 @@ pub struct Gathered {
     pub(super) scatter: f64,
     /// Over how much the first positions of the traces spread, and the last, mm: a cell at most.
     pub(super) ends: [f64; 2],
+    /// Whether each channel's traces were read at the same places.
+    pub(super) repeated: bool,
 }
 
 impl Gathered {
@@ -207,12 +209,32 @@ pub(super) fn gather(
         lacking,
         scatter: between_grids::variance(&lanes, &closures),
         ends: ends.map(|spread| spread.min(width)),
+        repeated: are_repeated(&members, readings, width),
     };
     let made = DesignObservations {
         design: observations.design.clone(),
         readings: made,
     };
     Ok((made, gathered))
+}
+
+/// Whether the traces of each channel were read at the same places in every cell where they were read, but for a
+/// thousandth of it.
+fn are_repeated(
+    members: &[(TraceKey, Vec<&[usize]>)],
+    readings: &[DesignReading],
+    width: f64,
+) -> bool {
+    let mut first: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+    members.iter().all(|((channel, _, _), inside)| {
+        let mut cells = inside.iter().enumerate();
+        cells.all(|(k, own)| {
+            mean(own, |k| readings[k].x).is_none_or(|x| {
+                let known = *first.entry((*channel, k)).or_insert(x);
+                (x - known).abs() <= 1e-3 * width
+            })
+        })
+    })
 }
 
 /// From where each channel's readings in a cell are carried.

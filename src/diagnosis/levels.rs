@@ -108,8 +108,6 @@ pub(in crate::diagnosis) const HELD: f64 = 1e-3;
 /// *Reckoned.* Log-evidence that differs by less is equal: of exact aliases the one of more usual size
 /// goes first.
 pub(in crate::diagnosis) const EQUAL_EVIDENCE: f64 = 1e-3;
-/// *Limit.* Sets of members of the groups, of greatest evidence, that are tried for one that stands together.
-pub(in crate::diagnosis) const TOGETHER: usize = 16;
 /// *Limit.* A swap of causes must raise the statistic by more than what searches leave open.
 pub(in crate::diagnosis) const BETTER: f64 = 0.01;
 /// *Limit.* Pairs that are fitted with everything else free, and how far above the best misfit a coarse

@@ -21,29 +21,6 @@ pub(in crate::diagnosis) struct Alternative {
     pub evidence: f64,
 }
 
-/// The effects that pass in the place of each of some causes, itself first.
-pub(super) fn groups_beside(
-    context: &Context<'_>,
-    readings: &DVector<f64>,
-    causes: &[Cause],
-) -> Vec<Vec<Alternative>> {
-    let beside = |k: usize| {
-        let members = alternatives(context, readings, causes, k, HOPELESS_PART);
-        let mut group = group_of(&members, k);
-        if group.iter().all(|a| a.cause.effect != causes[k].effect) {
-            let misfit = context.misfit(readings, causes);
-            group.push(Alternative {
-                cause: causes[k].clone(),
-                evidence: evidence(context, readings, causes, k, misfit),
-            });
-        }
-        group.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-        group.sort_by_key(|a| a.cause.effect != causes[k].effect);
-        group
-    };
-    (0..causes.len()).map(beside).collect()
-}
-
 pub(super) fn group_of(members: &[Member], k: usize) -> Vec<Alternative> {
     let of = |m: &Member| Alternative {
         cause: m.causes[k].clone(),

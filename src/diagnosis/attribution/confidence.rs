@@ -6,12 +6,10 @@
 
 use nalgebra::DVector;
 
-use crate::diagnosis::attribution::alternatives::{
-    Alternative, alternatives, evidence, group_of, groups_beside,
-};
+use crate::diagnosis::attribution::alternatives::{Alternative, alternatives, evidence, group_of};
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
 use crate::diagnosis::attribution::standing::stand_together;
-use crate::diagnosis::levels::{BENT, EQUAL_EVIDENCE, HOPELESS_PART, TOGETHER};
+use crate::diagnosis::levels::{BENT, EQUAL_EVIDENCE, HOPELESS_PART};
 
 /// Causes that together explain the gap, and those that do it as well.
 pub(in crate::diagnosis) struct Answer {
@@ -66,8 +64,7 @@ pub(in crate::diagnosis) fn confidence_set(
 }
 
 /// Brings the greatest evidence of each group to its front and makes it the cause, where these causes pass
-/// together too; else the cause that was kept goes first. Where those leave nothing that stands out but do not
-/// stand together, other members of the groups may.
+/// together too; else the cause that was kept goes first.
 fn led(context: &Context<'_>, readings: &DVector<f64>, mut answer: Answer) -> Answer {
     for group in &mut answer.groups {
         let rounded = |a: &Alternative| (a.evidence / EQUAL_EVIDENCE).round();
@@ -79,9 +76,8 @@ fn led(context: &Context<'_>, readings: &DVector<f64>, mut answer: Answer) -> An
             _ => kept.clone(),
         })
         .collect();
-    let kept = effects_of(&answer.causes);
     let led = effects_of(&leaders);
-    if led != kept && distinct(&led) {
+    if led != effects_of(&answer.causes) && distinct(&led) {
         let trial = context.relinearised(readings, &leaders, f64::INFINITY);
         let left = context.judged(readings, &trial);
         if context.adequate(&trial, &left) && context.amplitudes(readings, &trial).is_some() {
@@ -91,53 +87,9 @@ fn led(context: &Context<'_>, readings: &DVector<f64>, mut answer: Answer) -> An
     for (group, cause) in answer.groups.iter_mut().zip(&answer.causes) {
         group.sort_by_key(|a| a.cause.effect != cause.effect);
     }
-    if !context.adequate(&answer.causes, &answer.remainder) {
-        return answer;
-    }
-    answer.complete = stand_together(context, readings, &answer.causes);
-    if answer.complete {
-        return answer;
-    }
-    others(context, readings, &answer, &[kept, led]).unwrap_or(answer)
-}
-
-/// Other members of the groups that stand together, those of greatest evidence first.
-fn others(
-    context: &Context<'_>,
-    readings: &DVector<f64>,
-    answer: &Answer,
-    tried: &[Vec<usize>],
-) -> Option<Answer> {
-    let mut sets: Vec<(f64, Vec<Cause>)> = vec![(0.0, Vec::new())];
-    for group in &answer.groups {
-        let with = |(evidence, causes): &(f64, Vec<Cause>), member: &Alternative| {
-            let mut causes = causes.clone();
-            causes.push(member.cause.clone());
-            (evidence + member.evidence, causes)
-        };
-        sets = (sets.iter())
-            .flat_map(|set| group.iter().map(move |member| with(set, member)))
-            .collect();
-        sets.sort_by(|a, b| b.0.total_cmp(&a.0));
-        sets.truncate(TOGETHER);
-    }
-    let untried = sets.into_iter().map(|(_, causes)| causes).filter(|causes| {
-        let effects = effects_of(causes);
-        distinct(&effects) && !tried.contains(&effects)
-    });
-    for causes in untried {
-        let causes = context.relinearised(readings, &causes, f64::INFINITY);
-        let remainder = context.judged(readings, &causes);
-        if context.adequate(&causes, &remainder) && stand_together(context, readings, &causes) {
-            return Some(Answer {
-                groups: groups_beside(context, readings, &causes),
-                causes,
-                remainder,
-                complete: true,
-            });
-        }
-    }
-    None
+    answer.complete = context.adequate(&answer.causes, &answer.remainder)
+        && stand_together(context, readings, &answer.causes);
+    answer
 }
 
 fn effects_of(causes: &[Cause]) -> Vec<usize> {

@@ -120,9 +120,14 @@ pub(in crate::diagnosis) fn no_noise(model: &AnyModel, dependence: &Dependence) 
             for_people(model.position_unit())
         )
     });
+    let advice = if periodic.is_some() {
+        " Measure at another feed: what sticks keeps its length, what swings keeps its time."
+    } else {
+        ""
+    };
     let ways: Vec<String> = alike.into_iter().chain(periodic).collect();
     (!ways.is_empty()).then(|| format!(
-        "What differs from repeat to repeat is no noise of independent readings: {}, which such noise does in less than {} of cases. Something acts anew in every pass and is counted as noise here; probabilities and uncertainties hold for noise of independent readings only.",
+        "What differs from repeat to repeat is no noise of independent readings: {}, which such noise does in less than {} of cases. Something acts anew in every pass and is counted as noise here; probabilities and uncertainties hold for noise of independent readings only.{advice}",
         ways.join(", and "),
         percent(DEPENDENT)
     ))

@@ -19,6 +19,50 @@ fn diagnosed(readings: &Observations) -> Diagnosis {
     diagnose(&model, &options)
 }
 
+/// *Simulated truth*: of a slide that sticks somewhere else in every pass the catalogue without `stick-slip` has the mean, a
+/// step between the directions, and the rest is in the noise. It comes back along the travel, so nothing is named.
+/// With the whole catalogue it is named, and what it leaves is noise.
+#[test]
+fn what_comes_back_elsewhere_in_every_pass_is_not_noise() {
+    let readings = measured("stick-slip", 4, 1.5, 3, 100).unwrap();
+    let lacking = Options {
+        draws: 200,
+        without: vec!["stick-slip".to_owned()],
+        ..Options::default()
+    };
+    let model = Linearised::new(&readings, Assumptions::default()).unwrap();
+    let found = diagnose(&model, &lacking);
+    assert_eq!(
+        found.verdict.kind,
+        Kind::Unknown,
+        "{}",
+        found.verdict.statement
+    );
+    assert!(
+        found
+            .verdict
+            .partial
+            .contains(&"lateral-backlash".to_owned())
+    );
+    let periodic = found.noise.periodic.unwrap();
+    let why = "what differs from repeat to repeat comes back after";
+    assert!(
+        found.verdict.statement.contains(why),
+        "{}",
+        found.verdict.statement
+    );
+    assert!(periodic.p_value < 1e-3);
+
+    let whole = diagnosed(&readings);
+    assert_eq!(
+        whole.verdict.effects,
+        ["stick-slip"],
+        "{}",
+        whole.verdict.statement
+    );
+    assert!(whole.noise.periodic.is_none() && whole.noise.alike.is_none());
+}
+
 /// Every cause that is named has a size beyond twice its standard uncertainty.
 fn stands(diagnosis: &Diagnosis) {
     let model = Linearised::new(&nothing(1, 20), Assumptions::default()).unwrap();

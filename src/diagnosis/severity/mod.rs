@@ -8,8 +8,8 @@
 //! Rivals are drawn of what is listed or smooth. A cause that nobody listed, and that is nearly the one named, is none of
 //! them, but is mostly not quite that one either: a name is strong only where what it leaves is such as noise leaves.
 //!
-//! What a cause does anew in every repeat goes into the law of the noise by which it should be seen. Where what differs
-//! between repeats is no noise of independent readings (`noise/dependence.rs`) no name is strong.
+//! What a cause does anew in every repeat goes into the law of the noise by which it should be seen. Where channels have
+//! alike what differs between repeats (`noise/dependence.rs`) no name is strong.
 //!
 //! Of several causes each is judged alone. What they may imitate together is more than what each may, and is not drawn:
 //! none of them is strong.

@@ -58,6 +58,8 @@ pub(in crate::diagnosis) fn compose(
     let explained =
         first.residual.norm_squared() - context.remainder(readings, causes).residual.norm_squared();
     let before = meter.size(readings, 0);
+    let dependence = Dependence::of(context.model, &context.law, &(readings - &change));
+    let noise = NoiseOut::of(context.model, &context.law, &dependence);
     let Conclusion { kind, gap } = Conclusion::of(
         alarmed,
         found,
@@ -72,6 +74,7 @@ pub(in crate::diagnosis) fn compose(
                 0.0
             },
             held_out: meter.held_out(context.model, readings, &signatures),
+            periodic: noise.periodic.is_some(),
         },
     );
     // Without a gap there is nothing to explain.
@@ -101,7 +104,6 @@ pub(in crate::diagnosis) fn compose(
     } else {
         Vec::new()
     };
-    let dependence = Dependence::of(context.model, &context.law, &(readings - &change));
     let mut verdict = Verdict {
         kind,
         effects: if kind == Kind::Effect {
@@ -134,14 +136,14 @@ pub(in crate::diagnosis) fn compose(
     };
     verdict.separate = separating(&verdict.indistinguishable, &candidates, &splits);
     let hidden = hidden(context, &verdict.effects, options);
-    verdict.statement = statement(&verdict, &gap, &places, &candidates, &hidden);
+    verdict.statement = statement(&verdict, (&gap, &noise), &places, &candidates, &hidden);
     let (bias, profiles) = biases(context, readings, causes);
     Diagnosis {
         schema: "errsep.diagnosis/1",
         model: context.model.name(),
         verdict,
         gap,
-        noise: NoiseOut::of(context.model, &context.law, &dependence),
+        noise,
         places,
         bias,
         hidden,

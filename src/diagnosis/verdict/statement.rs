@@ -5,13 +5,15 @@ use crate::diagnosis::levels::MOSTLY;
 use crate::diagnosis::planning::splitting::Split;
 use crate::diagnosis::severity::{Confidence, NO_NOISE, Severity, TOGETHER};
 use crate::diagnosis::verdict::told::for_people;
-use crate::diagnosis::verdict::types::{Fingerprint, Gap, Hidden, Kind, Verdict, Where};
+use crate::diagnosis::verdict::types::{
+    Fingerprint, Gap, Hidden, Kind, NoiseOut, Periodic, Verdict, Where,
+};
 use crate::number::{percent, plain, probability};
 
 /// The sentence.
 pub(in crate::diagnosis) fn statement(
     verdict: &Verdict,
-    gap: &Gap,
+    (gap, noise): (&Gap, &NoiseOut),
     places: &[Where],
     candidates: &[Candidate],
     hidden: &[Hidden],
@@ -42,14 +44,15 @@ pub(in crate::diagnosis) fn statement(
             let partial = match verdict.partial[..] {
                 [] => String::new(),
                 ref some => format!(
-                    "; {} would leave {} but {}",
+                    "; {} would leave {} but {}{}",
                     some.join(" and "),
                     gap.after.in_words(gap.unit),
                     if some.len() > 1 {
                         "do not pass as its causes"
                     } else {
                         "does not pass as its cause"
-                    }
+                    },
+                    noise.periodic.as_ref().map_or(String::new(), coming_back)
                 ),
             };
             format!(
@@ -160,6 +163,15 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
     format!(
         "{beginning}; with {with} {} {remain}{more}. {doubt}",
         gap.after.in_words(gap.unit)
+    )
+}
+
+/// Why causes do not pass beside which something comes back.
+fn coming_back(periodic: &Periodic) -> String {
+    format!(
+        ": what differs from repeat to repeat comes back after {} {}, which noise does not",
+        plain(periodic.length, 3),
+        for_people(periodic.unit)
     )
 }
 

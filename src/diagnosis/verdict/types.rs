@@ -317,8 +317,10 @@ pub struct Alike {
 /// A period in what differs from repeat to repeat.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Periodic {
-    /// Its length, in the unit of the positions.
+    /// Its length.
     pub length: f64,
+    /// Unit of the positions.
+    pub unit: &'static str,
     /// Probability of as much in noise of independent readings.
     pub p_value: f64,
 }
@@ -351,6 +353,7 @@ impl NoiseOut {
             }),
             periodic: dependence.periodic.as_ref().map(|periodic| Periodic {
                 length: periodic.length,
+                unit: model.position_unit(),
                 p_value: periodic.p_value,
             }),
         }

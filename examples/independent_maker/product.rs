@@ -32,7 +32,7 @@ pub struct Said {
     pub sizes: Vec<(String, f64, f64, String)>,
     /// What the effects named change in the readings, in the order of the traces; empty where none is named.
     pub change: Vec<Vec<f64>>,
-    /// Whether what differs from repeat to repeat is said to be no noise of independent readings.
+    /// Whether what differs from repeat to repeat is said not to be independent noise.
     pub dependent: bool,
     /// How long it took, s.
     pub seconds: f64,
@@ -184,7 +184,7 @@ fn heard(json: &Value, seconds: f64) -> Option<Said> {
         gap: json.get("gap")?.get("before")?.get("rms")?.as_f64()?,
         sizes,
         change: Vec::new(),
-        dependent: ["alike", "periodic"].iter().any(|key| {
+        dependent: ["between_channels", "period"].iter().any(|key| {
             json.get("noise")
                 .is_some_and(|noise| noise.get(key).is_some())
         }),

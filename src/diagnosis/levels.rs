@@ -55,8 +55,8 @@ pub(in crate::diagnosis) const STAYS: f64 = 12.0;
 /// See [`STAYS`].
 pub(in crate::diagnosis) const STAYS_FREEDOM: usize = 5;
 
-/// *Quantile.* What differs from repeat to repeat is said to be no noise of independent readings where these would show
-/// as much less often than this, alike in two channels or with a period.
+/// *Quantile.* What differs from repeat to repeat is said not to be independent noise where such noise would show as
+/// much less often than this, a correlation of two channels or a period.
 pub(in crate::diagnosis) const DEPENDENT: f64 = 0.001;
 
 // Detection.

@@ -44,14 +44,14 @@ fn what_comes_back_elsewhere_in_every_pass_is_not_noise() {
             .partial
             .contains(&"lateral-backlash".to_owned())
     );
-    let periodic = found.noise.periodic.unwrap();
-    let why = "what differs from repeat to repeat comes back after";
+    let period = found.noise.period.unwrap();
+    let why = "what differs from repeat to repeat comes back every";
     assert!(
         found.verdict.statement.contains(why),
         "{}",
         found.verdict.statement
     );
-    assert!(periodic.p_value < 1e-3);
+    assert!(period.p_value < 1e-3);
 
     let whole = diagnosed(&readings);
     assert_eq!(
@@ -60,7 +60,7 @@ fn what_comes_back_elsewhere_in_every_pass_is_not_noise() {
         "{}",
         whole.verdict.statement
     );
-    assert!(whole.noise.periodic.is_none() && whole.noise.alike.is_none());
+    assert!(whole.noise.period.is_none() && whole.noise.between_channels.is_none());
 }
 
 /// Every cause that is named has a size beyond twice its standard uncertainty.

@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<(), String> {
             "noise",
             "alarms at 1 % (95 % limits)",
             "alarms at 5 % (95 % limits)",
-            "no noise of independent readings, at 0.2 %",
+            "said not to be independent noise, at 0.2 %",
         ],
         &lines,
     );

@@ -33,7 +33,7 @@ struct Row {
     outcome: Outcome,
     /// Whether a name with the effect is strong, and one without it, where severity was asked for.
     strong: Option<[bool; 2]>,
-    /// Whether the noise is said to be none of independent readings, which it is.
+    /// Whether the noise is said not to be independent; the maker's is.
     dependent: bool,
     law: &'static str,
     gap: Option<bool>,
@@ -257,7 +257,7 @@ fn overall(rows: &[&Row], class: Class) {
     }
     let right: Vec<&&Row> = rows.iter().filter(|row| row.right()).collect();
     lines.push(vec![
-        "right, and the noise is said to be none of independent readings".to_owned(),
+        "right, and the noise is said not to be independent".to_owned(),
         rate(
             right.iter().filter(|row| row.dependent).count(),
             right.len(),

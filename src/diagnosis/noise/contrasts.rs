@@ -7,6 +7,8 @@ use errsep_models::model::Place;
 use nalgebra::DVector;
 
 use crate::diagnosis::levels::LONG_TRACE;
+use crate::diagnosis::noise::law::NoiseLaw;
+use crate::diagnosis::noise::whitening::Whitening;
 
 /// Contrasts of the repeats of all traces, each with the covariance of one trace.
 pub(in crate::diagnosis) struct Contrasts {
@@ -133,13 +135,15 @@ impl Contrasts {
         groups.map(|g| (g.positions.as_slice(), g.rows.as_slice()))
     }
 
-    /// Changes the values of each contrast, knowing its positions.
-    pub fn each(&mut self, mut change: impl FnMut(&[f64], &mut DVector<f64>)) {
+    /// The contrasts whitened by a law: each has the covariance of one trace.
+    pub fn whitened(mut self, law: &NoiseLaw) -> Self {
         for group in &mut self.groups {
+            let whitening = Whitening::new(law, &group.positions);
             for row in &mut group.rows {
-                change(&group.positions, &mut row.values);
+                whitening.whiten(row.values.as_mut_slice());
             }
         }
+        self
     }
 
     /// The likelihood of a correlated part and a shift, both in units of the white variance.
@@ -247,7 +251,6 @@ fn norm(vector: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::NoiseLaw;
     use proptest::prelude::*;
 
     fn repeats(positions: &[f64], traces: usize) -> (Vec<Place>, Vec<Range<usize>>) {

@@ -1,8 +1,8 @@
 //! Whether what differs between repeats is noise as the law has it: of each channel by itself, and without a period.
 //!
 //! What an unknown cause does anew in every pass (a slide that sticks somewhere else each time) has no mean over the
-//! repeats, and goes into the law of the noise. Two channels that are read in one pass have it alike, and what comes back
-//! after a length stands out of the spectrum; noise of independent readings does neither.
+//! repeats, and goes into the law of the noise. Two channels that are read in one pass are correlated by it, and what comes
+//! back after a length stands out of the spectrum; independent noise does neither.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use crate::diagnosis::levels::DEPENDENT;
 use crate::diagnosis::noise::contrasts::{Contrasts, Row};
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
-use crate::diagnosis::noise::whitening::Whitening;
 
 /// Products of readings that are summed to one: what the law leaves correlated among neighbours is within it.
 const BLOCK: usize = 10;
@@ -24,9 +23,9 @@ const MOST_PERIODS: usize = 512;
 /// Neighbouring frequencies of a spectrum from which on, and up to which, its level about a frequency is taken.
 const ABOUT: std::ops::RangeInclusive<usize> = 4..=20;
 
-/// What two channels have alike.
+/// A correlation of two channels.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::diagnosis) struct Alike {
+pub(in crate::diagnosis) struct BetweenChannels {
     /// The channels.
     pub channels: [usize; 2],
     /// Correlation of what differs from repeat to repeat, whitened by the law of the noise.
@@ -37,18 +36,18 @@ pub(in crate::diagnosis) struct Alike {
 
 /// A period in what differs from repeat to repeat.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::diagnosis) struct Periodic {
+pub(in crate::diagnosis) struct Period {
     /// Its length, in the unit of the positions.
     pub length: f64,
     /// Probability of as much at any length in noise of the law.
     pub p_value: f64,
 }
 
-/// In what the differences between repeats are no noise of independent readings.
+/// In what the differences between repeats are not independent noise.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(in crate::diagnosis) struct Dependence {
-    pub alike: Option<Alike>,
-    pub periodic: Option<Periodic>,
+    pub between_channels: Option<BetweenChannels>,
+    pub period: Option<Period>,
 }
 
 impl Dependence {
@@ -57,36 +56,37 @@ impl Dependence {
         if law.source != NoiseSource::Repeats || !model.repeats_are_alike() {
             return Self::default();
         }
-        let mut contrasts = Contrasts::new(model.places(), model.traces(), clean);
-        contrasts.each(|positions, row| {
-            Whitening::new(law, positions).whiten(row.as_mut_slice());
-        });
-        Self::in_white(&contrasts)
+        let contrasts = Contrasts::new(model.places(), model.traces(), clean);
+        Self::in_white(&contrasts.whitened(law))
     }
 
     /// Of contrasts that are white if the noise is what the law says.
     fn in_white(contrasts: &Contrasts) -> Self {
-        let alike = alike(contrasts).filter(|found| found.p_value < DEPENDENT);
-        // Of channels that have it alike one tells no more than the other.
-        let times = if alike.is_some() { 2 } else { 1 };
-        let periodic = periodic(contrasts, times).filter(|found| found.p_value < DEPENDENT);
-        Self { alike, periodic }
+        let is_told = |p_value: f64| p_value < DEPENDENT;
+        let between_channels = between_channels(contrasts).filter(|found| is_told(found.p_value));
+        // Of correlated channels one tells no more than the other.
+        let times = if between_channels.is_some() { 2 } else { 1 };
+        let period = period(contrasts, times).filter(|found| is_told(found.p_value));
+        Self {
+            between_channels,
+            period,
+        }
     }
 
     /// Whether anything is told.
     pub fn is_seen(&self) -> bool {
-        self.alike.is_some() || self.periodic.is_some()
+        self.between_channels.is_some() || self.period.is_some()
     }
 }
 
-/// The two channels that have most alike: Student's t of the sums of products over blocks of neighbours.
-fn alike(contrasts: &Contrasts) -> Option<Alike> {
+/// The two channels that are correlated most clearly: Student's t of the sums of products over blocks of neighbours.
+fn between_channels(contrasts: &Contrasts) -> Option<BetweenChannels> {
     let groups: Vec<(&[f64], &[Row])> = contrasts.groups().collect();
     let channels = groups.iter().flat_map(|(_, rows)| rows.iter());
     let mut channels: Vec<usize> = channels.map(|row| row.channel).collect();
     channels.sort_unstable();
     channels.dedup();
-    let between = |a: usize, b: usize| -> Option<Alike> {
+    let between = |a: usize, b: usize| -> Option<BetweenChannels> {
         let (mut sums, mut squares) = (Vec::new(), [0.0, 0.0]);
         for (_, rows) in &groups {
             for one in rows.iter().filter(|row| row.channel == a) {
@@ -101,14 +101,15 @@ fn alike(contrasts: &Contrasts) -> Option<Alike> {
             }
         }
         let n = sums.len() as f64;
-        if sums.len() < FEWEST_BLOCKS {
-            return None;
-        }
         let whole = sums.iter().sum::<f64>();
         let scatter = sums.iter().map(|s| (s - whole / n).powi(2)).sum::<f64>() / (n - 1.0);
+        // Of a channel that never changes there is nothing to tell.
+        if sums.len() < FEWEST_BLOCKS || scatter <= 0.0 {
+            return None;
+        }
         let t = whole / (n * scatter).sqrt();
         let law = StudentsT::new(0.0, 1.0, n - 1.0).ok()?;
-        Some(Alike {
+        Some(BetweenChannels {
             channels: [a, b],
             correlation: whole / (squares[0] * squares[1]).sqrt(),
             p_value: 2.0 * law.cdf(-t.abs()),
@@ -116,10 +117,10 @@ fn alike(contrasts: &Contrasts) -> Option<Alike> {
     };
     let pairs = (channels.iter().enumerate())
         .flat_map(|(k, a)| channels[k + 1..].iter().map(|b| between(*a, *b)));
-    let found: Vec<Alike> = pairs.flatten().collect();
+    let found: Vec<BetweenChannels> = pairs.flatten().collect();
     let tried = found.len() as f64;
     let most = (found.into_iter()).min_by(|a, b| a.p_value.total_cmp(&b.p_value))?;
-    Some(Alike {
+    Some(BetweenChannels {
         p_value: (tried * most.p_value).min(1.0),
         ..most
     })
@@ -127,7 +128,7 @@ fn alike(contrasts: &Contrasts) -> Option<Alike> {
 
 /// The length that comes back most: a periodogram over all rows, against its level at the frequencies about and that of
 /// white noise, whichever is more. `times`: of so many rows one tells what all of them do.
-fn periodic(contrasts: &Contrasts, times: usize) -> Option<Periodic> {
+fn period(contrasts: &Contrasts, times: usize) -> Option<Period> {
     let long = contrasts.groups().max_by_key(|(x, _)| x.len())?.0;
     let (first, last) = (*long.first()?, *long.last()?);
     let travel = (last - first).abs();
@@ -142,7 +143,7 @@ fn periodic(contrasts: &Contrasts, times: usize) -> Option<Periodic> {
     for (positions, group) in contrasts.groups() {
         let turns = |x: &f64| PI * (x - first) / travel;
         let steps: Vec<(f64, f64)> = positions.iter().map(|x| turns(x).sin_cos()).collect();
-        for row in group {
+        for row in group.iter().filter(|row| !row.values.is_empty()) {
             let mut waves: Vec<(f64, f64)> = row.values.iter().map(|v| (0.0, *v)).collect();
             rows += 1;
             for total in &mut power {
@@ -171,7 +172,7 @@ fn periodic(contrasts: &Contrasts, times: usize) -> Option<Periodic> {
         .map(|k| (k, mean[k] / about(k)))
         .max_by(|a, b| a.1.total_cmp(&b.1))?;
     let tail = law.sf(2.0 * independent * most.1);
-    Some(Periodic {
+    Some(Period {
         length: 2.0 * travel / most.0 as f64,
         p_value: (tail * (count - lowest) as f64).min(1.0),
     })
@@ -187,7 +188,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal, StudentT};
 
-    use super::{Contrasts, Dependence, alike, periodic};
+    use super::{Contrasts, Dependence, between_channels, period};
 
     const POSITIONS: usize = 120;
     const REPEATS: usize = 4;
@@ -241,8 +242,8 @@ mod tests {
                     }
                 };
                 let made = contrasts(&mut random, &mut one);
-                by_channel += usize::from(alike(&made).unwrap().p_value < 0.05);
-                by_period += usize::from(periodic(&made, 1).unwrap().p_value < 0.05);
+                by_channel += usize::from(between_channels(&made).unwrap().p_value < 0.05);
+                by_period += usize::from(period(&made, 1).unwrap().p_value < 0.05);
             }
             assert!((26..=74).contains(&by_channel), "{heavy} {by_channel}");
             assert!(by_period <= 74, "{heavy} {by_period}");
@@ -270,11 +271,11 @@ mod tests {
             Dependence::in_white(&contrasts(&mut random, &mut reading))
         };
         let clear = found(0.8);
-        let alike = clear.alike.unwrap();
-        assert_eq!(alike.channels, [0, 1]);
+        let both = clear.between_channels.unwrap();
+        assert_eq!(both.channels, [0, 1]);
         // The wave's variance over that of a reading, 0.32/1.32, but for the scatter of 480 products.
-        assert!((alike.correlation + 0.24).abs() < 0.15, "{alike:?}");
-        let length = clear.periodic.unwrap().length;
+        assert!((both.correlation + 0.24).abs() < 0.15, "{both:?}");
+        let length = clear.period.unwrap().length;
         assert!((length - 33.0).abs() < 3.0, "{length}");
         assert!(!found(0.1).is_seen());
     }

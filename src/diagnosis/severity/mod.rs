@@ -8,8 +8,8 @@
 //! Rivals are drawn of what is listed or smooth. A cause that nobody listed, and that is nearly the one named, is none of
 //! them, but is mostly not quite that one either: a name is strong only where what it leaves is such as noise leaves.
 //!
-//! What a cause does anew in every repeat goes into the law of the noise by which it should be seen. Where channels have
-//! alike what differs between repeats (`noise/dependence.rs`) no name is strong.
+//! What a cause does anew in every repeat goes into the law of the noise by which it should be seen. Where channels are
+//! correlated in what differs between repeats (`noise/dependence.rs`) no name is strong.
 //!
 //! Of several causes each is judged alone. What they may imitate together is more than what each may, and is not drawn:
 //! none of them is strong.
@@ -42,9 +42,9 @@ const FEWEST: usize = 4;
 /// Why none of several names is strong.
 pub(in crate::diagnosis) const TOGETHER: &str =
     "each of several causes is judged alone, and what they may imitate together is not known";
-/// Why no name is strong where the noise is not that of independent readings.
+/// Why no name is strong where the noise is not independent.
 pub(in crate::diagnosis) const NO_NOISE: &str =
-    "what differs from repeat to repeat is no noise of independent readings";
+    "what differs from repeat to repeat is not independent noise";
 /// Rivals that a line tells.
 const TOLD: usize = 3;
 
@@ -72,7 +72,7 @@ pub struct Severity {
     pub left: f64,
     /// Whether other causes are named beside it.
     pub beside_others: bool,
-    /// Whether what differs between repeats is no noise of independent readings.
+    /// Whether what differs between repeats is not independent noise.
     pub dependent_noise: bool,
     /// Strong where the lower limit reaches 0.95, `left` is above 0.05, no cause is named beside it and the noise is
     /// that of independent readings.

@@ -74,7 +74,7 @@ pub(in crate::diagnosis) fn compose(
                 0.0
             },
             held_out: meter.held_out(context.model, readings, &signatures),
-            periodic: noise.periodic.is_some(),
+            periodic: noise.period.is_some(),
         },
     );
     // Without a gap there is nothing to explain.

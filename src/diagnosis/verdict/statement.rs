@@ -6,7 +6,7 @@ use crate::diagnosis::planning::splitting::Split;
 use crate::diagnosis::severity::{Confidence, NO_NOISE, Severity, TOGETHER};
 use crate::diagnosis::verdict::told::for_people;
 use crate::diagnosis::verdict::types::{
-    Fingerprint, Gap, Hidden, Kind, NoiseOut, Periodic, Verdict, Where,
+    Fingerprint, Gap, Hidden, Kind, NoiseOut, Period, Verdict, Where,
 };
 use crate::number::{percent, plain, probability};
 
@@ -52,7 +52,7 @@ pub(in crate::diagnosis) fn statement(
                     } else {
                         "does not pass as its cause"
                     },
-                    noise.periodic.as_ref().map_or(String::new(), coming_back)
+                    noise.period.as_ref().map_or(String::new(), coming_back)
                 ),
             };
             format!(
@@ -167,11 +167,11 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
 }
 
 /// Why causes do not pass beside which something comes back.
-fn coming_back(periodic: &Periodic) -> String {
+fn coming_back(period: &Period) -> String {
     format!(
-        ": what differs from repeat to repeat comes back after {} {}, which noise does not",
-        plain(periodic.length, 3),
-        for_people(periodic.unit)
+        ": what differs from repeat to repeat comes back every {} {}, which noise does not",
+        plain(period.length, 3),
+        for_people(period.unit)
     )
 }
 

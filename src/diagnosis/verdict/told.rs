@@ -100,34 +100,27 @@ impl Gap {
     }
 }
 
-/// In what the differences between repeats are no noise of independent readings.
+/// In what the differences between repeats are not independent noise.
 pub(in crate::diagnosis) fn no_noise(model: &AnyModel, dependence: &Dependence) -> Option<String> {
-    let alike = dependence.alike.as_ref().map(|alike| {
+    let between_channels = dependence.between_channels.as_ref().map(|both| {
         let names = model.channel_names();
-        let [one, other] = alike.channels.map(|channel| names[channel].as_str());
-        let way = if alike.correlation > 0.0 {
-            "alike"
-        } else {
-            "with opposite signs"
-        };
-        let correlation = plain(alike.correlation, 2);
-        format!("{one} and {other} have it {way} (correlation {correlation})")
+        let [one, other] = both.channels.map(|channel| names[channel].as_str());
+        let correlation = plain(both.correlation, 2);
+        format!("{one} and {other} are correlated ({correlation})")
     });
-    let periodic = dependence.periodic.as_ref().map(|periodic| {
-        let length = plain(periodic.length, 3);
-        format!(
-            "it comes back after {length} {}",
-            for_people(model.position_unit())
-        )
+    let period = dependence.period.as_ref().map(|period| {
+        let length = plain(period.length, 3);
+        let unit = for_people(model.position_unit());
+        format!("it comes back every {length} {unit}")
     });
-    let advice = if periodic.is_some() {
+    let advice = if period.is_some() {
         " Measure at another feed: what sticks keeps its length, what swings keeps its time."
     } else {
         ""
     };
-    let ways: Vec<String> = alike.into_iter().chain(periodic).collect();
+    let ways: Vec<String> = between_channels.into_iter().chain(period).collect();
     (!ways.is_empty()).then(|| format!(
-        "What differs from repeat to repeat is no noise of independent readings: {}, which such noise does in less than {} of cases. Something acts anew in every pass and is counted as noise here; probabilities and uncertainties hold for noise of independent readings only.{advice}",
+        "What differs from repeat to repeat is not independent noise: {}; independent noise does so in less than {} of cases. Something acts anew in every pass and is counted as noise here; probabilities and uncertainties hold for independent noise only.{advice}",
         ways.join(", and "),
         percent(DEPENDENT)
     ))

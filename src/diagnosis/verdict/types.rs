@@ -295,33 +295,33 @@ pub struct NoiseOut {
     /// How well it is known, and with it every standard uncertainty of the diagnosis; none where it
     /// is stated.
     pub degrees_of_freedom: Option<f64>,
-    /// Channels that have alike what differs from repeat to repeat: it is no noise of theirs.
+    /// A correlation of two channels in what differs from repeat to repeat.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub alike: Option<Alike>,
+    pub between_channels: Option<BetweenChannels>,
     /// A period in what differs from repeat to repeat.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub periodic: Option<Periodic>,
+    pub period: Option<Period>,
 }
 
-/// What two channels have alike from repeat to repeat.
+/// A correlation of two channels in what differs from repeat to repeat.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Alike {
+pub struct BetweenChannels {
     /// The channels.
     pub channels: [String; 2],
-    /// Correlation of what differs from repeat to repeat.
+    /// The correlation, whitened by the law of the noise along a trace.
     pub correlation: f64,
-    /// Probability of as much in noise of independent channels.
+    /// Probability of as much in independent noise.
     pub p_value: f64,
 }
 
 /// A period in what differs from repeat to repeat.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Periodic {
+pub struct Period {
     /// Its length.
     pub length: f64,
     /// Unit of the positions.
     pub unit: &'static str,
-    /// Probability of as much in noise of independent readings.
+    /// Probability of as much in independent noise.
     pub p_value: f64,
 }
 
@@ -343,18 +343,18 @@ impl NoiseOut {
                 NoiseSource::Neighbours => "neighbours",
             },
             degrees_of_freedom: Some(law.freedom).filter(|freedom| freedom.is_finite()),
-            alike: dependence.alike.as_ref().map(|alike| {
+            between_channels: dependence.between_channels.as_ref().map(|both| {
                 let names = model.channel_names();
-                Alike {
-                    channels: alike.channels.map(|channel| names[channel].clone()),
-                    correlation: alike.correlation,
-                    p_value: alike.p_value,
+                BetweenChannels {
+                    channels: both.channels.map(|channel| names[channel].clone()),
+                    correlation: both.correlation,
+                    p_value: both.p_value,
                 }
             }),
-            periodic: dependence.periodic.as_ref().map(|periodic| Periodic {
-                length: periodic.length,
+            period: dependence.period.as_ref().map(|period| Period {
+                length: period.length,
                 unit: model.position_unit(),
-                p_value: periodic.p_value,
+                p_value: period.p_value,
             }),
         }
     }

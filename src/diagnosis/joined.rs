@@ -13,7 +13,7 @@ use thiserror::Error;
 use crate::diagnosis::attribution::allowed::{Allowed, allowed_fits, answers_widened, widened};
 use crate::diagnosis::attribution::bias::biases;
 use crate::diagnosis::attribution::candidates::elsewhere;
-use crate::diagnosis::attribution::context::{Cause, Context, finer, raw_signatures, span};
+use crate::diagnosis::attribution::context::{Cause, Context, raw_signatures, span};
 use crate::diagnosis::attribution::examined::afresh;
 use crate::diagnosis::attribution::reported::{Bias, Elsewhere, ParameterOut};
 use crate::diagnosis::attribution::shrink::{GapMeter, HeldOut, Size, shrink};
@@ -23,6 +23,7 @@ use crate::diagnosis::levels::{INVISIBLE, POLISHED, SEPARABLE, WEAK};
 use crate::diagnosis::noise::dependence::Dependence;
 use crate::diagnosis::noise::spikes::calmed;
 use crate::diagnosis::options::Options;
+use crate::diagnosis::search::Reach;
 use crate::diagnosis::verdict::told::no_noise;
 use crate::diagnosis::verdict::types::NoiseOut;
 
@@ -251,7 +252,13 @@ fn fitted(context: &Context<'_>, readings: &DVector<f64>) -> Vec<Cause> {
         };
         let start = context.start(&remainder, effect).cloned().or_else(first);
         let start = start.unwrap_or_else(Shape::only);
-        let found = context.refine(context.model, readings, effect, &start, &causes);
+        let found = context.refine(
+            context.model,
+            readings,
+            effect,
+            (&start, Reach::WIDE),
+            &causes,
+        );
         let (cause, _) = context.come_back(context.model, readings, found, &causes);
         causes.push(cause);
     }
@@ -259,9 +266,9 @@ fn fitted(context: &Context<'_>, readings: &DVector<f64>) -> Vec<Cause> {
         for k in 0..causes.len() {
             let mut others = causes.clone();
             let own = others.remove(k);
-            let start = finer(&own.shape);
+            let start = (&own.shape, Reach::NEAR);
             causes[k] = context
-                .refine(context.model, readings, own.effect, &start, &others)
+                .refine(context.model, readings, own.effect, start, &others)
                 .0;
         }
     }

@@ -31,25 +31,51 @@ pub(super) fn around(
     (at, moved)
 }
 
-/// Coordinate search: the smallest value found from a start, with a first step for each coordinate
-/// (zero keeps it). Each coordinate is tried on both sides and at the vertex of the parabola through
-/// the three values; steps shrink to what the vertex asks for, or to half, down to `precision` of
-/// their first length.
+/// How far from its start a search looks first, and how closely it settles, in steps of each coordinate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Reach {
+    pub first: f64,
+    pub last: f64,
+}
+
+impl Reach {
+    /// From a start of a grid.
+    pub const WIDE: Self = Self {
+        first: 1.0,
+        last: 1e-2,
+    };
+    /// From what a search has found, something else having changed since.
+    pub const NEAR: Self = Self {
+        first: 0.3,
+        last: 3e-3,
+    };
+    /// The same where what has changed since is little.
+    pub const CLOSE: Self = Self {
+        first: 0.03,
+        last: 3e-3,
+    };
+}
+
+/// Coordinate search: the smallest value found from a start, with a step for each coordinate (zero
+/// keeps it). Each coordinate is tried on both sides and at the vertex of the parabola through the
+/// three values; what it is tried at shrinks to what the vertex asks for, or to half, and grows again
+/// where it walks.
 pub(super) fn coordinate_search(
     start: &[f64],
     steps: &[f64],
-    precision: f64,
+    Reach { first, last }: Reach,
     mut value: impl FnMut(&[f64]) -> f64,
 ) -> (Vec<f64>, f64) {
     let mut at = start.to_vec();
     let mut best = value(&at);
-    let mut scales = vec![1.0; steps.len()];
+    let mut scales = vec![first; steps.len()];
+    let longest = first.max(Reach::NEAR.first);
     let free = steps.iter().filter(|s| **s != 0.0).count();
     let mut left = FEWEST.max(EACH * free) as isize;
     loop {
         let mut searching = false;
         for (k, step) in steps.iter().enumerate().filter(|(_, s)| **s != 0.0) {
-            if scales[k] <= precision || left <= 0 {
+            if scales[k] <= last || left <= 0 {
                 continue;
             }
             searching = true;
@@ -79,7 +105,7 @@ pub(super) fn coordinate_search(
             best = moved.1;
             at[k] = centre + moved.0 * reach;
             scales[k] *= match moved.0.abs() {
-                1.0 => 1.0,
+                1.0 => (longest / scales[k]).clamp(1.0, 2.0),
                 part if inside => (0.5 * part).clamp(0.05, 0.5),
                 _ => 0.5,
             };
@@ -104,7 +130,7 @@ mod tests {
             let hollow = if away < 0.04 { -1.0 + away } else { 0.0 };
             hollow + (v[1] - 2.0).powi(2)
         };
-        let (at, value) = coordinate_search(&[0.2, 2.0], &[0.1, 0.1], 1e-2, hollow);
+        let (at, value) = coordinate_search(&[0.2, 2.0], &[0.1, 0.1], Reach::WIDE, hollow);
         assert!(value == 0.0, "small steps: {at:?}");
         let (at, moved) = around(&[0.2, 2.0], &[(0, 1.0)], hollow);
         // Half the way between two of the points that are tried.
@@ -119,7 +145,7 @@ mod tests {
     #[test]
     fn a_smooth_minimum_takes_few_values() {
         let mut count = 0;
-        let (at, value) = coordinate_search(&[0.0, 0.0], &[1.0, 1.0], 1e-2, |v| {
+        let (at, value) = coordinate_search(&[0.0, 0.0], &[1.0, 1.0], Reach::WIDE, |v| {
             count += 1;
             (v[0] - 0.4).powi(2) + 3.0 * (v[1] + 0.7).powi(2)
         });
@@ -135,13 +161,13 @@ mod tests {
 
     #[test]
     fn a_minimum_several_steps_away_is_walked_to() {
-        let far = coordinate_search(&[0.0], &[1.0], 1e-2, |v| (v[0] - 25.3).abs());
+        let far = coordinate_search(&[0.0], &[1.0], Reach::WIDE, |v| (v[0] - 25.3).abs());
         assert!((far.0[0] - 25.3).abs() < 1e-2, "{:?}", far.0);
     }
 
     #[test]
     fn steps_and_what_is_not_allowed_are_withstood() {
-        let (at, value) = coordinate_search(&[0.2, 5.0], &[1.0, 0.0], 1e-2, |v| {
+        let (at, value) = coordinate_search(&[0.2, 5.0], &[1.0, 0.0], Reach::WIDE, |v| {
             if v[0] > 2.5 {
                 f64::INFINITY
             } else {

@@ -62,24 +62,28 @@ pub struct Spot {
 /// Positions that are tried one by one before halving.
 const NEARBY: usize = 6;
 
+/// The first of rising positions that is not before one, sought from a neighbour on, by halving where it is far
+/// from there.
+pub(super) fn first_not_before(positions: &[f64], near: usize, x: f64) -> usize {
+    let n = positions.len();
+    let mut right = near.min(n);
+    for _ in 0..NEARBY {
+        if right < n && positions[right] < x {
+            right += 1;
+        } else if right > 0 && positions[right - 1] >= x {
+            right -= 1;
+        } else {
+            return right;
+        }
+    }
+    positions.partition_point(|p| *p < x)
+}
+
 impl Spot {
-    /// The spot of a position, sought from a neighbour on, by halving where it is far from there.
+    /// The spot of a position, sought from a neighbour on.
     pub fn new(positions: &[f64], near: usize, x: f64) -> Self {
         let n = positions.len();
-        let mut right = near.min(n);
-        for step in 0.. {
-            if step == NEARBY {
-                right = positions.partition_point(|p| *p < x);
-                break;
-            }
-            if right < n && positions[right] < x {
-                right += 1;
-            } else if right > 0 && positions[right - 1] >= x {
-                right -= 1;
-            } else {
-                break;
-            }
-        }
+        let right = first_not_before(positions, near, x);
         if right == 0 || right >= n {
             let end = if right == 0 { 0 } else { n - 1 };
             return Self {

@@ -1,17 +1,20 @@
 //! Which effects could stand in the place of one of several causes, the others kept.
 
+use std::sync::Arc;
+
 use errsep_models::model::Shape;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::diagnosis::attribution::context::{Cause, Context};
+use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
 use crate::diagnosis::attribution::limits::is_beyond_limit;
 use crate::diagnosis::attribution::outweighed::{Member, drop_outweighed};
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::attribution::standing::{has_possible_sizes, possible, stands, without};
 use crate::diagnosis::levels::{
-    EARNED, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, chi_squared_of_two,
+    BETTER, EARNED, HOPELESS, HOPELESS_PART, IN_REACH, NEAR, chi_squared_of_two,
 };
+use crate::diagnosis::search::Reach;
 
 /// An effect that explains the gap in the place of one of the causes.
 pub(in crate::diagnosis) struct Alternative {
@@ -29,86 +32,18 @@ pub(super) fn group_of(members: &[Member], k: usize) -> Vec<Alternative> {
     members.iter().map(of).collect()
 }
 
-/// The effects that are adequate in the place of cause `k`, the best fit first; those are tried that explain
-/// less than it by no more than a part of what it does.
+/// The effects that are adequate in the place of cause `k` of the best causes, which leave `remainder`, the best fit
+/// first; those are tried that explain less than it by no more than a part of what it does.
 pub(super) fn alternatives(
     context: &Context<'_>,
     readings: &DVector<f64>,
-    best: &[Cause],
+    best: (&[Cause], &Arc<Remainder>),
     k: usize,
     part: f64,
 ) -> Vec<Member> {
-    let others = without(best, k);
-    let remainder = context.remainder(readings, &others);
-    let strength = |cause: &Cause| {
-        let mut all = others.clone();
-        all.push(cause.clone());
-        remainder.residual.norm_squared() - context.misfit(readings, &all)
-    };
-    let own = strength(&best[k]);
-    let reach = HOPELESS + part * own;
-    let least = context.misfit(readings, best) + HOPELESS + HOPELESS_PART * own;
-    let best_of = |effect: usize| -> Option<Member> {
-        if others.iter().any(|c| c.effect == effect) {
-            return None;
-        }
-        let trials = if effect == best[k].effect {
-            // Relatives that a state bent by the first may hide.
-            let relatives = context.catalogue[effect].relatives(context.model, &best[k].shape);
-            let columns = best[k].columns.len();
-            let other = |shape: Shape| {
-                let here = context.cause(context.model, effect, shape.clone());
-                let near = here.columns.len() <= columns && strength(&here) > NEAR * own - HOPELESS;
-                near.then(|| context.refine_alone(context.model, readings, effect, &shape, &others))
-            };
-            let mut own = vec![Some(best[k].clone())];
-            own.par_extend(relatives.into_par_iter().map(other));
-            own
-        } else {
-            if context.p_value(&remainder, effect) > EARNED {
-                return None;
-            }
-            let start = context.start(&remainder, effect);
-            vec![start.map(|start| {
-                let found = context.refine(context.model, readings, effect, start, &others);
-                if strength(&found.0) < IN_REACH * own {
-                    return found.0;
-                }
-                let (cause, _) = context.come_back(context.model, readings, found, &others);
-                cause
-            })]
-        };
-        let judged = trials.into_par_iter().flatten().filter_map(|cause| {
-            if strength(&cause) < own - reach || !possible(context, readings, &others, &cause) {
-                return None;
-            }
-            let known = cause.shape == best[k].shape && effect == best[k].effect;
-            let mut trial = others.clone();
-            trial.insert(k, cause);
-            let trial = if known {
-                trial
-            } else {
-                context.relinearised(readings, &trial, least)
-            };
-            let left = context.judged(readings, &trial);
-            let misfit = left.square;
-            let passes = has_possible_sizes(context, readings, &trial, k..k + 1)
-                && context.adequate(&trial, &left)
-                && is_beyond_limit(context, readings, &trial, k)
-                && Sizes::fitted(context, readings, &trial)
-                    .is_some_and(|sizes| stands(context, &trial, &sizes, k));
-            passes.then(|| Member {
-                misfit,
-                size: part_of_plausible(context, readings, &trial, k),
-                evidence: evidence(context, readings, &trial, k, misfit),
-                causes: trial,
-                left,
-            })
-        });
-        judged.max_by(|a, b| a.evidence.total_cmp(&b.evidence))
-    };
+    let place = Place::of(context, readings, best, k, part);
     let effects = (0..context.catalogue.len()).into_par_iter();
-    let mut members: Vec<Member> = effects.filter_map(best_of).collect();
+    let mut members: Vec<Member> = effects.filter_map(|effect| place.best_of(effect)).collect();
     drop_outweighed(context, &mut members, k);
     let least = members
         .iter()
@@ -126,6 +61,184 @@ pub(super) fn alternatives(
         })
     });
     members
+}
+
+/// The place of one of several causes.
+struct Place<'s> {
+    context: &'s Context<'s>,
+    readings: &'s DVector<f64>,
+    /// The causes, and what they leave.
+    best: &'s [Cause],
+    left: &'s Arc<Remainder>,
+    k: usize,
+    /// The other causes, and what they leave.
+    others: Vec<Cause>,
+    beside: Remainder,
+    /// What the cause explains beside the others, and by how much another may explain less.
+    own: f64,
+    reach: f64,
+    /// The misfit above which another is not refitted.
+    hopeless: f64,
+}
+
+impl<'s> Place<'s> {
+    fn of(
+        context: &'s Context<'s>,
+        readings: &'s DVector<f64>,
+        (best, left): (&'s [Cause], &'s Arc<Remainder>),
+        k: usize,
+        part: f64,
+    ) -> Self {
+        let others = without(best, k);
+        let beside = context.remainder(readings, &others);
+        let misfit = context.misfit(readings, best);
+        let own = beside.residual.norm_squared() - misfit;
+        Self {
+            context,
+            readings,
+            best,
+            left,
+            k,
+            others,
+            beside,
+            own,
+            reach: HOPELESS + part * own,
+            hopeless: misfit + HOPELESS + HOPELESS_PART * own,
+        }
+    }
+
+    /// What a cause explains beside the others.
+    fn strength(&self, cause: &Cause) -> f64 {
+        let mut all = self.others.clone();
+        all.push(cause.clone());
+        self.beside.residual.norm_squared() - self.context.misfit(self.readings, &all)
+    }
+
+    /// An effect as the cause, of greatest evidence of those in which it is adequate.
+    fn best_of(&self, effect: usize) -> Option<Member> {
+        if self.others.iter().any(|c| c.effect == effect) {
+            return None;
+        }
+        let found = if effect == self.best[self.k].effect {
+            self.relatives()
+        } else {
+            self.another(effect).into_iter().collect()
+        };
+        let refitted = found
+            .into_par_iter()
+            .filter_map(|cause| self.refitted(cause));
+        let refitted: Vec<(f64, Vec<Cause>)> = refitted.collect();
+        let mut distinct: Vec<(f64, Vec<Cause>)> = Vec::new();
+        for (misfit, causes) in refitted {
+            let same = |known: &(f64, Vec<Cause>)| {
+                (known.0 - misfit).abs() < BETTER && in_same_variants(&known.1, &causes)
+            };
+            if !distinct.iter().any(same) {
+                distinct.push((misfit, causes));
+            }
+        }
+        let judged = distinct
+            .into_par_iter()
+            .filter_map(|(misfit, causes)| self.judged(misfit, causes));
+        judged.max_by(|a, b| a.evidence.total_cmp(&b.evidence))
+    }
+
+    /// The cause, and its relatives, that a state bent by it may hide.
+    fn relatives(&self) -> Vec<Cause> {
+        let (context, cause) = (self.context, &self.best[self.k]);
+        let relatives = context.catalogue[cause.effect].relatives(context.model, &cause.shape);
+        let other = |shape: Shape| {
+            let here = context.cause(context.model, cause.effect, shape.clone());
+            let near = here.columns.len() <= cause.columns.len()
+                && self.strength(&here) > NEAR * self.own - HOPELESS;
+            near.then(|| {
+                let start = (&shape, Reach::WIDE);
+                context.refine_alone(
+                    context.model,
+                    self.readings,
+                    cause.effect,
+                    start,
+                    &self.others,
+                )
+            })
+        };
+        let mut all = vec![cause.clone()];
+        all.par_extend(relatives.into_par_iter().filter_map(other));
+        all
+    }
+
+    /// Another effect in its place, where it stands out beside the others.
+    fn another(&self, effect: usize) -> Option<Cause> {
+        let (context, readings) = (self.context, self.readings);
+        if context.p_value(&self.beside, effect) > EARNED {
+            return None;
+        }
+        let start = (context.start(&self.beside, effect)?, Reach::WIDE);
+        let found = context.refine(context.model, readings, effect, start, &self.others);
+        if self.strength(&found.0) < IN_REACH * self.own {
+            return Some(found.0);
+        }
+        Some(
+            context
+                .come_back(context.model, readings, found, &self.others)
+                .0,
+        )
+    }
+
+    /// The causes with another in the place, fitted with the state, and their misfit; nothing where it explains too
+    /// little.
+    fn refitted(&self, cause: Cause) -> Option<(f64, Vec<Cause>)> {
+        let (context, readings) = (self.context, self.readings);
+        if self.strength(&cause) < self.own - self.reach
+            || !possible(context, readings, &self.others, &cause)
+        {
+            return None;
+        }
+        let known = is_same(&cause, &self.best[self.k]);
+        let mut causes = self.others.clone();
+        causes.insert(self.k, cause);
+        if !known {
+            causes = context.relinearised(readings, &causes, self.hopeless);
+        }
+        Some((context.misfit(readings, &causes), causes))
+    }
+
+    /// Causes as a member, where they leave nothing and the one in the place stands.
+    fn judged(&self, misfit: f64, causes: Vec<Cause>) -> Option<Member> {
+        let (context, readings, k) = (self.context, self.readings, self.k);
+        let stands = has_possible_sizes(context, readings, &causes, k..k + 1)
+            && Sizes::fitted(context, readings, &causes)
+                .is_some_and(|sizes| stands(context, &causes, &sizes, k));
+        if !stands {
+            return None;
+        }
+        let known = causes.iter().zip(self.best).all(|(a, b)| is_same(a, b));
+        let left = if known {
+            Arc::clone(self.left)
+        } else {
+            Arc::new(context.judged(readings, &causes))
+        };
+        let passes =
+            context.adequate(&causes, &left) && is_beyond_limit(context, readings, &causes, k);
+        passes.then(|| Member {
+            misfit,
+            size: part_of_plausible(context, readings, &causes, k),
+            evidence: evidence(context, readings, &causes, k, misfit),
+            causes,
+            left,
+        })
+    }
+}
+
+/// Whether a cause is the same in the same shape.
+fn is_same(one: &Cause, other: &Cause) -> bool {
+    one.effect == other.effect && one.shape == other.shape
+}
+
+/// Whether two ways to have the same effects have them in the same variants.
+fn in_same_variants(one: &[Cause], other: &[Cause]) -> bool {
+    let mut pairs = one.iter().zip(other);
+    pairs.all(|(a, b)| a.shape.variant == b.shape.variant)
 }
 
 /// Logarithm of the evidence for cause `k` beside the others against nothing in its place, by the

@@ -9,13 +9,14 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::confidence::{Answer, confidence_set};
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder, finer};
+use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
 use crate::diagnosis::attribution::fewer::in_fewest;
 use crate::diagnosis::attribution::standing::{possible, without};
 use crate::diagnosis::levels::{
     BETTER, EARNED, FAR, FREELY, HOPELESS, IN_REACH, MOST_CAUSES, NO_BETTER, PAIR_REACH, PAIRS,
     POLISHED, REFINED, STALLED,
 };
+use crate::diagnosis::search::Reach;
 
 /// Seeks the causes of what stands out in readings; `begun` are those without which noise and state were had.
 pub(in crate::diagnosis) fn attribute(
@@ -26,8 +27,8 @@ pub(in crate::diagnosis) fn attribute(
 ) -> Option<Answer> {
     let strongest_alone = strongest(context, readings, first, (&[], begun));
     if let [only] = begun {
-        let start = finer(&only.shape);
-        let (cause, t) = context.refine(context.model, readings, only.effect, &start, &[]);
+        let start = (&only.shape, Reach::NEAR);
+        let (cause, t) = context.refine(context.model, readings, only.effect, start, &[]);
         let better = |(other, other_t): &(Cause, f64)| other.effect == only.effect && *other_t > t;
         if !strongest_alone.as_ref().is_some_and(better) {
             let answer = confidence_set(context, readings, &[cause]);
@@ -289,11 +290,15 @@ fn standing_out(
     sought
         .into_par_iter()
         .filter_map(|effect| {
-            let refine =
-                |start: &Shape| context.refine(context.model, readings, effect, start, causes);
+            let refine = |start: (&Shape, Reach)| {
+                context.refine(context.model, readings, effect, start, causes)
+            };
             let (found, again) = rayon::join(
-                || context.start(remainder, effect).map(refine),
-                || known(effect).map(|cause| refine(&finer(&cause.shape))),
+                || {
+                    let start = context.start(remainder, effect)?;
+                    Some(refine((start, Reach::WIDE)))
+                },
+                || known(effect).map(|cause| refine((&cause.shape, Reach::NEAR))),
             );
             let both = found.into_iter().chain(again);
             both.max_by(|a, b| paid(context, a).total_cmp(&paid(context, b)))
@@ -339,14 +344,14 @@ fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause], 
         let mut changed = false;
         for k in 0..causes.len() {
             let others = without(causes, k);
-            let start = finer(&causes[k].shape);
             let left = context.misfit(readings, &others);
             let again = (left - tried[k]).abs() > NO_BETTER;
             let refine = |effect: usize, start: &Shape| {
-                context.refine(context.model, readings, effect, start, &others)
+                let near = (start, Reach::NEAR);
+                context.refine(context.model, readings, effect, near, &others)
             };
             let (refined, found) = rayon::join(
-                || refine(causes[k].effect, &start),
+                || refine(causes[k].effect, &causes[k].shape),
                 || {
                     again.then(|| {
                         let remainder = context.remainder(readings, &others);
@@ -357,7 +362,7 @@ fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause], 
             let swapped = found.map(|found| {
                 tried[k] = left;
                 let strongest = greatest(context, readings, &others, found, refined.1);
-                strongest.map(|(c, _)| refine(c.effect, &finer(&c.shape)))
+                strongest.map(|(c, _)| refine(c.effect, &c.shape))
             });
             match swapped.flatten() {
                 Some(other) if paid(context, &other) > paid(context, &refined) + BETTER => {

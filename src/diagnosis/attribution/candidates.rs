@@ -12,6 +12,7 @@ use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::attribution::standing::{possible, without};
 use crate::diagnosis::detection::dictionary::statistic;
 use crate::diagnosis::levels::chi_squared_of_two;
+use crate::diagnosis::search::Reach;
 
 /// What each effect explains, by that. `groups` are those of the causes, where they are named.
 pub(in crate::diagnosis) fn candidates(
@@ -142,7 +143,13 @@ pub(in crate::diagnosis) fn variants_alike(
         };
         let fits = near.values.len() == near.steps.len() && effect.allowed(context.model, &near);
         let start = if fits { near } else { start };
-        let other = context.refine_alone(context.model, readings, cause.effect, &start, &others);
+        let other = context.refine_alone(
+            context.model,
+            readings,
+            cause.effect,
+            (&start, Reach::WIDE),
+            &others,
+        );
         // One that holds this variant fits as well whatever the readings are.
         if other.unknowns() > cause.unknowns() {
             return None;

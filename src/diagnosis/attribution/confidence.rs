@@ -4,6 +4,8 @@
 //! of the noise: no other effect, no place. All causes that pass are the confidence set (the
 //! inversion of the test); significance alone names nothing. Of several each must earn its place.
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 
 use crate::diagnosis::attribution::alternatives::{Alternative, alternatives, evidence, group_of};
@@ -19,7 +21,7 @@ pub(in crate::diagnosis) struct Answer {
     /// has the greatest evidence, unless those of greatest evidence do not pass together.
     pub groups: Vec<Vec<Alternative>>,
     /// What remains beside them.
-    pub remainder: Remainder,
+    pub remainder: Arc<Remainder>,
     /// Whether the remainder is adequate.
     pub complete: bool,
 }
@@ -31,14 +33,14 @@ pub(in crate::diagnosis) fn confidence_set(
     causes: &[Cause],
 ) -> Answer {
     let mut best = context.relinearised(readings, causes, f64::INFINITY);
-    let mut remainder = context.judged(readings, &best);
+    let mut remainder = Arc::new(context.judged(readings, &best));
     let mut groups = Vec::new();
     for k in 0..causes.len() {
-        let mut members = alternatives(context, readings, &best, k, HOPELESS_PART);
+        let mut members = alternatives(context, readings, (&best, &remainder), k, HOPELESS_PART);
         if members.is_empty() && causes.len() == 1 {
             // What bends the state most is seen least at that state.
             let least = context.misfit(readings, &best);
-            members = alternatives(context, readings, &best, k, BENT);
+            members = alternatives(context, readings, (&best, &remainder), k, BENT);
             members.retain(|m| m.left.residual.norm_squared() < least);
         }
         let mut group = group_of(&members, k);
@@ -79,7 +81,7 @@ fn led(context: &Context<'_>, readings: &DVector<f64>, mut answer: Answer) -> An
     let led = effects_of(&leaders);
     if led != effects_of(&answer.causes) && distinct(&led) {
         let trial = context.relinearised(readings, &leaders, f64::INFINITY);
-        let left = context.judged(readings, &trial);
+        let left = Arc::new(context.judged(readings, &trial));
         if context.adequate(&trial, &left) && context.amplitudes(readings, &trial).is_some() {
             (answer.causes, answer.remainder) = (trial, left);
         }

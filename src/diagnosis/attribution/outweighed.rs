@@ -1,5 +1,7 @@
 //! Which of the effects that pass in a cause's place stay in its group.
 
+use std::sync::Arc;
+
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder, span};
 use crate::diagnosis::levels::{HELD, ODDS, OUTDONE, chi_squared_quantile};
 
@@ -8,7 +10,7 @@ pub(in crate::diagnosis) struct Member {
     pub causes: Vec<Cause>,
     pub misfit: f64,
     pub evidence: f64,
-    pub left: Remainder,
+    pub left: Arc<Remainder>,
     /// Size as a part of what is physically plausible.
     pub size: f64,
 }

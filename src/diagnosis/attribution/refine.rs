@@ -9,10 +9,8 @@ use crate::diagnosis::attribution::context::{Cause, Context, as_matrix, column, 
 use crate::diagnosis::detection::dictionary::{inverse, is_positive, products, statistic};
 use crate::diagnosis::detection::space::orthonormal;
 use crate::diagnosis::levels::{ALIKE, UNSEARCHED};
-use crate::diagnosis::search::{around, coordinate_search};
+use crate::diagnosis::search::{Reach, around, coordinate_search};
 
-/// Part of a shape's first step that its search settles to.
-const PRECISION: f64 = 1e-2;
 /// How often values that come back are tried around their cycles.
 const ROUNDS: usize = 4;
 
@@ -24,11 +22,11 @@ impl Context<'_> {
         state: &AnyModel,
         readings: &DVector<f64>,
         effect: usize,
-        start: &Shape,
+        (start, reach): (&Shape, Reach),
         beside: &[Cause],
     ) -> (Cause, f64) {
         let seen = Seen::of(self, state, readings, effect, beside);
-        let (mut shape, mut t) = seen.searched(start);
+        let (mut shape, mut t) = seen.searched(start, reach);
         let log_readings = (self.space.readings() as f64).ln();
         let weighed = |shape: &Shape, t: f64| {
             let known = &self.catalogue[effect];
@@ -54,8 +52,8 @@ impl Context<'_> {
             let is_spared = |(here, own, other): &(f64, usize, Shape), searched: &[usize]| {
                 let alike = searched.iter().filter(|v| **v == other.variant).count();
                 // One that holds the other needs no search to be better; one of another kind does.
-                let reach = if *own == columns { UNSEARCHED * t } else { 0.0 };
-                *here <= least - reach || alike >= ALIKE
+                let added = if *own == columns { UNSEARCHED * t } else { 0.0 };
+                *here <= least - added || alike >= ALIKE
             };
             if is_spared(&relatives[k], &searched) {
                 continue;
@@ -74,7 +72,7 @@ impl Context<'_> {
                 }
                 let found: Vec<(Shape, f64)> = next
                     .par_iter()
-                    .map(|j| seen.searched(&relatives[*j].2))
+                    .map(|j| seen.searched(&relatives[*j].2, reach))
                     .collect();
                 next.into_iter()
                     .zip(found)
@@ -111,7 +109,7 @@ impl Context<'_> {
     /// The statistic of an effect at the best shape that is found from a start, without relatives.
     pub fn greatest_near(&self, readings: &DVector<f64>, effect: usize, start: &Shape) -> f64 {
         Seen::of(self, self.model, readings, effect, &[])
-            .searched(start)
+            .searched(start, Reach::WIDE)
             .1
     }
 
@@ -121,10 +119,10 @@ impl Context<'_> {
         state: &AnyModel,
         readings: &DVector<f64>,
         effect: usize,
-        start: &Shape,
+        (start, reach): (&Shape, Reach),
         beside: &[Cause],
     ) -> Cause {
-        let (shape, _) = Seen::of(self, state, readings, effect, beside).searched(start);
+        let (shape, _) = Seen::of(self, state, readings, effect, beside).searched(start, reach);
         self.cause(state, effect, shape)
     }
 }
@@ -188,14 +186,14 @@ impl<'s> Seen<'s> {
 
     /// The best shape from a start, settled, and its statistic; one that settles to another variant is
     /// searched there.
-    fn searched(&self, start: &Shape) -> (Shape, f64) {
+    fn searched(&self, start: &Shape, reach: Reach) -> (Shape, f64) {
         let mut shape = start.clone();
         if shape.free() > 0 {
             let mut by_traces = ByTraces::new(self, start);
             let misfit = |values: &[f64]| self.misfit(start, values, by_traces.as_mut());
-            shape.values = coordinate_search(&start.values, &start.steps, PRECISION, misfit).0;
+            shape.values = coordinate_search(&start.values, &start.steps, reach, misfit).0;
         }
-        self.settled(shape)
+        self.settled(shape, reach)
     }
 
     /// What small steps stop beside: the best around the cycles, searched on from there.
@@ -208,9 +206,9 @@ impl<'s> Seen<'s> {
             if !moved {
                 break;
             }
-            shape.values = coordinate_search(&values, &start.steps, PRECISION, &mut misfit).0;
+            shape.values = coordinate_search(&values, &start.steps, Reach::WIDE, &mut misfit).0;
         }
-        self.settled(shape)
+        self.settled(shape, Reach::WIDE)
     }
 
     /// The statistic of other values of a shape, the greatest the least; infinite where they are not allowed.
@@ -247,7 +245,7 @@ impl<'s> Seen<'s> {
     }
 
     /// A shape with what readings and its size make of it.
-    fn settled(&self, mut shape: Shape) -> (Shape, f64) {
+    fn settled(&self, mut shape: Shape, reach: Reach) -> (Shape, f64) {
         if let Some(traced) = self.traced(&shape) {
             shape = traced;
         }
@@ -259,7 +257,7 @@ impl<'s> Seen<'s> {
                 break;
             };
             if next.variant != shape.variant {
-                return self.searched(&next);
+                return self.searched(&next, reach);
             }
             if next.values == shape.values {
                 break;

@@ -6,21 +6,27 @@ use std::borrow::Cow;
 use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 
-use crate::diagnosis::attribution::context::{Cause, Context, finer};
+use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::attribution::mixing::Mixing;
 use crate::diagnosis::attribution::standing::has_possible_sizes;
+use crate::diagnosis::search::Reach;
 
 /// Relative change of the amplitudes at which refining stops.
 const AT_REST: f64 = 1e-4;
 
-/// Rounds in which a shape of more than [`MANY`] parameters is searched: with so many a search always finds
-/// something, and the state moves it little.
+/// Rounds in which relatives are tried, and a shape of more than [`MANY`] parameters is searched: with so many a search
+/// always finds something, and by then the state moves them little.
 const SEARCHED: usize = 2;
 /// See [`SEARCHED`].
 const MANY: usize = 12;
 
 /// Most rounds of fitting the state without the causes.
 const ROUNDS: usize = 16;
+/// Rounds in which the best fit does not become better, by squares of standard deviations, after which there are no
+/// more: what is followed anew in each round may never rest.
+const IDLE: usize = 4;
+/// See [`IDLE`].
+const NO_GAIN: f64 = 0.02;
 
 impl Context<'_> {
     /// Causes bend the state at which their signatures are taken: takes their change out of the
@@ -35,13 +41,11 @@ impl Context<'_> {
     ) -> Vec<Cause> {
         let mut best = (f64::INFINITY, causes.to_vec());
         let mut causes = causes.to_vec();
-        for cause in &mut causes {
-            cause.shape = finer(&cause.shape);
-        }
         let Some(mut changes) = self.changes(readings, &causes) else {
             return causes;
         };
         let mut mixing = Mixing::default();
+        let mut idle = 0;
         for round in 0..ROUNDS {
             let state = self
                 .model
@@ -50,9 +54,23 @@ impl Context<'_> {
                 let mut others = causes.clone();
                 let own = others.remove(k);
                 let state = self.seen_by(k, &state, &causes, &changes);
-                causes[k] = if round < SEARCHED || own.shape.free() <= MANY {
-                    self.refine(&state, readings, own.effect, &own.shape, &others)
-                        .0
+                causes[k] = if round < SEARCHED {
+                    self.refine(
+                        &state,
+                        readings,
+                        own.effect,
+                        (&own.shape, Reach::NEAR),
+                        &others,
+                    )
+                    .0
+                } else if own.shape.free() <= MANY {
+                    self.refine_alone(
+                        &state,
+                        readings,
+                        own.effect,
+                        (&own.shape, Reach::CLOSE),
+                        &others,
+                    )
                 } else {
                     self.at_rest(&state, readings, &own, &others)
                 };
@@ -66,8 +84,12 @@ impl Context<'_> {
             if !has_possible_sizes(self, readings, &causes, 0..causes.len()) {
                 break;
             }
+            idle = if gained > NO_GAIN { 0 } else { idle + 1 };
             if misfit < best.0 {
                 best = (misfit, causes.clone());
+            }
+            if idle == IDLE {
+                break;
             }
             let Some(next) = self.changes(readings, &causes) else {
                 break;
@@ -90,7 +112,13 @@ impl Context<'_> {
     ) -> Cause {
         let mut shape = cause.shape.clone();
         shape.steps.fill(0.0);
-        let mut kept = self.refine_alone(state, readings, cause.effect, &shape, others);
+        let mut kept = self.refine_alone(
+            state,
+            readings,
+            cause.effect,
+            (&shape, Reach::CLOSE),
+            others,
+        );
         kept.shape.steps.clone_from(&cause.shape.steps);
         kept
     }

@@ -26,6 +26,10 @@ const LEAST: f64 = -0.5;
 /// Part of the change by a step of an amplitude that a further round may leave out of its derivative.
 const AT_REST: f64 = 1e-3;
 
+/// Part of a shape's step over which a derivative is taken, either way: where a signature jumps between two readings
+/// a longer one would count the jump as known to less than their distance.
+const SLOPE: f64 = 1e-3;
+
 /// Amplitudes and shapes of causes fitted together.
 pub(in crate::diagnosis) struct Sizes {
     /// The amplitudes, cause by cause.
@@ -236,10 +240,10 @@ pub(in crate::diagnosis) fn beside(cause: &Cause, parameter: usize) -> Option<(S
     }
     let moved = |sign: f64| {
         let mut shape = cause.shape.clone();
-        shape.values[parameter] += sign * 0.1 * step;
+        shape.values[parameter] += sign * SLOPE * step;
         shape
     };
-    Some((moved(-1.0), moved(1.0), 0.2 * step))
+    Some((moved(-1.0), moved(1.0), 2.0 * SLOPE * step))
 }
 
 /// The whitened, projected change by causes of given amplitudes, at the state that is left without

@@ -17,7 +17,7 @@ use statrs::function::gamma::ln_gamma;
 
 use crate::diagnosis::noise::contrasts::Contrasts;
 use crate::diagnosis::noise::law::Components;
-use crate::diagnosis::search::coordinate_search;
+use crate::diagnosis::search::{Reach, coordinate_search};
 
 /// Proposals for each kind of law.
 const PROPOSALS: usize = 300;
@@ -159,7 +159,7 @@ fn proposed(
     let mode = kind
         .starts(range)
         .into_iter()
-        .map(|(start, steps)| coordinate_search(&start, &steps, 1e-2, |p| judged(p).0))
+        .map(|(start, steps)| coordinate_search(&start, &steps, Reach::WIDE, |p| judged(p).0))
         .fold((Vec::new(), f64::INFINITY), |best, next| {
             if next.1 < best.1 { next } else { best }
         })

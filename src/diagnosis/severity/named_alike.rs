@@ -13,6 +13,7 @@ use crate::diagnosis::attribution::standing::possible;
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::detection::null::rows_of;
 use crate::diagnosis::levels::{EARNED, REFINED, UNSEARCHED};
+use crate::diagnosis::search::Reach;
 use crate::diagnosis::severity::grounds::Grounds;
 use crate::diagnosis::severity::rivals::{Drawn, Family};
 use crate::diagnosis::severity::stage::Name;
@@ -68,7 +69,8 @@ fn is_first(context: &Context<'_>, name: &Name, rivals: &Drawn, rival: usize) ->
         .into_iter()
         .filter_map(|(_, effect)| {
             let start = context.start(&first, effect)?;
-            let (cause, t) = context.refine(context.model, &readings, effect, start, &[]);
+            let (cause, t) =
+                context.refine(context.model, &readings, effect, (start, Reach::WIDE), &[]);
             possible(context, &readings, &[], &cause).then_some((cause, t))
         })
         .collect();

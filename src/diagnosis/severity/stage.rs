@@ -16,6 +16,7 @@ use crate::diagnosis::detection::dictionary::Dictionary;
 use crate::diagnosis::detection::folding::Sums;
 use crate::diagnosis::detection::null::{BATCH, add_surprises, seen};
 use crate::diagnosis::levels::{EARNED, REFINED, UNSEARCHED};
+use crate::diagnosis::search::Reach;
 use crate::diagnosis::severity::rivals::Drawn;
 
 /// A name that was given.
@@ -221,6 +222,6 @@ fn refined(
     effect: usize,
 ) -> Option<(Cause, f64)> {
     let start = context.start(first, effect)?;
-    let (cause, t) = context.refine(context.model, readings, effect, start, &[]);
+    let (cause, t) = context.refine(context.model, readings, effect, (start, Reach::WIDE), &[]);
     possible(context, readings, &[], &cause).then_some((cause, t))
 }

@@ -8,14 +8,17 @@ use nalgebra::{DMatrix, DVector};
 use crate::diagnosis::detection::space::Space;
 use crate::diagnosis::levels::INVISIBLE;
 use crate::diagnosis::noise::law::NoiseLaw;
-use crate::diagnosis::search::coordinate_search;
+use crate::diagnosis::search::{Reach, coordinate_search};
 use crate::diagnosis::symbolic::function::Function;
 use crate::diagnosis::symbolic::grammar::{Grammar, Term};
 
 /// Part of its visible square that a column must keep beside those before it.
 const APART: f64 = 1e-4;
-/// Part of the grid's spacing to which shapes are refined.
-const PRECISION: f64 = 1e-3;
+/// How far apart from the grid shapes are refined, and how closely.
+const REACH: Reach = Reach {
+    last: 1e-3,
+    ..Reach::WIDE
+};
 /// Places of a step that are tried on the way to the best between two of the grid.
 const PLACES: usize = 24;
 /// Rounds of refining smooth shapes and places of steps in turn.
@@ -169,7 +172,7 @@ impl View {
             0.5 * grammar.function(term).step(grammar.coordinate(term))
         };
         let steps: Vec<f64> = moved.iter().map(step).collect();
-        let (found, _) = coordinate_search(&shapes, &steps, PRECISION, value);
+        let (found, _) = coordinate_search(&shapes, &steps, REACH, value);
         self.fitted(grammar, &put(&found), residual)
             .unwrap_or(start)
     }

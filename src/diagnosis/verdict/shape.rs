@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
 use crate::diagnosis::levels::{ABSENT, PRESENT};
+use crate::diagnosis::search::Reach;
 use crate::diagnosis::verdict::places::{channel_shares, place_of};
 use crate::diagnosis::verdict::types::{Fingerprint, Nearest, Where};
 
@@ -50,7 +51,7 @@ fn nearest(
             let start = context.start(first, effect)?;
             let cause = vec![
                 context
-                    .refine(context.model, readings, effect, start, &[])
+                    .refine(context.model, readings, effect, (start, Reach::WIDE), &[])
                     .0,
             ];
             let explained = whole - context.misfit(readings, &cause);

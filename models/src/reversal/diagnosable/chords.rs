@@ -1,7 +1,7 @@
 //! How a reading changes when the slide or the probed point stands elsewhere: chords of the smooth forms, per mm,
 //! and what the exact geometry adds to a reading by the point that is touched.
 
-use super::super::smooth_profile::{SmoothProfile, Spot};
+use super::super::smooth_profile::{SmoothProfile, Spot, first_not_before};
 use super::Linearised;
 use crate::model::Place;
 
@@ -69,13 +69,14 @@ impl Linearised {
         let k = self.at(&self.record.places[reading]);
         let start = reading - k;
         let x = self.positions[k] + shift;
-        let nearest = self.positions.partition_point(|p| *p < x);
+        let nearest = first_not_before(&self.positions, k, x);
         let from = nearest.saturating_sub(1).min(n - 3);
         let [a, b, c] = [from, from + 1, from + 2].map(|j| self.positions[j]);
         let [p, q, r] = [from, from + 1, from + 2].map(|j| beneath[start + j]);
-        let there = p * (x - b) * (x - c) / ((a - b) * (a - c))
-            + q * (x - a) * (x - c) / ((b - a) * (b - c))
-            + r * (x - a) * (x - b) / ((c - a) * (c - b));
+        // Newton's divided differences.
+        let first = (q - p) / (b - a);
+        let second = ((r - q) / (c - b) - first) / (c - a);
+        let there = p + (x - a) * (first + (x - b) * second);
         (there - beneath[reading]) / shift
     }
 }

@@ -18,6 +18,10 @@ const STANDS: usize = 16;
 const SPREADS: [f64; 6] = [0.01, 0.02, 0.04, 0.08, 0.15, 0.3];
 const STEPS: usize = 40;
 const NARROW: f64 = 1e-3;
+/// Standard deviations beyond which a normal law has a part of less than 10⁻¹².
+const CERTAIN: f64 = 7.2;
+/// Logarithm of a part of the whole probability that is rounding.
+const NOTHING: f64 = 25.0;
 /// Part of the hold that is rounding.
 const ROUNDING: f64 = 1e-9;
 /// Most ways that are followed side by side, and how far behind the likeliest, in variances.
@@ -200,17 +204,31 @@ pub(super) fn threshold<'p>(
             intervals.push((held.min(then), then.max(held + NARROW)));
         }
     }
-    let likelihood = |law: &Normal| -> f64 {
-        let of = |(low, high): &(f64, f64)| (law.cdf(*high) - law.cdf(*low)).max(1e-12).ln();
-        intervals.iter().map(of).sum::<f64>() / f64::from(count)
+    let mut best = f64::NEG_INFINITY;
+    // A sum of what is never positive: no longer summed once it is too small to count.
+    let law = Normal::standard();
+    let below = |z: f64| match z {
+        z if z < -CERTAIN => 0.0,
+        z if z > CERTAIN => 1.0,
+        z => law.cdf(z),
+    };
+    let mut likelihood = |centre: f64, spread: f64| -> f64 {
+        let mut sum = 0.0;
+        for (low, high) in &intervals {
+            let held = below((high - centre) / spread) - below((low - centre) / spread);
+            sum += held.max(1e-12).ln() / f64::from(count);
+            if sum < best - NOTHING {
+                return f64::NEG_INFINITY;
+            }
+        }
+        best = best.max(sum);
+        sum
     };
     let at = |k: usize| 1.0 + LOOSE * (k as f64 / STEPS as f64 - 1.0);
-    let laws = SPREADS.into_iter().flat_map(|spread| {
-        let centres = (0..=2 * STEPS).map(at);
-        centres.filter_map(move |centre| Some((centre, Normal::new(centre, spread).ok()?)))
-    });
-    let laws: Vec<(f64, f64)> = laws.map(|(c, law)| (c, likelihood(&law))).collect();
-    let best = laws.iter().map(|l| l.1).fold(f64::NEG_INFINITY, f64::max);
+    // From the middle outwards: the likeliest come early.
+    let outwards = (0..=STEPS).flat_map(|k| [STEPS - k, STEPS + k]).skip(1);
+    let laws = outwards.flat_map(|k| SPREADS.map(|spread| (at(k), spread)));
+    let laws: Vec<(f64, f64)> = laws.map(|(c, spread)| (c, likelihood(c, spread))).collect();
     // Its mean and standard deviation with all holds and spreads as probable before.
     let weights: Vec<f64> = laws.iter().map(|(_, l)| (l - best).exp()).collect();
     let whole: f64 = weights.iter().sum();

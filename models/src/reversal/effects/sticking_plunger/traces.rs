@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::super::Linearised;
 use super::followed::{COST, Path, follow, mean_lag, threshold};
@@ -186,8 +187,12 @@ fn unfollowed(traces: &[Followed], hold: f64) -> f64 {
 fn likeliest(traces: &[Followed], hold: f64, parts: &[f64]) -> Option<(f64, Paths)> {
     let freely = of_traces(traces, hold, 0.0)?;
     let noise = variance(traces, &freely);
-    let sizes = parts.iter().map(|part| part * hold);
-    let tried = sizes.filter_map(|size| Some((size, paths(traces, size, noise)?)));
+    let tried = parts.par_iter().map(|part| {
+        let size = part * hold;
+        Some((size, paths(traces, size, noise)?))
+    });
+    let tried: Vec<Option<(f64, Paths)>> = tried.collect();
+    let tried = tried.into_iter().flatten();
     tried.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost))
 }
 

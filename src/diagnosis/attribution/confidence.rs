@@ -11,7 +11,7 @@ use nalgebra::DVector;
 use crate::diagnosis::attribution::alternatives::{Alternative, alternatives, evidence, group_of};
 use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
 use crate::diagnosis::attribution::standing::stand_together;
-use crate::diagnosis::levels::{BENT, EQUAL_EVIDENCE, HOPELESS_PART};
+use crate::diagnosis::levels::{BENT, EQUAL_EVIDENCE, FREELY, HOPELESS_PART};
 
 /// Causes that together explain the gap, and those that do it as well.
 pub(in crate::diagnosis) struct Answer {
@@ -35,8 +35,14 @@ pub(in crate::diagnosis) fn confidence_set(
     let mut best = context.relinearised(readings, causes, f64::INFINITY);
     let mut remainder = Arc::new(context.judged(readings, &best));
     let mut groups = Vec::new();
+    // Of many that do not suffice each has been swapped for what explains more, and what is lacking is another.
+    let tried = causes.len() <= FREELY || context.adequate(&best, &remainder);
     for k in 0..causes.len() {
-        let mut members = alternatives(context, readings, (&best, &remainder), k, HOPELESS_PART);
+        let mut members = if tried {
+            alternatives(context, readings, (&best, &remainder), k, HOPELESS_PART)
+        } else {
+            Vec::new()
+        };
         if members.is_empty() && causes.len() == 1 {
             // What bends the state most is seen least at that state.
             let least = context.misfit(readings, &best);

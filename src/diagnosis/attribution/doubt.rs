@@ -153,7 +153,7 @@ impl Context<'_> {
         {
             return known.draws.clone();
         }
-        let moved = self.moved_states(readings, causes, DRAWS);
+        let moved = self.moved_states(readings, causes, DRAWS, true);
         let draws = moved.map(|(moved, moved_as_read)| {
             Arc::new(StateDraws {
                 moved: self.space.forward(moved).0,
@@ -172,12 +172,13 @@ impl Context<'_> {
     }
 
     /// How the causes' change moves with the drawn states, as it stands in the readings, and the same with
-    /// the state as read where the change is linear in it: readings × draws.
+    /// the state as read where the change is linear in it, if that is asked for: readings × draws.
     fn moved_states(
         &self,
         readings: &DVector<f64>,
         causes: &[Cause],
         draws: usize,
+        also_as_read: bool,
     ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let (amplitudes, _) = self.amplitudes(readings, causes)?;
         let changes = self.changes(readings, causes)?;
@@ -199,21 +200,21 @@ impl Context<'_> {
         states.hold(&apart);
         let base = apart.column_sum();
         let rounds = states.rounds(&base)?;
-        let all: Vec<[DVector<f64>; 2]> = (0..draws)
-            .into_par_iter()
-            .map(|draw| {
-                let (moved, as_read) = states.moved(draw, rounds);
-                [moved.column_sum() - &base, as_read - &base_as_read]
-            })
-            .collect();
-        let [moved, moved_as_read] = [0, 1].map(|which| {
-            let mut columns = DMatrix::zeros(readings.len(), draws);
-            for (mut column, draw) in columns.column_iter_mut().zip(&all) {
-                column.copy_from(&draw[which]);
-            }
-            columns
+        let all = (0..draws).into_par_iter().map(|draw| {
+            let (fitted, state) = states.drawn(draw, rounds);
+            let moved = states.change_at((&state, &state)).column_sum() - &base;
+            let as_read = also_as_read.then(|| {
+                states.change_at((&state, &fitted.as_read())).column_sum() - &base_as_read
+            });
+            (moved, as_read)
         });
-        Some((moved, moved_as_read))
+        let (moved, as_read): (Vec<DVector<f64>>, Vec<Option<DVector<f64>>>) = all.unzip();
+        let side_by_side = |columns: Vec<DVector<f64>>| match columns.len() {
+            0 => DMatrix::zeros(readings.len(), 0),
+            _ => DMatrix::from_columns(&columns),
+        };
+        let as_read = as_read.into_iter().flatten().collect();
+        Some((side_by_side(moved), side_by_side(as_read)))
     }
 
     /// The signatures of one of the causes at a state, taken at the state as read where they are
@@ -280,7 +281,7 @@ impl Context<'_> {
         open: DMatrix<f64>,
         draws: usize,
     ) -> Doubt {
-        let Some((moved, _)) = self.moved_states(readings, causes, draws) else {
+        let Some((moved, _)) = self.moved_states(readings, causes, draws, false) else {
             return Doubt::of_open(&open);
         };
         let mut moved = self.space.forward(moved).0;
@@ -401,17 +402,16 @@ impl States<'_> {
         Some(ROUNDS)
     }
 
-    /// The causes' changes at the state that is drawn, and their sum as read.
-    fn moved(&self, draw: usize, rounds: usize) -> (DMatrix<f64>, DVector<f64>) {
+    /// The state that is fitted to a draw of noise without the causes' changes there, and the same with what its
+    /// smoothing may have taken away.
+    fn drawn(&self, draw: usize, rounds: usize) -> (AnyModel, AnyModel) {
         let noisy = self.noisy(draw);
         let mut changes = self.changes.clone();
         for _ in 1..rounds {
             let (_, state) = self.fitted(draw, &noisy, &changes);
             changes = self.change_at((&state, &state));
         }
-        let (fitted, state) = self.fitted(draw, &noisy, &changes);
-        let as_read = self.change_at((&state, &fitted.as_read())).column_sum();
-        (self.change_at((&state, &state)), as_read)
+        self.fitted(draw, &noisy, &changes)
     }
 }
 

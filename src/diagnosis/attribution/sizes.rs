@@ -165,10 +165,10 @@ impl Sizes {
             };
             self.parameters.iter().position(|p| *p == unknown)
         };
-        let size = count + shape.values.len();
-        let covariance = DMatrix::from_fn(size, size, |i, j| match (place(i), place(j)) {
-            (Some(i), Some(j)) => self.covariance[(i, j)],
-            _ => f64::NAN,
+        let places: Vec<Option<usize>> = (0..count + shape.values.len()).map(place).collect();
+        let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
+            let known = places[i].zip(places[j]);
+            known.map_or(f64::NAN, |at| self.covariance[at])
         });
         let mut estimates = effect.estimates(
             shape,

@@ -165,6 +165,20 @@ mod tests {
         assert!((far.0[0] - 25.3).abs() < 1e-2, "{:?}", far.0);
     }
 
+    /// A start that was thought to be close and is not: at a first step of 0.03 the way of three steps would take 200
+    /// values.
+    #[test]
+    fn a_walk_from_close_by_takes_longer_steps() {
+        let mut count = 0;
+        let (at, _) = coordinate_search(&[0.0], &[1.0], Reach::CLOSE, |v| {
+            count += 1;
+            (v[0] - 3.0).abs()
+        });
+        // Half a step of the closest reach, as a kink has no vertex.
+        assert!((at[0] - 3.0).abs() <= 3e-3, "{at:?}");
+        assert!(count <= 80, "{count}");
+    }
+
     #[test]
     fn steps_and_what_is_not_allowed_are_withstood() {
         let (at, value) = coordinate_search(&[0.2, 5.0], &[1.0, 0.0], Reach::WIDE, |v| {

@@ -182,3 +182,45 @@ impl Context<'_> {
         clean
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use errsep_models::model::{AnyModel, FittedModel};
+    use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
+    use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use crate::diagnosis::attribution::context::Context;
+    use crate::diagnosis::detection::estimate::estimate;
+
+    /// *Property*: however often a cause is fitted, the next search begins with the steps of the grid. Where each left
+    /// shorter ones a search crept and stopped on the way.
+    #[test]
+    fn fitting_again_does_not_shorten_the_steps_of_a_search() {
+        let noise = SceneNoise {
+            white: 0.1,
+            ..SceneNoise::default()
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let scene = Scene::random(40, 3, 1e-5, 2.0, noise, &mut random);
+        let fitted = Linearised::new(&scene.measured(4), Assumptions::default()).unwrap();
+        let model = AnyModel::new(&fitted);
+        let catalogue = model.effects();
+        let mut readings = model.linearised();
+        let cycle = catalogue
+            .iter()
+            .position(|e| e.name() == "cyclic-error")
+            .unwrap();
+        let grid = catalogue[cycle].grid(&model);
+        let start = grid[grid.len() / 3].clone();
+        let column = catalogue[cycle].columns(&model, &start).remove(0);
+        readings += 0.5 * column.dense(readings.len());
+        let context = Context::new(&model, &catalogue, estimate(&model, &readings), 40, 1);
+        let mut causes = vec![context.cause(&model, cycle, start.clone())];
+        for _ in 0..3 {
+            causes = context.relinearised(&readings, &causes, f64::INFINITY);
+        }
+        assert_eq!(causes[0].shape.steps, start.steps);
+    }
+}

@@ -6,9 +6,10 @@ use errsep_models::model::Shape;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
+use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::attribution::limits::is_beyond_limit;
 use crate::diagnosis::attribution::outweighed::{Member, drop_outweighed};
+use crate::diagnosis::attribution::remainder::Remainder;
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::attribution::standing::{has_possible_sizes, possible, stands, without};
 use crate::diagnosis::levels::{

@@ -9,8 +9,9 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::confidence::{Answer, confidence_set};
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
+use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::attribution::fewer::in_fewest;
+use crate::diagnosis::attribution::remainder::Remainder;
 use crate::diagnosis::attribution::standing::{possible, without};
 use crate::diagnosis::levels::{
     BETTER, EARNED, FAR, FREELY, HOPELESS, IN_REACH, MOST_CAUSES, NO_BETTER, PAIR_REACH, PAIRS,

@@ -6,7 +6,8 @@ use errsep_models::model::Shape;
 use nalgebra::DVector;
 
 use crate::diagnosis::attribution::alternatives::Alternative;
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
+use crate::diagnosis::attribution::context::{Cause, Context};
+use crate::diagnosis::attribution::remainder::Remainder;
 use crate::diagnosis::attribution::reported::{Candidate, Elsewhere};
 use crate::diagnosis::attribution::sizes::Sizes;
 use crate::diagnosis::attribution::standing::{possible, without};

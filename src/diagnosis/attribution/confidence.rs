@@ -9,7 +9,8 @@ use std::sync::Arc;
 use nalgebra::DVector;
 
 use crate::diagnosis::attribution::alternatives::{Alternative, alternatives, evidence, group_of};
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
+use crate::diagnosis::attribution::context::{Cause, Context};
+use crate::diagnosis::attribution::remainder::Remainder;
 use crate::diagnosis::attribution::standing::stand_together;
 use crate::diagnosis::levels::{BENT, EQUAL_EVIDENCE, FREELY, HOPELESS_PART};
 

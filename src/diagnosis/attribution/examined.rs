@@ -5,7 +5,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::attribution::attribute::{attribute, roughly};
 use crate::diagnosis::attribution::confidence::Answer;
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
+use crate::diagnosis::attribution::context::{Cause, Context};
+use crate::diagnosis::attribution::remainder::Remainder;
 use crate::diagnosis::detection::estimate::estimate;
 use crate::diagnosis::noise::law::NoiseLaw;
 

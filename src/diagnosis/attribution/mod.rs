@@ -17,6 +17,7 @@ pub(super) mod mixing;
 pub(super) mod outweighed;
 pub(super) mod refine;
 pub(super) mod refit;
+pub(super) mod remainder;
 pub(super) mod reported;
 pub(super) mod shrink;
 pub(super) mod sizes;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder, span};
+use crate::diagnosis::attribution::context::{Cause, Context, span};
+use crate::diagnosis::attribution::remainder::Remainder;
 use crate::diagnosis::levels::{HELD, ODDS, OUTDONE, chi_squared_quantile};
 
 /// One way to explain the gap: causes with one of them varied.

@@ -8,9 +8,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::diagnosis::attribution::confidence::Answer;
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
+use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::attribution::doubt::FEW_DRAWS;
 use crate::diagnosis::attribution::outweighed::{holds, outweighed};
+use crate::diagnosis::attribution::remainder::Remainder;
 use crate::diagnosis::attribution::standing::possible;
 use crate::diagnosis::detection::dictionary::Dictionary;
 use crate::diagnosis::detection::folding::Sums;

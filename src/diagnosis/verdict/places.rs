@@ -3,7 +3,8 @@
 use errsep_models::model::FittedModel;
 use nalgebra::DMatrix;
 
-use crate::diagnosis::attribution::context::{Context, Remainder};
+use crate::diagnosis::attribution::context::Context;
+use crate::diagnosis::attribution::remainder::Remainder;
 use crate::diagnosis::detection::dictionary::{Entry, Meaning, statistic};
 use crate::diagnosis::levels::{EVERYWHERE, PLACE, chi_squared_of_two};
 use crate::diagnosis::verdict::types::Where;

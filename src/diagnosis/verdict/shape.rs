@@ -6,7 +6,8 @@ use errsep_models::model::FittedModel;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::diagnosis::attribution::context::{Cause, Context, Remainder};
+use crate::diagnosis::attribution::context::{Cause, Context};
+use crate::diagnosis::attribution::remainder::Remainder;
 use crate::diagnosis::levels::{ABSENT, PRESENT};
 use crate::diagnosis::search::Reach;
 use crate::diagnosis::verdict::places::{channel_shares, place_of};

@@ -46,3 +46,84 @@ pub(in crate::diagnosis) fn is_beyond_limit(
         gained > more as f64 * (context.space.readings() as f64).ln()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use errsep_models::model::AnyModel;
+    use errsep_models::model::{FittedModel, Shape};
+    use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
+    use errsep_models::reversal::exact_readings::{Injection, Scene, SceneNoise};
+    use nalgebra::DVector;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::is_beyond_limit;
+    use crate::diagnosis::attribution::context::Context;
+    use crate::diagnosis::detection::estimate::estimate;
+    use crate::diagnosis::search::Reach;
+
+    const ANEW: &str = "a lag that begins anew in each pass";
+
+    fn model(lost: f64) -> AnyModel {
+        let noise = SceneNoise {
+            white: 0.05,
+            ..SceneNoise::default()
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(8);
+        let mut scene = Scene::random(80, 3, 1e-5, 4.0, noise, &mut random);
+        scene.effects.push(Injection::AxisBacklash(lost));
+        let fitted = Linearised::new(&scene.measured(3), Assumptions::default());
+        AnyModel::new(&fitted.unwrap())
+    }
+
+    /// Whether the lag anew that explains most of readings is more than its limit, and the part that it explains.
+    fn lag_anew(model: &AnyModel, readings: &DVector<f64>) -> (bool, f64) {
+        let catalogue = model.effects();
+        let lags = |k: usize, shape: &Shape| {
+            catalogue[k].variant_name(model, shape).as_deref() == Some(ANEW)
+        };
+        let name = |name: &str| catalogue.iter().position(|e| e.name() == name).unwrap();
+        let effect = name("stick-slip");
+        let context = Context::new(model, &catalogue, estimate(model, readings), 40, 1);
+        let starts = catalogue[effect].grid(model);
+        let starts = starts.iter().filter(|shape| lags(effect, shape)).step_by(3);
+        let found = starts.map(|start| {
+            let start = (start, Reach::WIDE);
+            context.refine(model, readings, effect, start, &[])
+        });
+        let (best, explained) = found.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        let whole = context.residual(readings).norm_squared();
+        let beyond = is_beyond_limit(&context, readings, &[best], 0);
+        (beyond, explained / whole)
+    }
+
+    /// *Limit*: a lost motion is found as a lag that begins anew, which can be nearly even along the travel, and is no
+    /// such lag; one that slips is. Both explain most of what is there.
+    #[test]
+    fn a_lost_motion_is_no_lag_that_slips() {
+        let lost = model(1.5);
+        let (beyond, part) = lag_anew(&lost, &lost.linearised());
+        assert!(!beyond && part > 0.5, "{beyond} {part}");
+
+        let still = model(0.0);
+        let catalogue = still.effects();
+        let slip = catalogue.iter().find(|e| e.name() == "stick-slip").unwrap();
+        let waves = slip.grid(&still);
+        let mut waves = waves.iter().filter(|shape| {
+            slip.variant_name(&still, shape).as_deref() == Some(ANEW) && shape.values[0] > 5.0
+        });
+        let waves = waves.next().unwrap();
+        let amplitudes = vec![0.5; slip.columns(&still, waves).len()];
+        let mut saw = slip.settled(waves, &amplitudes).unwrap();
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let last = saw.values.len() - 1;
+        let states = &mut saw.values[1..last];
+        states.iter_mut().for_each(|state| *state = random.random());
+        let mut readings = still.linearised();
+        for column in slip.columns(&still, &saw) {
+            readings += column.dense(readings.len());
+        }
+        let (beyond, part) = lag_anew(&still, &readings);
+        assert!(beyond && part > 0.5, "{beyond} {part}");
+    }
+}

@@ -54,26 +54,7 @@ impl Context<'_> {
                 let mut others = causes.clone();
                 let own = others.remove(k);
                 let state = self.seen_by(k, &state, &causes, &changes);
-                causes[k] = if round < SEARCHED {
-                    self.refine(
-                        &state,
-                        readings,
-                        own.effect,
-                        (&own.shape, Reach::NEAR),
-                        &others,
-                    )
-                    .0
-                } else if own.shape.free() <= MANY {
-                    self.refine_alone(
-                        &state,
-                        readings,
-                        own.effect,
-                        (&own.shape, Reach::CLOSE),
-                        &others,
-                    )
-                } else {
-                    self.at_rest(&state, readings, &own, &others)
-                };
+                causes[k] = self.again(&state, readings, &own, &others, round);
             }
             let misfit = self.misfit(readings, &causes);
             let gained = best.0 - misfit;
@@ -100,6 +81,27 @@ impl Context<'_> {
             changes = mixing.mixed(&changes, next);
         }
         best.1
+    }
+
+    /// A cause searched again at another state, the less the later the round.
+    fn again(
+        &self,
+        state: &AnyModel,
+        readings: &DVector<f64>,
+        cause: &Cause,
+        others: &[Cause],
+        round: usize,
+    ) -> Cause {
+        let (effect, shape) = (cause.effect, &cause.shape);
+        if round < SEARCHED {
+            let start = (shape, Reach::NEAR);
+            self.refine(state, readings, effect, start, others).0
+        } else if shape.free() <= MANY {
+            let start = (shape, Reach::CLOSE);
+            self.refine_alone(state, readings, effect, start, others)
+        } else {
+            self.at_rest(state, readings, cause, others)
+        }
     }
 
     /// A cause at another state, its shape kept but for what its size makes of it.

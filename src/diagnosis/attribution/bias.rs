@@ -10,7 +10,7 @@
 //! whatever the amplitudes: a change m of the readings in each draw of the state. The move's error
 //! is then gᵀδ + wᵀm, and what wᵀm adds to the variances is taken from the draws.
 
-use errsep_models::model::{AnyModel, FittedModel, Profile};
+use errsep_models::model::{AnyModel, FittedModel, Profile, Quantity};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -34,118 +34,153 @@ pub(in crate::diagnosis) fn biases(
     observed: &DVector<f64>,
     causes: &[Cause],
 ) -> (Vec<Bias>, Vec<MovedProfile>) {
-    let (model, law) = (context.model, &context.law);
     let taken = Taken::out_of(context, observed, causes);
     let corrected = match &taken {
         Some(taken) => observed - &taken.change,
         None => observed.clone(),
     };
-    let mut biases: Vec<Bias> = model
-        .quantities()
-        .into_iter()
-        .map(|quantity| {
-            let before = quantity.weights.dot(observed);
-            let after = quantity.weights.dot(&corrected);
-            let spread = covariance_times(model, law, &quantity.weights);
-            let std = quantity.weights.dot(&spread).max(0.0).sqrt();
-            let (moved_std, after_std) = taken.as_ref().map_or((0.0, std), |taken| {
-                let gradient = taken.derivatives.tr_mul(&quantity.weights);
-                let mut whitened = DMatrix::from_column_slice(spread.len(), 1, spread.as_slice());
-                context.space.whiten(&mut whitened);
-                let common = (&taken.sizes.gain * whitened.column(0)).dot(&gradient);
-                let state = taken.by_state(&quantity.weights, &gradient);
-                let moved = (taken.variance(&gradient) + state.added).max(0.0);
-                let common = common + state.common;
-                let after = std * std + moved - 2.0 * common;
-                (moved.sqrt(), after.max(0.0).sqrt())
-            });
-            let still = (after - before).abs() <= ROUNDING * std && moved_std <= ROUNDING * std;
-            let (after, after_std, moved_std) = if still {
-                (before, std, 0.0)
-            } else {
-                (after, after_std, moved_std)
-            };
-            Bias {
-                quantity: quantity.name,
-                before,
-                after,
-                moved: after - before,
-                std,
-                after_std,
-                moved_std,
-                unit: quantity.unit.to_owned(),
-            }
-        })
+    let readings = (observed, &corrected);
+    let quantities = context.model.quantities().into_iter();
+    let mut biases: Vec<Bias> = quantities
+        .map(|quantity| of_quantity(context, readings, taken.as_ref(), quantity))
         .collect();
-    let rms = |v: &DVector<f64>| v.norm() / (v.len().max(1) as f64).sqrt();
-    let profiles_of = |readings: DVector<f64>| model.refit(readings).profiles();
+    let (own, profiles) = of_profiles(context, readings, taken.as_ref());
+    biases.extend(own);
+    (biases, profiles)
+}
+
+/// How a quantity moves from readings as they are to corrected ones.
+fn of_quantity(
+    context: &Context<'_>,
+    (observed, corrected): (&DVector<f64>, &DVector<f64>),
+    taken: Option<&Taken>,
+    quantity: Quantity,
+) -> Bias {
+    let before = quantity.weights.dot(observed);
+    let after = quantity.weights.dot(corrected);
+    let spread = covariance_times(context.model, &context.law, &quantity.weights);
+    let std = quantity.weights.dot(&spread).max(0.0).sqrt();
+    let (moved_std, after_std) = taken.map_or((0.0, std), |taken| {
+        let gradient = taken.derivatives.tr_mul(&quantity.weights);
+        let mut whitened = DMatrix::from_column_slice(spread.len(), 1, spread.as_slice());
+        context.space.whiten(&mut whitened);
+        let common = (&taken.sizes.gain * whitened.column(0)).dot(&gradient);
+        let state = taken.by_state(&quantity.weights, &gradient);
+        let moved = (taken.variance(&gradient) + state.added).max(0.0);
+        let common = common + state.common;
+        let after = std * std + moved - 2.0 * common;
+        (moved.sqrt(), after.max(0.0).sqrt())
+    });
+    let still = (after - before).abs() <= ROUNDING * std && moved_std <= ROUNDING * std;
+    let (after, after_std, moved_std) = if still {
+        (before, std, 0.0)
+    } else {
+        (after, after_std, moved_std)
+    };
+    Bias {
+        quantity: quantity.name,
+        before,
+        after,
+        moved: after - before,
+        std,
+        after_std,
+        moved_std,
+        unit: quantity.unit.to_owned(),
+    }
+}
+
+/// How the profiles move, and the root mean square of each.
+fn of_profiles(
+    context: &Context<'_>,
+    (observed, corrected): (&DVector<f64>, &DVector<f64>),
+    taken: Option<&Taken>,
+) -> (Vec<Bias>, Vec<MovedProfile>) {
+    let profiles_of = |readings: DVector<f64>| context.model.refit(readings).profiles();
     let before = profiles_of(observed.clone());
     let after = profiles_of(corrected.clone());
-    // The profiles with each parameter of the causes moved by its standard uncertainty.
-    let moved_by: Vec<Vec<Profile>> = taken.as_ref().map_or_else(Vec::new, |taken| {
-        let columns = taken.derivatives.column_iter();
-        columns
-            .zip(&taken.stds)
-            .map(|(column, std)| profiles_of(&corrected - column * *std))
-            .collect()
-    });
-    let moved_with_state: Vec<Vec<Profile>> = taken
-        .as_ref()
-        .and_then(|taken| taken.sizes.draws.as_ref())
-        .map_or_else(Vec::new, |draws| {
-            let moved = &draws.moved_as_read;
-            (0..moved.ncols().min(STATES))
-                .into_par_iter()
-                .map(|draw| profiles_of(&corrected - moved.column(draw)))
-                .collect()
-        });
-    let mut profiles = Vec::new();
-    for (k, (b, a)) in before.into_iter().zip(after).enumerate() {
-        let moved = &a.values - &b.values;
-        let std = b.noise_gain * law.sigma();
-        let (moved_std, after_std) = taken.as_ref().map_or((0.0, std), |taken| {
-            let mut slopes = DMatrix::zeros(moved.len(), moved_by.len());
-            for ((mut slope, own), by) in slopes.column_iter_mut().zip(&moved_by).zip(&taken.stds) {
-                let change = own.get(k).map(|own| (&own.values - &a.values) / *by);
-                if let Some(change) = change.filter(|c| c.iter().all(|v| v.is_finite())) {
-                    slope.copy_from(&change);
-                }
-            }
-            // The derivative of a norm is the product with its direction.
-            let count = moved.len().max(1) as f64;
-            let length = moved.norm() * count.sqrt();
-            let direction = &moved / length.max(f64::MIN_POSITIVE);
-            let gradient = slopes.tr_mul(&direction);
-            let spread = (&slopes * &taken.sizes.covariance).component_mul(&slopes);
-            let states = moved_with_state.iter().filter_map(|own| own.get(k));
-            let (mut along, mut square) = (0.0, 0.0);
-            for state in states {
-                let change = &state.values - &a.values;
-                along += change.dot(&direction).powi(2) / moved_with_state.len() as f64;
-                square += change.norm_squared() / moved_with_state.len() as f64;
-            }
-            (
-                (taken.variance(&gradient) + along).sqrt(),
-                std.hypot(((spread.sum() + square) / count).max(0.0).sqrt()),
-            )
-        });
-        biases.push(Bias {
+    let moved = taken.map(|taken| MovedBy::out_of(taken, corrected, &profiles_of));
+    let rms = |v: &DVector<f64>| v.norm() / (v.len().max(1) as f64).sqrt();
+    let pairs = before.into_iter().zip(after).enumerate();
+    let told = pairs.map(|(k, (b, a))| {
+        let change = &a.values - &b.values;
+        let std = b.noise_gain * context.law.sigma();
+        let stds = moved.as_ref().map(|by| by.stds(k, &a, &change, std));
+        let (moved_std, after_std) = stds.unwrap_or((0.0, std));
+        let bias = Bias {
             quantity: b.name.clone(),
             before: rms(&b.values),
             after: rms(&a.values),
-            moved: rms(&moved),
+            moved: rms(&change),
             std,
             after_std,
             moved_std,
             unit: b.unit.to_owned(),
+        };
+        let values = |profile: Profile| profile.values.as_slice().to_vec();
+        (bias, (b.name.clone(), values(b), values(a)))
+    });
+    told.unzip()
+}
+
+/// Profiles of readings out of which something else is taken.
+struct MovedBy<'t> {
+    taken: &'t Taken,
+    /// Each parameter of the causes moved by its standard uncertainty.
+    parameters: Vec<Vec<Profile>>,
+    /// The causes' change at drawn states.
+    states: Vec<Vec<Profile>>,
+}
+
+impl<'t> MovedBy<'t> {
+    fn out_of(
+        taken: &'t Taken,
+        corrected: &DVector<f64>,
+        profiles_of: &(impl Fn(DVector<f64>) -> Vec<Profile> + Sync),
+    ) -> Self {
+        let columns = taken.derivatives.column_iter().zip(&taken.stds);
+        let states = taken.sizes.draws.as_ref().map_or_else(Vec::new, |draws| {
+            let moved = &draws.moved_as_read;
+            (0..moved.ncols().min(STATES))
+                .into_par_iter()
+                .map(|draw| profiles_of(corrected - moved.column(draw)))
+                .collect()
         });
-        profiles.push((
-            b.name,
-            b.values.as_slice().to_vec(),
-            a.values.as_slice().to_vec(),
-        ));
+        Self {
+            taken,
+            parameters: columns
+                .map(|(column, std)| profiles_of(corrected - column * *std))
+                .collect(),
+            states,
+        }
     }
-    (biases, profiles)
+
+    /// Standard uncertainties of the root mean square of the k-th profile's change, and of the profile after it.
+    fn stds(&self, k: usize, after: &Profile, change: &DVector<f64>, std: f64) -> (f64, f64) {
+        let mut slopes = DMatrix::zeros(change.len(), self.parameters.len());
+        let own = self.parameters.iter().zip(&self.taken.stds);
+        for (mut slope, (own, by)) in slopes.column_iter_mut().zip(own) {
+            let moved = own.get(k).map(|own| (&own.values - &after.values) / *by);
+            if let Some(moved) = moved.filter(|m| m.iter().all(|v| v.is_finite())) {
+                slope.copy_from(&moved);
+            }
+        }
+        // The derivative of a norm is the product with its direction.
+        let count = change.len().max(1) as f64;
+        let length = change.norm() * count.sqrt();
+        let direction = change / length.max(f64::MIN_POSITIVE);
+        let gradient = slopes.tr_mul(&direction);
+        let spread = (&slopes * &self.taken.sizes.covariance).component_mul(&slopes);
+        let (mut along, mut square) = (0.0, 0.0);
+        for state in self.states.iter().filter_map(|own| own.get(k)) {
+            let moved = &state.values - &after.values;
+            along += moved.dot(&direction).powi(2) / self.states.len() as f64;
+            square += moved.norm_squared() / self.states.len() as f64;
+        }
+        (
+            (self.taken.variance(&gradient) + along).sqrt(),
+            std.hypot(((spread.sum() + square) / count).max(0.0).sqrt()),
+        )
+    }
 }
 
 /// What causes change in the readings, and how that moves with their amplitudes and shapes.

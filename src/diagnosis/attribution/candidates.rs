@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use errsep_models::model::Shape;
+use errsep_models::model::{Estimate, Shape};
 use nalgebra::DVector;
 
 use crate::diagnosis::attribution::alternatives::Alternative;
@@ -37,29 +37,12 @@ pub(in crate::diagnosis) fn candidates(
             let own = group.iter().find(|a| a.cause.effect == effect)?;
             Some((k, own))
         });
-        let (cause, parameters) = match (named, member) {
-            (Some(which), _) => (
-                Some(causes[which].clone()),
-                fitted.as_ref().map(|f| f.of(context, causes, which)),
-            ),
-            (None, Some((k, own))) => {
-                let mut trial = causes.to_vec();
-                trial[k] = own.cause.clone();
-                let sizes = Sizes::fitted(context, readings, &trial);
-                (
-                    Some(own.cause.clone()),
-                    sizes.map(|sizes| sizes.of(context, &trial, k)),
-                )
+        let (cause, parameters) = match named {
+            Some(which) => {
+                let own = fitted.as_ref().map(|f| f.of(context, causes, which));
+                (Some(causes[which].clone()), own)
             }
-            (None, None) => {
-                let start = context.start(first, effect).cloned();
-                let cause = start.map(|shape| context.cause(context.model, effect, shape));
-                let parameters = cause.as_ref().and_then(|cause| {
-                    let alone = std::slice::from_ref(cause);
-                    Some(Sizes::fitted(context, readings, alone)?.of(context, alone, 0))
-                });
-                (cause, parameters)
-            }
+            None => not_named(context, (readings, first), causes, effect, member),
         };
         let (t, unknowns) = cause.as_ref().map_or((0.0, 0), |c| {
             let gram = c.projected.tr_mul(&c.projected);
@@ -89,6 +72,43 @@ pub(in crate::diagnosis) fn candidates(
             },
         ));
     }
+    in_order(list)
+}
+
+/// An effect that is not named, in the place of the cause whose group it is in or alone, with its parameters.
+fn not_named(
+    context: &Context<'_>,
+    (readings, first): (&DVector<f64>, &Remainder),
+    causes: &[Cause],
+    effect: usize,
+    member: Option<(usize, &Alternative)>,
+) -> (Option<Cause>, Option<Vec<Estimate>>) {
+    if let Some((k, own)) = member {
+        let mut trial = causes.to_vec();
+        trial[k] = own.cause.clone();
+        let parameters = fitted_alone(context, readings, &trial, k);
+        return (Some(own.cause.clone()), parameters);
+    }
+    let start = context.start(first, effect).cloned();
+    let cause = start.map(|shape| context.cause(context.model, effect, shape));
+    let alone = cause.as_ref().map(std::slice::from_ref);
+    let parameters = alone.and_then(|own| fitted_alone(context, readings, own, 0));
+    (cause, parameters)
+}
+
+/// The parameters of one of several causes that are fitted without the state.
+fn fitted_alone(
+    context: &Context<'_>,
+    readings: &DVector<f64>,
+    causes: &[Cause],
+    which: usize,
+) -> Option<Vec<Estimate>> {
+    let sizes = Sizes::fitted(context, readings, causes)?;
+    Some(sizes.of(context, causes, which))
+}
+
+/// Those of the set first, by their evidence, then by what they explain alone.
+fn in_order(mut list: Vec<(f64, Candidate)>) -> Vec<Candidate> {
     list.sort_by(|a, b| {
         let by_set = b.1.in_set.cmp(&a.1.in_set);
         by_set.then(if a.1.in_set {

@@ -26,65 +26,7 @@ impl Context<'_> {
         beside: &[Cause],
     ) -> (Cause, f64) {
         let seen = Seen::of(self, state, readings, effect, beside);
-        let (mut shape, mut t) = seen.searched(start, reach);
-        let log_readings = (self.space.readings() as f64).ln();
-        let weighed = |shape: &Shape, t: f64| {
-            let known = &self.catalogue[effect];
-            let columns = known.amplitudes_at(shape).len();
-            let size = (self.space.readings(), columns);
-            let unknowns = unknowns(size, shape, known.choices(shape));
-            (t - unknowns as f64 * log_readings, columns)
-        };
-        let relatives = self.catalogue[effect].relatives(state, &shape);
-        let mut relatives: Vec<(f64, usize, Shape)> = relatives
-            .into_par_iter()
-            .map(|other| {
-                let (here, columns) = weighed(&other, seen.value(&other).0);
-                (here, columns, other)
-            })
-            .collect();
-        // The best first: what it is searched to spares the search of many others.
-        relatives.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut ahead: Vec<Option<(Shape, f64)>> = vec![None; relatives.len()];
-        let mut searched: Vec<usize> = Vec::new();
-        for k in 0..relatives.len() {
-            let (least, columns) = weighed(&shape, t);
-            let is_spared = |(here, own, other): &(f64, usize, Shape), searched: &[usize]| {
-                let alike = searched.iter().filter(|v| **v == other.variant).count();
-                // One that holds the other needs no search to be better; one of another kind does.
-                let added = if *own == columns { UNSEARCHED * t } else { 0.0 };
-                *here <= least - added || alike >= ALIKE
-            };
-            if is_spared(&relatives[k], &searched) {
-                continue;
-            }
-            let other = relatives[k].2.variant;
-            if ahead[k].is_none() {
-                // Others that will be searched unless this one spares them, on processors that would stand idle.
-                let mut next: Vec<usize> = Vec::new();
-                let mut then = searched.clone();
-                for j in k..relatives.len() {
-                    if next.len() < rayon::current_num_threads() && !is_spared(&relatives[j], &then)
-                    {
-                        next.push(j);
-                        then.push(relatives[j].2.variant);
-                    }
-                }
-                let found: Vec<(Shape, f64)> = next
-                    .par_iter()
-                    .map(|j| seen.searched(&relatives[*j].2, reach))
-                    .collect();
-                next.into_iter()
-                    .zip(found)
-                    .for_each(|(j, found)| ahead[j] = Some(found));
-            }
-            searched.push(other);
-            if let Some((found, own_t)) = ahead[k].take()
-                && weighed(&found, own_t).0 > least
-            {
-                (shape, t) = (found, own_t);
-            }
-        }
+        let (shape, t) = seen.of_greatest_evidence(seen.searched(start, reach), reach);
         (self.cause(state, effect, shape), t)
     }
 
@@ -182,6 +124,69 @@ impl<'s> Seen<'s> {
             0.0
         };
         (statistic, gram, score)
+    }
+
+    /// Of a shape found, with its statistic, and its relatives that of greatest evidence.
+    fn of_greatest_evidence(&self, (mut shape, mut t): (Shape, f64), reach: Reach) -> (Shape, f64) {
+        let readings = self.context.space.readings();
+        let log_readings = (readings as f64).ln();
+        let weighed = |shape: &Shape, t: f64| {
+            let columns = self.effect.amplitudes_at(shape).len();
+            let choices = self.effect.choices(shape);
+            let unknowns = unknowns((readings, columns), shape, choices);
+            (t - unknowns as f64 * log_readings, columns)
+        };
+        let relatives = self.effect.relatives(self.state, &shape);
+        let mut relatives: Vec<(f64, usize, Shape)> = relatives
+            .into_par_iter()
+            .map(|other| {
+                let (here, columns) = weighed(&other, self.value(&other).0);
+                (here, columns, other)
+            })
+            .collect();
+        // The best first: what it is searched to spares the search of many others.
+        relatives.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut ahead: Vec<Option<(Shape, f64)>> = vec![None; relatives.len()];
+        let mut searched: Vec<usize> = Vec::new();
+        for k in 0..relatives.len() {
+            let (least, columns) = weighed(&shape, t);
+            let is_spared = |(here, own, other): &(f64, usize, Shape), searched: &[usize]| {
+                let alike = searched.iter().filter(|v| **v == other.variant).count();
+                // One that holds the other needs no search to be better; one of another kind does.
+                let added = if *own == columns { UNSEARCHED * t } else { 0.0 };
+                *here <= least - added || alike >= ALIKE
+            };
+            if is_spared(&relatives[k], &searched) {
+                continue;
+            }
+            let other = relatives[k].2.variant;
+            if ahead[k].is_none() {
+                // Others that will be searched unless this one spares them, on processors that would stand idle.
+                let mut next: Vec<usize> = Vec::new();
+                let mut then = searched.clone();
+                for j in k..relatives.len() {
+                    if next.len() < rayon::current_num_threads() && !is_spared(&relatives[j], &then)
+                    {
+                        next.push(j);
+                        then.push(relatives[j].2.variant);
+                    }
+                }
+                let found: Vec<(Shape, f64)> = next
+                    .par_iter()
+                    .map(|j| self.searched(&relatives[*j].2, reach))
+                    .collect();
+                next.into_iter()
+                    .zip(found)
+                    .for_each(|(j, found)| ahead[j] = Some(found));
+            }
+            searched.push(other);
+            if let Some((found, own_t)) = ahead[k].take()
+                && weighed(&found, own_t).0 > least
+            {
+                (shape, t) = (found, own_t);
+            }
+        }
+        (shape, t)
     }
 
     /// The best shape from a start, settled, and its statistic; one that settles to another variant is

@@ -29,46 +29,7 @@ impl Space {
 
     /// A signature as it is whitened, and what the fit absorbs of it.
     pub fn part(&self, column: &Column) -> Part {
-        let mut whitened = DVector::zeros(self.readings);
-        let mut seen = vec![false; self.traces.len()];
-        for (&row, &value) in column.rows.iter().zip(&column.values) {
-            whitened[row] += value;
-            seen[self.trace_of[row] as usize] = true;
-        }
-        let mut touched: Vec<usize> = (0..seen.len()).filter(|t| seen[*t]).collect();
-        // Many signatures are one profile times a sign in each trace: such a profile is whitened
-        // once.
-        let mut model: Option<(usize, Vec<f64>)> = None;
-        for &t in &touched {
-            let trace = self.traces[t].clone();
-            let values = &whitened.as_slice()[trace.clone()];
-            let same = |sign: f64, raw: &[f64]| {
-                raw.len() == values.len() && raw.iter().zip(values).all(|(a, b)| *a == sign * b)
-            };
-            let known = model.as_ref().and_then(|(from, raw)| {
-                if !Arc::ptr_eq(&self.whitening[*from], &self.whitening[t]) {
-                    None
-                } else if same(1.0, raw) {
-                    Some((*from, 1.0))
-                } else {
-                    same(-1.0, raw).then_some((*from, -1.0))
-                }
-            });
-            if let Some((from, sign)) = known {
-                let from = self.traces[from].start;
-                for k in 0..trace.len() {
-                    whitened[trace.start + k] = sign * whitened[from + k];
-                }
-            } else {
-                model = Some((t, values.to_vec()));
-                self.whitening[t].whiten(&mut whitened.as_mut_slice()[trace]);
-            }
-        }
-        if let Some(root) = &self.scatter {
-            // It joins readings of different traces.
-            root.apply(whitened.as_mut_slice());
-            touched = (0..self.traces.len()).collect();
-        }
+        let (whitened, touched) = self.whitened_by_traces(column);
         let sums = self.patterns.as_ref().map_or_else(
             || DMatrix::zeros(0, 0),
             |patterns| {
@@ -110,6 +71,50 @@ impl Space {
             touched,
             whitened,
         }
+    }
+
+    /// A signature whitened, and the traces in which it is then. Many signatures are one profile times a sign in each
+    /// trace: such a profile is whitened once.
+    fn whitened_by_traces(&self, column: &Column) -> (DVector<f64>, Vec<usize>) {
+        let mut whitened = DVector::zeros(self.readings);
+        let mut seen = vec![false; self.traces.len()];
+        for (&row, &value) in column.rows.iter().zip(&column.values) {
+            whitened[row] += value;
+            seen[self.trace_of[row] as usize] = true;
+        }
+        let touched: Vec<usize> = (0..seen.len()).filter(|t| seen[*t]).collect();
+        let mut model: Option<(usize, Vec<f64>)> = None;
+        for &t in &touched {
+            let trace = self.traces[t].clone();
+            let values = &whitened.as_slice()[trace.clone()];
+            let same = |sign: f64, raw: &[f64]| {
+                raw.len() == values.len() && raw.iter().zip(values).all(|(a, b)| *a == sign * b)
+            };
+            let known = model.as_ref().and_then(|(from, raw)| {
+                if !Arc::ptr_eq(&self.whitening[*from], &self.whitening[t]) {
+                    None
+                } else if same(1.0, raw) {
+                    Some((*from, 1.0))
+                } else {
+                    same(-1.0, raw).then_some((*from, -1.0))
+                }
+            });
+            if let Some((from, sign)) = known {
+                let from = self.traces[from].start;
+                for k in 0..trace.len() {
+                    whitened[trace.start + k] = sign * whitened[from + k];
+                }
+            } else {
+                model = Some((t, values.to_vec()));
+                self.whitening[t].whiten(&mut whitened.as_mut_slice()[trace]);
+            }
+        }
+        if let Some(root) = &self.scatter {
+            // It joins readings of different traces.
+            root.apply(whitened.as_mut_slice());
+            return (whitened, (0..self.traces.len()).collect());
+        }
+        (whitened, touched)
     }
 
     /// The part of a signature that is another in some traces, `column` holding what it is there.

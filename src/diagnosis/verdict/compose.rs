@@ -6,6 +6,7 @@ use nalgebra::DVector;
 use crate::diagnosis::attribution::alternatives::Alternative;
 use crate::diagnosis::attribution::bias::biases;
 use crate::diagnosis::attribution::candidates::candidates;
+use crate::diagnosis::attribution::confidence::Answer;
 use crate::diagnosis::attribution::context::{Cause, Context, raw_signatures};
 use crate::diagnosis::attribution::examined::Examined;
 use crate::diagnosis::attribution::reported::Candidate;
@@ -32,112 +33,35 @@ pub(in crate::diagnosis) fn compose(
     calm: &Calmed,
     options: &Options,
 ) -> Diagnosis {
-    let Examined {
-        context,
-        readings,
-        first,
-        detected,
-        ref found,
-    } = *examined;
-    let alarmed = detected <= options.false_alarm;
-    let found = found.as_ref().filter(|_| alarmed);
-    // What cannot be fitted is no cause.
-    let fit = found.and_then(|answer| {
-        let (amplitudes, _) = context.amplitudes(readings, &answer.causes)?;
-        Some((answer.causes.as_slice(), amplitudes))
-    });
-    let (causes, change) = fit.map_or_else(
-        || (&[][..], DVector::zeros(readings.len())),
-        |(causes, amplitudes)| (causes, context.change(causes, &amplitudes)),
-    );
+    let told = Told::of(examined, options);
+    let (context, readings, first) = (examined.context, examined.readings, examined.first);
+    let clean = readings - &told.change;
     let meter = GapMeter::new(context.model, &context.law, options.seed);
-    let unknowns: usize = causes.iter().map(Cause::unknowns).sum();
-    let signatures = raw_signatures(context, causes);
-    let square = first.residual.norm_squared() - context.space.degrees_of_freedom() as f64;
-    let excess = square.max(f64::MIN_POSITIVE);
-    let explained =
-        first.residual.norm_squared() - context.remainder(readings, causes).residual.norm_squared();
-    let before = meter.size(readings, 0);
-    let dependence = Dependence::of(context.model, &context.law, &(readings - &change));
+    let dependence = Dependence::of(context.model, &context.law, &clean);
     let noise = NoiseOut::of(context.model, &context.law, &dependence);
-    let Conclusion { kind, gap } = Conclusion::of(
-        alarmed,
-        found,
-        Measured {
-            unit: context.model.reading_unit(),
-            noise: context.law.sigma(),
-            before,
-            after: meter.size(&(readings - &change), unknowns),
-            predicted_shrink: if before.rms > 0.0 {
-                1.0 - (1.0 - explained / excess).max(0.0).sqrt()
-            } else {
-                0.0
-            },
-            held_out: meter.held_out(context.model, readings, &signatures),
-            periodic: noise.period.is_some(),
-        },
-    );
+    let Conclusion { kind, gap } = told.conclusion(&meter, noise.period.is_some());
+    let groups = told.groups(kind);
     // Without a gap there is nothing to explain.
-    let whole = if alarmed && square > 0.0 {
-        excess
+    let whole = if told.alarmed && told.square > 0.0 {
+        told.excess()
     } else {
         f64::INFINITY
     };
-    let names = |causes: &mut dyn Iterator<Item = &Cause>| -> Vec<String> {
-        causes
-            .map(|c| context.catalogue[c.effect].name().to_owned())
-            .collect()
-    };
-    let own = names(&mut causes.iter());
-    let groups: &[Vec<Alternative>] = match (found, kind) {
-        (Some(answer), Kind::Effect) => &answer.groups,
-        _ => &[],
-    };
-    let candidates = candidates(context, readings, first, whole, groups, causes);
-    let indistinguishable: Vec<Vec<String>> = groups
-        .iter()
-        .filter(|group| group.len() > 1)
-        .map(|group| names(&mut group.iter().map(|a| &a.cause)))
-        .collect();
-    let places = if alarmed {
-        places(context, first, excess)
+    let candidates = candidates(context, readings, first, whole, groups, told.causes);
+    let places = if told.alarmed {
+        places(context, first, told.excess())
     } else {
         Vec::new()
     };
-    let mut verdict = Verdict {
-        kind,
-        effects: if kind == Kind::Effect {
-            own.clone()
-        } else {
-            Vec::new()
-        },
-        severity: match (found, kind) {
-            (Some(answer), Kind::Effect) if options.severity > 0 => {
-                severities(context, readings, answer, &dependence, options)
-            }
-            _ => Vec::new(),
-        },
-        indistinguishable,
-        partial: if kind == Kind::Unknown {
-            own
-        } else {
-            Vec::new()
-        },
-        separate: Vec::new(),
-        shape: (kind == Kind::Unknown && square > 0.0)
-            .then(|| fingerprint(context, readings, first, excess)),
-        statement: String::new(),
-        p_value: detected,
-        adequacy: context.global(found.map_or(first, |a| &a.remainder)),
-    };
-    let splits = match (found, kind) {
+    let mut verdict = told.verdict(kind, &dependence, options);
+    let splits = match (told.found, kind) {
         (Some(answer), Kind::Effect) => splits(context, readings, answer),
         _ => Vec::new(),
     };
     verdict.separate = separating(&verdict.indistinguishable, &candidates, &splits);
     let hidden = hidden(context, &verdict.effects, options);
     verdict.statement = statement(&verdict, (&gap, &noise), &places, &candidates, &hidden);
-    let (bias, profiles) = biases(context, readings, causes);
+    let (bias, profiles) = biases(context, readings, told.causes);
     Diagnosis {
         schema: "errsep.diagnosis/1",
         model: context.model.name(),
@@ -148,7 +72,7 @@ pub(in crate::diagnosis) fn compose(
         bias,
         hidden,
         notes: [
-            notes(context, &(readings - &change), calm),
+            notes(context, &clean, calm),
             no_noise(context.model, &dependence).into_iter().collect(),
             elsewhere(&candidates),
         ]
@@ -156,11 +80,126 @@ pub(in crate::diagnosis) fn compose(
         candidates,
         detail: Detail {
             before: meter.residuals(readings),
-            after: meter.residuals(&(readings - &change)),
+            after: meter.residuals(&clean),
             profiles,
-            change: change.as_slice().to_vec(),
+            change: told.change.as_slice().to_vec(),
             apart: splits.iter().flatten().map(|split| split.now).collect(),
         },
+    }
+}
+
+/// What is told of what was found: nothing without an alarm, nor of what cannot be fitted.
+struct Told<'a> {
+    examined: &'a Examined<'a>,
+    alarmed: bool,
+    found: Option<&'a Answer>,
+    causes: &'a [Cause],
+    /// What the causes change in the readings.
+    change: DVector<f64>,
+    /// What is missed without them, beyond the noise.
+    square: f64,
+}
+
+impl<'a> Told<'a> {
+    fn of(examined: &'a Examined<'a>, options: &Options) -> Self {
+        let (context, readings) = (examined.context, examined.readings);
+        let alarmed = examined.detected <= options.false_alarm;
+        let found = examined.found.as_ref().filter(|_| alarmed);
+        let fit = found.and_then(|answer| {
+            let (amplitudes, _) = context.amplitudes(readings, &answer.causes)?;
+            Some((answer.causes.as_slice(), amplitudes))
+        });
+        let (causes, change) = fit.map_or_else(
+            || (&[][..], DVector::zeros(readings.len())),
+            |(causes, amplitudes)| (causes, context.change(causes, &amplitudes)),
+        );
+        let freedom = context.space.degrees_of_freedom() as f64;
+        Self {
+            examined,
+            alarmed,
+            found,
+            causes,
+            change,
+            square: examined.first.residual.norm_squared() - freedom,
+        }
+    }
+
+    fn excess(&self) -> f64 {
+        self.square.max(f64::MIN_POSITIVE)
+    }
+
+    /// What the data allow to say, and the gap. `periodic`: something comes back in what differs between repeats.
+    fn conclusion(&self, meter: &GapMeter, periodic: bool) -> Conclusion {
+        let (context, readings) = (self.examined.context, self.examined.readings);
+        let unknowns: usize = self.causes.iter().map(Cause::unknowns).sum();
+        let whole = self.examined.first.residual.norm_squared();
+        let beside = context.remainder(readings, self.causes);
+        let explained = whole - beside.residual.norm_squared();
+        let before = meter.size(readings, 0);
+        let signatures = raw_signatures(context, self.causes);
+        let measured = Measured {
+            unit: context.model.reading_unit(),
+            noise: context.law.sigma(),
+            before,
+            after: meter.size(&(readings - &self.change), unknowns),
+            predicted_shrink: if before.rms > 0.0 {
+                1.0 - (1.0 - explained / self.excess()).max(0.0).sqrt()
+            } else {
+                0.0
+            },
+            held_out: meter.held_out(context.model, readings, &signatures),
+            periodic,
+        };
+        Conclusion::of(self.alarmed, self.found, measured)
+    }
+
+    /// What could stand in the place of each cause that is named.
+    fn groups(&self, kind: Kind) -> &'a [Vec<Alternative>] {
+        match (self.found, kind) {
+            (Some(answer), Kind::Effect) => &answer.groups,
+            _ => &[],
+        }
+    }
+
+    /// The verdict but for what separates the members of groups, and its sentence.
+    fn verdict(&self, kind: Kind, dependence: &Dependence, options: &Options) -> Verdict {
+        let Examined {
+            context,
+            readings,
+            first,
+            detected,
+            ..
+        } = *self.examined;
+        let names = |causes: &mut dyn Iterator<Item = &Cause>| -> Vec<String> {
+            causes
+                .map(|c| context.catalogue[c.effect].name().to_owned())
+                .collect()
+        };
+        let own = |wanted: Kind| {
+            let causes = if kind == wanted { self.causes } else { &[] };
+            names(&mut causes.iter())
+        };
+        let groups = self.groups(kind).iter().filter(|group| group.len() > 1);
+        Verdict {
+            kind,
+            effects: own(Kind::Effect),
+            severity: match (self.found, kind) {
+                (Some(answer), Kind::Effect) if options.severity > 0 => {
+                    severities(context, readings, answer, dependence, options)
+                }
+                _ => Vec::new(),
+            },
+            indistinguishable: groups
+                .map(|group| names(&mut group.iter().map(|a| &a.cause)))
+                .collect(),
+            partial: own(Kind::Unknown),
+            separate: Vec::new(),
+            shape: (kind == Kind::Unknown && self.square > 0.0)
+                .then(|| fingerprint(context, readings, first, self.excess())),
+            statement: String::new(),
+            p_value: detected,
+            adequacy: context.global(self.found.map_or(first, |a| &a.remainder)),
+        }
     }
 }
 

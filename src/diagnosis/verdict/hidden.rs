@@ -1,6 +1,6 @@
 //! What could hide in these readings.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{AnyModel, Effect, FittedModel, Quantity};
 
 use crate::diagnosis::attribution::bias::weighted_std;
 use crate::diagnosis::attribution::context::Context;
@@ -19,7 +19,7 @@ pub(in crate::diagnosis) fn hidden(
     named: &[String],
     options: &Options,
 ) -> Vec<Hidden> {
-    let quantities: Vec<_> = context
+    let quantities: Vec<(Quantity, f64)> = context
         .model
         .quantities()
         .into_iter()
@@ -56,25 +56,6 @@ pub(in crate::diagnosis) fn hidden(
             let threshold = |order| context.null.threshold(family, level, order);
             SizesByShape::new(&context.dictionary, own, threshold, most)
         });
-        let shape = description.grid(context.model).into_iter().next();
-        let column = shape
-            .and_then(|s| description.columns(context.model, &s).into_iter().next())
-            .map(|c| c.dense(context.space.readings()));
-        let harm = column.and_then(|column| {
-            quantities
-                .iter()
-                .map(|(q, std)| {
-                    let bias = q.weights.dot(&column);
-                    (q, bias, bias.abs() / *std)
-                })
-                // Of equal harms that to the quantity named first.
-                .reduce(|most, next| if next.2 > EQUAL * most.2 { next } else { most })
-                .map(|(q, per_unit, _)| Harm {
-                    quantity: q.name.clone(),
-                    per_unit,
-                    unit: q.unit.to_owned(),
-                })
-        });
         list.push(Hidden {
             effect: description.name().to_owned(),
             visible,
@@ -85,9 +66,32 @@ pub(in crate::diagnosis) fn hidden(
                 .amplitudes()
                 .first()
                 .map_or(String::new(), |p| p.unit.to_owned()),
-            harm,
+            harm: harm(context, description.as_ref(), &quantities),
         });
     }
     list.sort_by(|a, b| a.visible.total_cmp(&b.visible));
     list
+}
+
+/// How an effect moves the quantity that it harms most, measured in the standard uncertainties that stand beside the
+/// quantities.
+fn harm(
+    context: &Context<'_>,
+    effect: &dyn Effect<AnyModel>,
+    quantities: &[(Quantity, f64)],
+) -> Option<Harm> {
+    let shape = effect.grid(context.model).into_iter().next()?;
+    let column = effect.columns(context.model, &shape).into_iter().next()?;
+    let column = column.dense(context.space.readings());
+    let moved = quantities.iter().map(|(quantity, std)| {
+        let bias = quantity.weights.dot(&column);
+        (quantity, bias, bias.abs() / *std)
+    });
+    // Of equal harms that to the quantity named first.
+    let most = moved.reduce(|most, next| if next.2 > EQUAL * most.2 { next } else { most });
+    most.map(|(quantity, per_unit, _)| Harm {
+        quantity: quantity.name.clone(),
+        per_unit,
+        unit: quantity.unit.to_owned(),
+    })
 }

@@ -107,42 +107,8 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
         .collect();
     let said = said.join(" and ");
     let weak = weakness(verdict);
-    let doubt = if open {
-        format!(
-            "These readings cannot tell {} apart. To tell them apart: {}.",
-            if causes.len() > 1 {
-                "the members of a group"
-            } else {
-                "them"
-            },
-            verdict.separate.join("; ")
-        )
-    } else {
-        let confirm: Vec<&str> = candidates
-            .iter()
-            .filter(|c| verdict.effects.contains(&c.effect))
-            .map(|c| c.confirm.as_str())
-            .collect();
-        let purpose = if weak.is_empty() {
-            "To confirm"
-        } else {
-            "To tell them apart"
-        };
-        format!("{purpose}: {}.", confirm.join("; "))
-    };
-    let missed = gap.before.in_words(gap.unit);
-    let beginning = match (gap.before.rms > 0.0, weak.is_empty()) {
-        (true, true) => format!("The model misses {missed} because of {said}"),
-        (true, false) => {
-            format!("The model misses {missed}, which is consistent ({weak}) with {said}")
-        }
-        (false, true) => {
-            format!("The model misses {missed}, but what stands out of the noise is {said}")
-        }
-        (false, false) => format!(
-            "The model misses {missed}, but what stands out of the noise is consistent ({weak}) with {said}"
-        ),
-    };
+    let doubt = next(verdict, candidates, !weak.is_empty());
+    let beginning = because(gap, &said, &weak);
     let with = if open {
         verdict.effects.join(" and ")
     } else if causes.len() > 1 {
@@ -164,6 +130,52 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
         "{beginning}; with {with} {} {remain}{more}. {doubt}",
         gap.after.in_words(gap.unit)
     )
+}
+
+/// What to do next: to tell the members of groups apart, or to confirm a name.
+fn next(verdict: &Verdict, candidates: &[Candidate], is_weak: bool) -> String {
+    let causes = verdict.causes();
+    let open = causes.iter().any(|group| group.len() > 1);
+    if open {
+        format!(
+            "These readings cannot tell {} apart. To tell them apart: {}.",
+            if causes.len() > 1 {
+                "the members of a group"
+            } else {
+                "them"
+            },
+            verdict.separate.join("; ")
+        )
+    } else {
+        let confirm: Vec<&str> = candidates
+            .iter()
+            .filter(|c| verdict.effects.contains(&c.effect))
+            .map(|c| c.confirm.as_str())
+            .collect();
+        let purpose = if is_weak {
+            "To tell them apart"
+        } else {
+            "To confirm"
+        };
+        format!("{purpose}: {}.", confirm.join("; "))
+    }
+}
+
+/// What is missed because of what, or what a weak name (`weak`: why) is consistent with.
+fn because(gap: &Gap, said: &str, weak: &str) -> String {
+    let missed = gap.before.in_words(gap.unit);
+    match (gap.before.rms > 0.0, weak.is_empty()) {
+        (true, true) => format!("The model misses {missed} because of {said}"),
+        (true, false) => {
+            format!("The model misses {missed}, which is consistent ({weak}) with {said}")
+        }
+        (false, true) => {
+            format!("The model misses {missed}, but what stands out of the noise is {said}")
+        }
+        (false, false) => format!(
+            "The model misses {missed}, but what stands out of the noise is consistent ({weak}) with {said}"
+        ),
+    }
 }
 
 /// Why causes do not pass beside which something comes back.

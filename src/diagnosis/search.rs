@@ -174,8 +174,9 @@ mod tests {
             count += 1;
             (v[0] - 3.0).abs()
         });
-        // Half a step of the closest reach, as a kink has no vertex.
+        // What it settles to; a kink has no vertex.
         assert!((at[0] - 3.0).abs() <= 3e-3, "{at:?}");
+        // Some ten moves of 0.3, of two values each, and as many again to settle by halves.
         assert!(count <= 80, "{count}");
     }
 

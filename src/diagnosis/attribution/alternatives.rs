@@ -42,9 +42,11 @@ pub(super) fn alternatives(
     k: usize,
     part: f64,
 ) -> Vec<Member> {
-    let place = Place::of(context, readings, best, k, part);
+    let replacement = Replacement::of(context, readings, best, k, part);
     let effects = (0..context.catalogue.len()).into_par_iter();
-    let mut members: Vec<Member> = effects.filter_map(|effect| place.best_of(effect)).collect();
+    let mut members: Vec<Member> = effects
+        .filter_map(|effect| replacement.best_of(effect))
+        .collect();
     drop_outweighed(context, &mut members, k);
     let least = members
         .iter()
@@ -64,8 +66,8 @@ pub(super) fn alternatives(
     members
 }
 
-/// The place of one of several causes.
-struct Place<'s> {
+/// What may stand in the place of one of several causes.
+struct Replacement<'s> {
     context: &'s Context<'s>,
     readings: &'s DVector<f64>,
     /// The causes, and what they leave.
@@ -82,7 +84,7 @@ struct Place<'s> {
     hopeless: f64,
 }
 
-impl<'s> Place<'s> {
+impl<'s> Replacement<'s> {
     fn of(
         context: &'s Context<'s>,
         readings: &'s DVector<f64>,

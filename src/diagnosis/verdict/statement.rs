@@ -107,7 +107,7 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
         .collect();
     let said = said.join(" and ");
     let weak = weakness(verdict);
-    let doubt = next(verdict, candidates, !weak.is_empty());
+    let advice = advice(verdict, candidates, !weak.is_empty());
     let beginning = because(gap, &said, &weak);
     let with = if open {
         verdict.effects.join(" and ")
@@ -127,13 +127,13 @@ fn named(verdict: &Verdict, gap: &Gap, candidates: &[Candidate]) -> String {
         "remain"
     };
     format!(
-        "{beginning}; with {with} {} {remain}{more}. {doubt}",
+        "{beginning}; with {with} {} {remain}{more}. {advice}",
         gap.after.in_words(gap.unit)
     )
 }
 
 /// What to do next: to tell the members of groups apart, or to confirm a name.
-fn next(verdict: &Verdict, candidates: &[Candidate], is_weak: bool) -> String {
+fn advice(verdict: &Verdict, candidates: &[Candidate], is_weak: bool) -> String {
     let causes = verdict.causes();
     let open = causes.iter().any(|group| group.len() > 1);
     if open {

@@ -205,13 +205,13 @@ pub(super) fn threshold<'p>(
         }
     }
     let mut best = f64::NEG_INFINITY;
-    // A sum of what is never positive: no longer summed once it is too small to count.
     let law = Normal::standard();
     let below = |z: f64| match z {
         z if z < -CERTAIN => 0.0,
         z if z > CERTAIN => 1.0,
         z => law.cdf(z),
     };
+    // A sum of what is never positive: no longer summed once it is too small to count.
     let mut likelihood = |centre: f64, spread: f64| -> f64 {
         let mut sum = 0.0;
         for (low, high) in &intervals {

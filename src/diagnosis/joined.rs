@@ -332,7 +332,9 @@ fn told(
     let meter = GapMeter::new(context.model, &context.law, options.seed);
     let clean = readings - &change;
     let (before, after) = (meter.size(readings, 0), meter.size(&clean, unknowns));
-    let dependence = Dependence::of(context.model, &context.law, &clean);
+    let dependence = Dependence::of(context.model, &context.law, &clean, || {
+        context.repeats_show_whole()
+    });
     notes.extend(no_noise(context.model, &dependence));
     let (quantities, moved) = biases(context, readings, causes);
     let quantities = answers_widened(context, readings, quantities, &moved, &allowed);

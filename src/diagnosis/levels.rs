@@ -94,8 +94,8 @@ pub(in crate::diagnosis) const BENT: f64 = 0.5;
 pub(in crate::diagnosis) const ODDS: f64 = 100.0;
 /// *Tuned* on withheld effects: part of the strongest cause's change, squared, that a further one must
 /// reach. What is less may be the remainder of a cause taken for another whose signature is off by a
-/// seventh of its size.
-pub(in crate::diagnosis) const WEIGHTY: f64 = 0.02;
+/// fifth of its size.
+pub(in crate::diagnosis) const WEIGHTY: f64 = 0.04;
 /// *Limit.* A relative of a cause that explains less than this part of what it does cannot stand for it.
 pub(in crate::diagnosis) const NEAR: f64 = 0.7;
 /// *Tuned.* A size counts from this many of its standard uncertainties on: that of the only cause, and

@@ -33,8 +33,9 @@ pub(in crate::diagnosis) fn confidence_set(
     readings: &DVector<f64>,
     causes: &[Cause],
 ) -> Answer {
-    let mut best = context.relinearised(readings, causes, f64::INFINITY);
-    let mut remainder = Arc::new(context.judged(readings, &best));
+    let best = context.relinearised(readings, causes, f64::INFINITY);
+    let remainder = Arc::new(context.judged(readings, &best));
+    let (mut best, mut remainder) = context.in_other_shapes(readings, best, remainder);
     let mut groups = Vec::new();
     // Of many that do not suffice each has been swapped for what explains more, and what is lacking is another.
     let tried = causes.len() <= FREELY || context.adequate(&best, &remainder);

@@ -1,8 +1,10 @@
 //! The workbench of one pass: state of the model, noise, space, dictionary and their null law.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
-use errsep_models::model::{AnyModel, Column, Effect, Shape};
+use errsep_models::model::{AnyModel, Column, Effect, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::attribution::doubt::Drawn;
@@ -12,6 +14,8 @@ use crate::diagnosis::detection::space::{Space, orthonormal};
 use crate::diagnosis::levels::SLACK;
 use crate::diagnosis::noise::law::NoiseLaw;
 
+/// What keeps this part of its length is seen whole.
+const WHOLE: f64 = 0.999;
 /// A column of which less than this part, squared, is left beside the others is a sum of them and rounding.
 const ROUNDING: f64 = 1e-10;
 
@@ -100,6 +104,32 @@ impl<'a> Context<'a> {
     /// The whitened, projected residual of readings.
     pub fn residual(&self, readings: &DVector<f64>) -> DVector<f64> {
         self.space.forward_vector(readings)
+    }
+
+    /// Whether what differs between repeats is seen whole: no unknown of the model takes up part of a shift of one trace
+    /// against the next one that repeats it.
+    pub fn repeats_show_whole(&self) -> bool {
+        let (places, traces) = (self.model.places(), self.model.traces());
+        let mut last: BTreeMap<Vec<usize>, &Range<usize>> = BTreeMap::new();
+        let mut shifts: Vec<Column> = Vec::new();
+        for trace in traces.iter().filter(|trace| !trace.is_empty()) {
+            let mut key: Vec<usize> = places[trace.clone()].iter().map(|p| p.cell).collect();
+            key.push(usize::from(places[trace.start].direction < 0.0));
+            if let Some(before) = last.insert(key, trace) {
+                let signs = before
+                    .clone()
+                    .map(|_| -1.0)
+                    .chain(trace.clone().map(|_| 1.0));
+                shifts.push(Column {
+                    rows: before.clone().chain(trace.clone()).collect(),
+                    values: signs.collect(),
+                });
+            }
+        }
+        shifts.iter().all(|shift| {
+            let (seen, sizes) = self.space.forward_columns(std::slice::from_ref(shift));
+            seen.norm() > WHOLE * sizes[0]
+        })
     }
 
     /// A cause of the catalogue at a shape, by the signature at a state of the model.

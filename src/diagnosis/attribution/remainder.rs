@@ -118,6 +118,13 @@ impl Context<'_> {
         self.exceeds(left, least_chance(causes))
     }
 
+    /// Whether an effect stands out beside causes, by what they leave.
+    pub fn stands_out(&self, left: &Remainder, causes: &[Cause], effect: usize) -> bool {
+        self.family_of(effect).is_some_and(|family| {
+            self.null.global_of(family, self.best(left, family).0) <= least_chance(causes)
+        })
+    }
+
     /// Whether as much as remains of any family would stand out with nothing there in more than a part of all cases.
     fn exceeds(&self, left: &Remainder, least: f64) -> bool {
         let mut families = 0..self.dictionary.families.len();

@@ -1,8 +1,10 @@
-//! Whether what differs between repeats is noise as the law has it: of each channel by itself, and without a period.
+//! Whether what differs between repeats is noise as the law has it: of each channel by itself, without a period, anew in
+//! each trace and alike in all channels.
 //!
 //! What an unknown cause does anew in every pass (a slide that sticks somewhere else each time) has no mean over the
 //! repeats, and goes into the law of the noise. Two channels that are read in one pass are correlated by it, and what comes
-//! back after a length stands out of the spectrum; independent noise does neither.
+//! back after a length stands out of the spectrum; independent noise does neither. Nor does it go on from one trace to the
+//! next (`course.rs`), or shift the traces of some channels only (`uneven.rs`).
 
 use std::f64::consts::PI;
 
@@ -12,7 +14,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use crate::diagnosis::levels::DEPENDENT;
 use crate::diagnosis::noise::contrasts::{Contrasts, Row};
+use crate::diagnosis::noise::course::{Course, course};
 use crate::diagnosis::noise::law::{NoiseLaw, NoiseSource};
+use crate::diagnosis::noise::uneven::{Uneven, uneven};
 
 /// Products of readings that are summed to one: what the law leaves correlated among neighbours is within it.
 const BLOCK: usize = 10;
@@ -48,21 +52,37 @@ pub(in crate::diagnosis) struct Period {
 pub(in crate::diagnosis) struct Dependence {
     pub between_channels: Option<BetweenChannels>,
     pub period: Option<Period>,
+    pub course: Option<Course>,
+    pub uneven: Option<Uneven>,
 }
 
 impl Dependence {
     /// Of readings free of causes, where repeats tell the noise and nothing else: read at other places they show forms too.
-    pub fn of(model: &AnyModel, law: &NoiseLaw, clean: &DVector<f64>) -> Self {
+    /// `show_whole`: whether no unknown of the model takes up part of what differs between repeats, of which readings then
+    /// hold what is not noise and is not seen.
+    pub fn of(
+        model: &AnyModel,
+        law: &NoiseLaw,
+        clean: &DVector<f64>,
+        show_whole: impl FnOnce() -> bool,
+    ) -> Self {
         if law.source != NoiseSource::Repeats || !model.repeats_are_alike() {
             return Self::default();
         }
         let contrasts = Contrasts::new(model.places(), model.traces(), clean);
-        Self::in_white(&contrasts.whitened(law))
+        let course = course(model.places(), model.traces(), clean);
+        let course = course.filter(|found| is_told(found.p_value));
+        let uneven = uneven(&contrasts).filter(|found| is_told(found.p_value));
+        let lasting = (course.is_some() || uneven.is_some()) && show_whole();
+        Self {
+            course: course.filter(|_| lasting),
+            uneven: uneven.filter(|_| lasting),
+            ..Self::in_white(&contrasts.whitened(law))
+        }
     }
 
     /// Of contrasts that are white if the noise is what the law says.
     fn in_white(contrasts: &Contrasts) -> Self {
-        let is_told = |p_value: f64| p_value < DEPENDENT;
         let between_channels = between_channels(contrasts).filter(|found| is_told(found.p_value));
         // Of correlated channels one tells no more than the other.
         let times = if between_channels.is_some() { 2 } else { 1 };
@@ -70,13 +90,35 @@ impl Dependence {
         Self {
             between_channels,
             period,
+            course: None,
+            uneven: None,
         }
     }
 
     /// Whether anything is told.
     pub fn is_seen(&self) -> bool {
-        self.between_channels.is_some() || self.period.is_some()
+        self.between_channels.is_some() || self.is_no_noise()
     }
+
+    /// Whether it is something else: noise may come to two channels at once, but neither comes back nor goes on nor
+    /// shifts the traces of some channels only.
+    pub fn is_no_noise(&self) -> bool {
+        self.p_value_of_no_noise() < 1.0
+    }
+
+    /// Probability of what tells that it is something else, the least; one where nothing does.
+    pub fn p_value_of_no_noise(&self) -> f64 {
+        let all = [
+            self.period.as_ref().map(|period| period.p_value),
+            self.course.as_ref().map(|course| course.p_value),
+            self.uneven.as_ref().map(|uneven| uneven.p_value),
+        ];
+        all.into_iter().flatten().fold(1.0, f64::min)
+    }
+}
+
+fn is_told(p_value: f64) -> bool {
+    p_value < DEPENDENT
 }
 
 /// The two channels that are correlated most clearly: Student's t of the sums of products over blocks of neighbours.

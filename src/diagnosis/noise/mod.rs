@@ -2,9 +2,11 @@
 //! repeats, with jumps and spikes told apart from it, and the whitening by that law.
 
 pub(super) mod contrasts;
+mod course;
 pub(super) mod dependence;
 pub(super) mod law;
 pub(super) mod posterior;
 pub(super) mod spikes;
 pub(super) mod steps;
+mod uneven;
 pub(super) mod whitening;

@@ -33,13 +33,16 @@ pub(in crate::diagnosis) fn compose(
     calm: &Calmed,
     options: &Options,
 ) -> Diagnosis {
-    let told = Told::of(examined, options);
+    let mut told = Told::of(examined, options);
     let (context, readings, first) = (examined.context, examined.readings, examined.first);
     let clean = readings - &told.change;
     let meter = GapMeter::new(context.model, &context.law, options.seed);
-    let dependence = Dependence::of(context.model, &context.law, &clean);
+    let dependence = Dependence::of(context.model, &context.law, &clean, || {
+        context.repeats_show_whole()
+    });
+    told.heed(&dependence, options);
     let noise = NoiseOut::of(context.model, &context.law, &dependence);
-    let Conclusion { kind, gap } = told.conclusion(&meter, noise.period.is_some());
+    let Conclusion { kind, gap } = told.conclusion(&meter, dependence.is_no_noise());
     let groups = told.groups(kind);
     // Without a gap there is nothing to explain.
     let whole = if told.alarmed && told.square > 0.0 {
@@ -92,6 +95,8 @@ pub(in crate::diagnosis) fn compose(
 struct Told<'a> {
     examined: &'a Examined<'a>,
     alarmed: bool,
+    /// Probability of as much as was noticed with nothing there.
+    p_value: f64,
     found: Option<&'a Answer>,
     causes: &'a [Cause],
     /// What the causes change in the readings.
@@ -117,6 +122,7 @@ impl<'a> Told<'a> {
         Self {
             examined,
             alarmed,
+            p_value: examined.detected,
             found,
             causes,
             change,
@@ -124,12 +130,20 @@ impl<'a> Told<'a> {
         }
     }
 
+    /// Counts as noticed what the law of the noise has taken for noise.
+    fn heed(&mut self, dependence: &Dependence, options: &Options) {
+        let p_value = dependence.p_value_of_no_noise();
+        if !self.alarmed && p_value <= options.false_alarm {
+            (self.alarmed, self.p_value) = (true, p_value);
+        }
+    }
+
     fn excess(&self) -> f64 {
         self.square.max(f64::MIN_POSITIVE)
     }
 
-    /// What the data allow to say, and the gap. `periodic`: something comes back in what differs between repeats.
-    fn conclusion(&self, meter: &GapMeter, periodic: bool) -> Conclusion {
+    /// What the data allow to say, and the gap. `no_noise`: what differs between repeats is something else.
+    fn conclusion(&self, meter: &GapMeter, no_noise: bool) -> Conclusion {
         let (context, readings) = (self.examined.context, self.examined.readings);
         let unknowns: usize = self.causes.iter().map(Cause::unknowns).sum();
         let whole = self.examined.first.residual.norm_squared();
@@ -148,7 +162,7 @@ impl<'a> Told<'a> {
                 0.0
             },
             held_out: meter.held_out(context.model, readings, &signatures),
-            periodic,
+            no_noise,
         };
         Conclusion::of(self.alarmed, self.found, measured)
     }
@@ -167,7 +181,6 @@ impl<'a> Told<'a> {
             context,
             readings,
             first,
-            detected,
             ..
         } = *self.examined;
         let names = |causes: &mut dyn Iterator<Item = &Cause>| -> Vec<String> {
@@ -197,7 +210,7 @@ impl<'a> Told<'a> {
             shape: (kind == Kind::Unknown && self.square > 0.0)
                 .then(|| fingerprint(context, readings, first, self.excess())),
             statement: String::new(),
-            p_value: detected,
+            p_value: self.p_value,
             adequacy: context.global(self.found.map_or(first, |a| &a.remainder)),
         }
     }

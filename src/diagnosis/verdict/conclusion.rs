@@ -26,8 +26,8 @@ pub(in crate::diagnosis) struct Measured {
     pub predicted_shrink: f64,
     /// On held-out repeats.
     pub held_out: Option<HeldOut>,
-    /// Whether what differs between repeats comes back along the travel.
-    pub periodic: bool,
+    /// Whether what differs between repeats is no noise, as it comes back along the travel or goes on in time.
+    pub no_noise: bool,
 }
 
 /// Kind of the verdict and the gap that goes with it.
@@ -46,15 +46,15 @@ impl Conclusion {
             after,
             predicted_shrink,
             held_out,
-            periodic,
+            no_noise,
         } = measured;
         let shrunk = shrink(before.rms, after.rms);
         // A gap that stands clear and does not shrink as its score promised has another cause.
         let kept_promise = !before.is_clear() || shrunk > PROMISE * predicted_shrink;
         let kind = match found {
             _ if !alarmed => Kind::None,
-            // Beside the whole cause there is noise, and noise has no period.
-            Some(answer) if answer.complete && kept_promise && !periodic => Kind::Effect,
+            // Beside the whole cause there is noise and nothing else.
+            Some(answer) if answer.complete && kept_promise && !no_noise => Kind::Effect,
             _ => Kind::Unknown,
         };
         let with_zero = |size: Size| Size {

@@ -5,9 +5,7 @@ use crate::diagnosis::levels::MOSTLY;
 use crate::diagnosis::planning::splitting::Split;
 use crate::diagnosis::severity::{Confidence, NO_NOISE, Severity, TOGETHER};
 use crate::diagnosis::verdict::told::for_people;
-use crate::diagnosis::verdict::types::{
-    Fingerprint, Gap, Hidden, Kind, NoiseOut, Period, Verdict, Where,
-};
+use crate::diagnosis::verdict::types::{Fingerprint, Gap, Hidden, Kind, NoiseOut, Verdict, Where};
 use crate::number::{percent, plain, probability};
 
 /// The sentence.
@@ -41,8 +39,9 @@ pub(in crate::diagnosis) fn statement(
                     gap.before.in_words(gap.unit)
                 )
             };
+            let no_noise = no_noise(noise);
             let partial = match verdict.partial[..] {
-                [] => String::new(),
+                [] => no_noise.map_or(String::new(), |why| format!("; {why}")),
                 ref some => format!(
                     "; {} would leave {} but {}{}",
                     some.join(" and "),
@@ -52,7 +51,9 @@ pub(in crate::diagnosis) fn statement(
                     } else {
                         "does not pass as its cause"
                     },
-                    noise.period.as_ref().map_or(String::new(), coming_back)
+                    no_noise
+                        .as_ref()
+                        .map_or(String::new(), |why| format!(": {why}"))
                 ),
             };
             format!(
@@ -178,13 +179,27 @@ fn because(gap: &Gap, said: &str, weak: &str) -> String {
     }
 }
 
-/// Why causes do not pass beside which something comes back.
-fn coming_back(period: &Period) -> String {
-    format!(
-        ": what differs from repeat to repeat comes back every {} {}, which noise does not",
-        plain(period.length, 3),
-        for_people(period.unit)
-    )
+/// Why causes do not pass: what differs between repeats is not noise alone.
+fn no_noise(noise: &NoiseOut) -> Option<String> {
+    let comes_back = noise.period.as_ref().map(|period| {
+        let (length, unit) = (plain(period.length, 3), for_people(period.unit));
+        format!("comes back every {length} {unit}")
+    });
+    let goes_on = noise.between_traces.as_ref();
+    let goes_on = goes_on.map(|_| "goes on from one trace to the next".to_owned());
+    let uneven = noise.uneven.as_ref().map(|uneven| {
+        let channels = uneven.channels.join(" and ");
+        format!("shifts the traces of {channels} more than the others")
+    });
+    let ways: Vec<String> = comes_back
+        .into_iter()
+        .chain(goes_on)
+        .chain(uneven)
+        .collect();
+    (!ways.is_empty()).then(|| {
+        let ways = ways.join(" and ");
+        format!("what differs from repeat to repeat {ways}, which noise does not")
+    })
 }
 
 /// Of each weak name what else would be given it, or how rare it is that noise leaves as much, of several that they are

@@ -113,14 +113,37 @@ pub(in crate::diagnosis) fn no_noise(model: &AnyModel, dependence: &Dependence) 
         let unit = for_people(model.position_unit());
         format!("it comes back every {length} {unit}")
     });
-    let advice = if period.is_some() {
-        " Measure at another feed: what sticks keeps its length, what swings keeps its time."
+    let course = dependence.course.as_ref().map(|course| {
+        let correlation = plain(course.correlation, 2);
+        format!("it goes on from one trace to the next (correlation {correlation})")
+    });
+    let uneven = dependence.uneven.as_ref().map(|uneven| {
+        let names = model.channel_names();
+        let channels: Vec<&str> = uneven.channels.iter().map(|k| names[*k].as_str()).collect();
+        format!(
+            "the traces of {} shift {} times as much as those of the others",
+            channels.join(" and "),
+            plain(uneven.times, 2)
+        )
+    });
+    let lasts = course.is_some() || uneven.is_some();
+    let mut advice = String::new();
+    if period.is_some() {
+        advice +=
+            " Measure at another feed: what sticks keeps its length, what swings keeps its time.";
+    }
+    if lasts {
+        advice += " Record the indicators at one position for as long as the test took, and the temperatures with them.";
+    }
+    let what = if lasts {
+        "Something that lasts longer than a trace"
     } else {
-        ""
+        "Something that acts anew in every pass"
     };
-    let ways: Vec<String> = between_channels.into_iter().chain(period).collect();
+    let ways = [between_channels, period, course, uneven];
+    let ways: Vec<String> = ways.into_iter().flatten().collect();
     (!ways.is_empty()).then(|| format!(
-        "What differs from repeat to repeat is not independent noise: {}; independent noise does so in less than {} of cases. Something acts anew in every pass and is counted as noise here; probabilities and uncertainties hold for independent noise only.{advice}",
+        "What differs from repeat to repeat is not independent noise: {}; independent noise does so in less than {} of cases. {what} is counted as noise here; probabilities and uncertainties hold for independent noise only.{advice}",
         ways.join(", and "),
         percent(DEPENDENT)
     ))

@@ -301,6 +301,12 @@ pub struct NoiseOut {
     /// A period in what differs from repeat to repeat.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period: Option<Period>,
+    /// How what differs from repeat to repeat goes on from one trace to the next.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub between_traces: Option<BetweenTraces>,
+    /// Channels whose traces shift more from repeat to repeat than those of the others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uneven: Option<Uneven>,
 }
 
 /// A correlation of two channels in what differs from repeat to repeat.
@@ -322,6 +328,26 @@ pub struct Period {
     /// Unit of the positions.
     pub unit: &'static str,
     /// Probability of as much in independent noise.
+    pub p_value: f64,
+}
+
+/// How what differs from repeat to repeat goes on from one trace to the next.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BetweenTraces {
+    /// Correlation of the ends of traces with the beginnings of the next ones.
+    pub correlation: f64,
+    /// Probability of as much in independent noise.
+    pub p_value: f64,
+}
+
+/// Channels whose traces shift more from repeat to repeat than those of the others.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Uneven {
+    /// The channels.
+    pub channels: Vec<String>,
+    /// How many times as much, each in units of the scatter of its readings.
+    pub times: f64,
+    /// Probability of as much in noise that is alike in all.
     pub p_value: f64,
 }
 
@@ -355,6 +381,18 @@ impl NoiseOut {
                 length: period.length,
                 unit: model.position_unit(),
                 p_value: period.p_value,
+            }),
+            between_traces: dependence.course.as_ref().map(|course| BetweenTraces {
+                correlation: course.correlation,
+                p_value: course.p_value,
+            }),
+            uneven: dependence.uneven.as_ref().map(|uneven| {
+                let names = model.channel_names();
+                Uneven {
+                    channels: uneven.channels.iter().map(|k| names[*k].clone()).collect(),
+                    times: uneven.times,
+                    p_value: uneven.p_value,
+                }
             }),
         }
     }

@@ -16,8 +16,8 @@ pub(super) struct AmbientCycle(pub Indicators);
 /// Cycles between neighbouring starts of the search.
 const STRIDE: f64 = 0.3;
 
-/// Cycles by which two periods must differ to be told apart.
-const APART: f64 = 0.6;
+/// Cycles by which a period must be longer than two traces: at that itself it is a form.
+const APART: f64 = 0.1;
 
 impl Effect<Linearised> for AmbientCycle {
     fn name(&self) -> &str {

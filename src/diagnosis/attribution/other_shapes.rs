@@ -1,0 +1,85 @@
+//! A cause beside which its own effect stands out has the wrong shape: it is sought in others.
+//!
+//! A search beside other causes may end beside the best shape, and of two shapes the simpler one is taken where the
+//! other explains little more. Neither is kept where what is left is more than noise and of the same effect.
+
+use std::sync::Arc;
+
+use errsep_models::model::{FittedModel, Shape};
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use crate::diagnosis::attribution::context::{Cause, Context};
+use crate::diagnosis::attribution::remainder::Remainder;
+use crate::diagnosis::attribution::standing::without;
+use crate::diagnosis::levels::{FAR, NO_BETTER};
+use crate::diagnosis::search::Reach;
+
+/// Rounds of seeking others, and shapes that are fitted with the state in each.
+const ROUNDS: usize = 3;
+/// See [`ROUNDS`].
+const FITTED: usize = 2;
+
+impl Context<'_> {
+    /// Causes in other shapes than those in which they leave `left`, and what they leave then; the same where that is
+    /// adequate, or no other shape explains more.
+    pub fn in_other_shapes(
+        &self,
+        readings: &DVector<f64>,
+        causes: Vec<Cause>,
+        left: Arc<Remainder>,
+    ) -> (Vec<Cause>, Arc<Remainder>) {
+        let mut best = (causes, left);
+        for _ in 0..ROUNDS {
+            let (causes, left) = &best;
+            let misfit = self.misfit(readings, causes);
+            let freedom = self.space.degrees_of_freedom() as f64;
+            let far = misfit > freedom + FAR * (2.0 * freedom).sqrt();
+            if far || self.adequate(causes, left) {
+                break;
+            }
+            let lacking = (0..causes.len()).into_par_iter();
+            let lacking = lacking.filter(|k| self.stands_out(left, causes, causes[*k].effect));
+            let other = lacking.flat_map(|k| self.otherwise(readings, causes, k));
+            let other = other.map(|causes| (self.misfit(readings, &causes), causes));
+            let next = other.min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, causes)) = next.filter(|(other, _)| *other < misfit - NO_BETTER) else {
+                break;
+            };
+            let left = Arc::new(self.judged(readings, &causes));
+            best = (causes, left);
+        }
+        best
+    }
+
+    /// The causes fitted again with one of them begun in each of its other shapes.
+    fn otherwise(&self, readings: &DVector<f64>, causes: &[Cause], k: usize) -> Vec<Vec<Cause>> {
+        let own = &causes[k];
+        let others = without(causes, k);
+        let Some(changes) = self.changes(readings, causes) else {
+            return Vec::new();
+        };
+        let clean = self.without(readings, causes, &changes);
+        let state = self.model.refit_as_smooth(clean);
+        let state = self.seen_by(k, &state, causes, &changes);
+        let mut starts: Vec<Shape> = self.catalogue[own.effect].relatives(&state, &own.shape);
+        let beside = self.remainder(readings, &others);
+        starts.extend(self.start(&beside, own.effect).cloned());
+        let misfit = |cause: &Cause| {
+            let mut all = others.clone();
+            all.insert(k, cause.clone());
+            (self.misfit(readings, &all), all)
+        };
+        let found = starts.par_iter().map(|start| {
+            let start = (start, Reach::WIDE);
+            misfit(&self.refine_alone(&state, readings, own.effect, start, &others))
+        });
+        let mut found: Vec<(f64, Vec<Cause>)> = found.collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.truncate(FITTED);
+        let fitted = found.into_par_iter();
+        fitted
+            .map(|(_, causes)| self.relinearised(readings, &causes, f64::INFINITY))
+            .collect()
+    }
+}

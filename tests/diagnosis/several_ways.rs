@@ -244,3 +244,41 @@ fn the_harm_of_an_indexing_error_is_told() {
     // Epsilons: sums over 60 positions of weights that are normed to one.
     assert!((harm.per_unit + 0.5).abs() < 1e-12, "{harm:?}");
 }
+
+/// *Simulated truth*: a jump or a slow cycle of one indicator, withheld, goes into the law of the noise as shifts of traces;
+/// without a look at how they shift a drift passes in the place of these jumps, and the cycles are `none`.
+#[test]
+fn what_outlasts_a_trace_and_is_not_listed_is_unknown() {
+    let cases = [
+        ("zero-jump", 1, 2),
+        ("zero-jump", 1, 3),
+        ("zero-jump", 3, 1),
+        ("ambient-cycle", 3, 0),
+        ("ambient-cycle", 3, 1),
+    ];
+    cases.par_iter().for_each(|&(effect, way, seed)| {
+        let readings = measured(effect, way, 1.2, seed, POSITIONS).unwrap();
+        let model = Linearised::new(&readings, Assumptions::default()).unwrap();
+        let lacking = Options {
+            draws: 200,
+            severity: 0,
+            without: vec![effect.to_owned()],
+            ..Options::default()
+        };
+        let found = diagnose(&model, &lacking);
+        let said = &found.verdict.statement;
+        let why = "shifts the traces of";
+        assert_eq!(found.verdict.kind, Kind::Unknown, "{effect}: {said}");
+        assert!(said.contains(why), "{effect}: {said}");
+        assert!(found.noise.uneven.unwrap().p_value < 1e-3);
+
+        let whole = diagnosed(&readings);
+        let groups = whole.verdict.causes();
+        let said = &whole.verdict.statement;
+        assert!(
+            groups.len() == 1 && groups[0].contains(&effect),
+            "{effect}: {said}"
+        );
+        assert!(whole.noise.uneven.is_none() && whole.noise.between_traces.is_none());
+    });
+}

@@ -83,3 +83,49 @@ impl Context<'_> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use errsep_models::model::{AnyModel, FittedModel};
+    use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
+    use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use crate::diagnosis::attribution::context::{Context, span};
+    use crate::diagnosis::detection::estimate::estimate;
+
+    /// *Simulated truth*: a drift with a short time constant, taken for a straight one, of which that leaves 90 in χ²: it
+    /// stands out beside itself, and is found in another shape beside which nothing does.
+    #[test]
+    fn a_drift_that_bends_is_not_left_as_a_straight_one() {
+        let noise = SceneNoise {
+            white: 0.1,
+            ..SceneNoise::default()
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let scene = Scene::random(40, 3, 1e-5, 2.0, noise, &mut random);
+        let fitted = Linearised::new(&scene.measured(4), Assumptions::default()).unwrap();
+        let model = AnyModel::new(&fitted);
+        let catalogue = model.effects();
+        let quiet = model.linearised();
+        let context = Context::new(&model, &catalogue, estimate(&model, &quiet), 200, 1);
+        let name = |e: &dyn errsep_models::model::Effect<AnyModel>| e.name() == "thermal-drift";
+        let drift = catalogue.iter().position(|e| name(e.as_ref())).unwrap();
+        let grid = catalogue[drift].grid(&model);
+        let [straight, bent] =
+            [grid.len() - 1, 1].map(|k| context.cause(&model, drift, grid[k].clone()));
+        let basis = span(std::slice::from_ref(&straight), quiet.len());
+        let left = &bent.projected - &basis * basis.tr_mul(&bent.projected);
+        let size = (90.0 / left.column(0).norm_squared()).sqrt();
+        let readings = quiet + size * bent.columns[0].dense(left.nrows());
+        let causes = vec![straight];
+        let left = Arc::new(context.judged(&readings, &causes));
+        assert!(!context.adequate(&causes, &left));
+        let (causes, left) = context.in_other_shapes(&readings, causes, left);
+        assert!(context.adequate(&causes, &left), "{:?}", causes[0].shape);
+        assert_ne!(causes[0].shape.values, grid[grid.len() - 1].values);
+    }
+}

@@ -1,7 +1,5 @@
 //! The workbench of one pass: state of the model, noise, space, dictionary and their null law.
 
-use std::collections::BTreeMap;
-use std::ops::Range;
 use std::sync::Arc;
 
 use errsep_models::model::{AnyModel, Column, Effect, FittedModel, Shape};
@@ -12,6 +10,7 @@ use crate::diagnosis::detection::dictionary::{Dictionary, Entry, Places};
 use crate::diagnosis::detection::null::NullLaw;
 use crate::diagnosis::detection::space::{Space, orthonormal};
 use crate::diagnosis::levels::SLACK;
+use crate::diagnosis::noise::contrasts::repeated;
 use crate::diagnosis::noise::law::NoiseLaw;
 
 /// What keeps this part of its length is seen whole.
@@ -109,25 +108,23 @@ impl<'a> Context<'a> {
     /// Whether what differs between repeats is seen whole: no unknown of the model takes up part of a shift of one trace
     /// against the next one that repeats it.
     pub fn repeats_show_whole(&self) -> bool {
-        let (places, traces) = (self.model.places(), self.model.traces());
-        let mut last: BTreeMap<Vec<usize>, &Range<usize>> = BTreeMap::new();
-        let mut shifts: Vec<Column> = Vec::new();
-        for trace in traces.iter().filter(|trace| !trace.is_empty()) {
-            let mut key: Vec<usize> = places[trace.clone()].iter().map(|p| p.cell).collect();
-            key.push(usize::from(places[trace.start].direction < 0.0));
-            if let Some(before) = last.insert(key, trace) {
-                let signs = before
-                    .clone()
-                    .map(|_| -1.0)
-                    .chain(trace.clone().map(|_| 1.0));
-                shifts.push(Column {
-                    rows: before.clone().chain(trace.clone()).collect(),
-                    values: signs.collect(),
-                });
+        let traces = self.model.traces();
+        let alike = repeated(self.model.places(), traces);
+        let pairs = alike.iter().flat_map(|alike| alike.windows(2));
+        let shifts = pairs.map(|pair| {
+            let [before, after] = [0, 1].map(|k| traces[pair[k]].clone());
+            let signs = before
+                .clone()
+                .map(|_| -1.0)
+                .chain(after.clone().map(|_| 1.0));
+            Column {
+                values: signs.collect(),
+                rows: before.chain(after).collect(),
             }
-        }
-        shifts.iter().all(|shift| {
-            let (seen, sizes) = self.space.forward_columns(std::slice::from_ref(shift));
+        });
+        let mut shifts = shifts.filter(|shift| !shift.rows.is_empty());
+        shifts.all(|shift| {
+            let (seen, sizes) = self.space.forward_columns(&[shift]);
             seen.norm() > WHOLE * sizes[0]
         })
     }

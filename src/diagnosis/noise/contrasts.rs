@@ -47,16 +47,9 @@ pub(in crate::diagnosis) struct Likelihood {
 
 impl Contrasts {
     pub fn new(places: &[Place], traces: &[Range<usize>], readings: &DVector<f64>) -> Self {
-        let mut alike: BTreeMap<Vec<usize>, Vec<&Range<usize>>> = BTreeMap::new();
-        for trace in traces {
-            let mut key: Vec<usize> = places[trace.clone()].iter().map(|p| p.cell).collect();
-            key.push(usize::from(
-                places.get(trace.start).is_some_and(|p| p.direction < 0.0),
-            ));
-            alike.entry(key).or_default().push(trace);
-        }
         let mut contrasts = Self { groups: Vec::new() };
-        for traces in alike.values() {
+        for alike in repeated(places, traces) {
+            let traces: Vec<&Range<usize>> = alike.iter().map(|k| &traces[*k]).collect();
             let times: Vec<f64> = traces
                 .iter()
                 .map(|t| places[(*t).clone()].iter().map(|p| p.time).sum::<f64>() / t.len() as f64)
@@ -65,7 +58,7 @@ impl Contrasts {
             let begin = places.get(traces[0].start);
             for (which, weights) in steady_free(&times).into_iter().enumerate() {
                 let mut values = DVector::zeros(positions.len());
-                for (weight, trace) in weights.iter().zip(traces) {
+                for (weight, trace) in weights.iter().zip(&traces) {
                     values += *weight * readings.rows(trace.start, trace.len());
                 }
                 let row = Row {
@@ -199,6 +192,18 @@ impl Contrasts {
             quadratic,
         }
     }
+}
+
+/// Which traces repeat each other: read of the same cells in the same direction.
+pub(in crate::diagnosis) fn repeated(places: &[Place], traces: &[Range<usize>]) -> Vec<Vec<usize>> {
+    let mut alike: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
+    for (k, trace) in traces.iter().enumerate() {
+        let mut key: Vec<usize> = places[trace.clone()].iter().map(|p| p.cell).collect();
+        let begin = places.get(trace.start);
+        key.push(usize::from(begin.is_some_and(|p| p.direction < 0.0)));
+        alike.entry(key).or_default().push(k);
+    }
+    alike.into_values().collect()
 }
 
 /// The filter at one reading: the same for all contrasts on the same positions.

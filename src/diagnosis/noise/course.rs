@@ -11,15 +11,20 @@ use std::ops::Range;
 use errsep_models::model::Place;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
+use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+
+use crate::diagnosis::noise::contrasts::repeated;
 
 /// Part of a trace that is its beginning, and its end.
 const PART: usize = 4;
 /// Rotations of the repeats: first so many, and all where the first tell that it may be rare.
-const DRAWS: [usize; 2] = [200, 20_000];
+const DRAWS: [usize; 2] = [200, 10_000];
 /// See [`DRAWS`].
 const RARE: f64 = 0.05;
+/// Repeats of which there are exchanges enough (40 320), and rotations take long.
+const MANY: usize = 8;
 /// Contrasts without which rotations are too few to tell what is rare.
 const FEWEST: usize = 2;
 
@@ -64,20 +69,25 @@ pub(in crate::diagnosis) fn course(
         begins += right.dot(&other.begin).powi(2);
         told |= left.nrows() >= FEWEST && right.nrows() >= FEWEST;
     }
-    let seen = sum(&between, |k| {
-        (repeats[k].end.clone(), repeats[k].begin.clone())
-    });
+    let own: Vec<Ends> = repeats
+        .iter()
+        .map(|r| (r.end.clone(), r.begin.clone()))
+        .collect();
+    let seen = sum(&between, &own);
     (told && ends * begins > 0.0).then(|| Course {
         correlation: seen / (ends * begins).sqrt(),
         p_value: chance(&between, &repeats, seen),
     })
 }
 
-/// Sum of the products of ends and beginnings, those of a group from `turned`.
-fn sum(between: &Between, turned: impl Fn(usize) -> (DVector<f64>, DVector<f64>)) -> f64 {
+/// Contrasts of the ends of a group's repeats, and of their beginnings.
+type Ends = (DVector<f64>, DVector<f64>);
+
+/// Sum of the products of ends and beginnings, of each group its own.
+fn sum(between: &Between, ends: &[Ends]) -> f64 {
     let products = between.iter().map(|((from, to), between)| {
-        let (end, begin) = (turned(*from).0, turned(*to).1);
-        between.tr_mul(&end).dot(&begin)
+        let (end, begin) = (&ends[*from].0, &ends[*to].1);
+        between.tr_mul(end).dot(begin)
     });
     products.sum()
 }
@@ -90,13 +100,8 @@ fn chance(between: &Between, repeats: &[Repeats], seen: f64) -> f64 {
     let mut p_value = 1.0;
     for draws in DRAWS {
         for _ in drawn..draws {
-            let of = |r: &Repeats| rotation(r.contrasts.nrows(), &mut random);
-            let rotations: Vec<DMatrix<f64>> = repeats.iter().map(of).collect();
-            let turned = |k: usize| {
-                let rotation = &rotations[k];
-                (rotation * &repeats[k].end, rotation * &repeats[k].begin)
-            };
-            as_much += usize::from(sum(between, turned) >= seen);
+            let turned: Vec<Ends> = repeats.iter().map(|r| r.turned(&mut random)).collect();
+            as_much += usize::from(sum(between, &turned) >= seen);
         }
         drawn = draws;
         p_value = (as_much as f64 + 1.0) / (drawn as f64 + 1.0);
@@ -113,18 +118,10 @@ fn repeats(
     traces: &[Range<usize>],
     readings: &DVector<f64>,
 ) -> (Vec<Repeats>, Vec<Option<(usize, usize)>>) {
-    let mut alike: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
-    for (k, trace) in traces.iter().enumerate().filter(|(_, t)| !t.is_empty()) {
-        let mut key: Vec<usize> = places[trace.clone()].iter().map(|p| p.cell).collect();
-        key.push(usize::from(places[trace.start].direction < 0.0));
-        alike.entry(key).or_default().push(k);
-    }
     let mut of_trace = vec![None; traces.len()];
     let mut repeats = Vec::new();
-    for members in alike.values() {
-        if members.len() < 2 {
-            continue;
-        }
+    let alike = repeated(places, traces).into_iter();
+    for members in alike.filter(|m| m.len() > 1 && !traces[m[0]].is_empty()) {
         let contrasts = against_their_mean(members.len());
         let (begin, end): (Vec<f64>, Vec<f64>) = (members.iter())
             .map(|k| begin_and_end(places, traces[*k].clone(), readings))
@@ -195,12 +192,26 @@ fn links(
     links
 }
 
-/// A rotation or reflection, each as probable (Haar's measure): Gram and Schmidt's basis of normal numbers.
-fn rotation(size: usize, random: &mut ChaCha8Rng) -> DMatrix<f64> {
-    let normal = DMatrix::from_fn(size, size, |_, _| StandardNormal.sample(random));
-    let decomposed = normal.qr();
-    let signs = decomposed.r().diagonal().map(f64::signum);
-    decomposed.q() * DMatrix::from_diagonal(&signs)
+impl Repeats {
+    /// Ends and beginnings after a rotation or reflection, each as probable (Haar's measure: Gram and Schmidt's basis of
+    /// normal numbers); of many repeats after an exchange of them, which is one too.
+    fn turned(&self, random: &mut ChaCha8Rng) -> Ends {
+        let (size, repeats) = self.contrasts.shape();
+        if repeats >= MANY {
+            let mut order: Vec<usize> = (0..repeats).collect();
+            order.shuffle(random);
+            let exchanged = |own: &DVector<f64>| {
+                let each = self.contrasts.tr_mul(own);
+                &self.contrasts * each.select_rows(&order)
+            };
+            return (exchanged(&self.end), exchanged(&self.begin));
+        }
+        let normal = DMatrix::from_fn(size, size, |_, _| StandardNormal.sample(random));
+        let decomposed = normal.qr();
+        let signs = decomposed.r().diagonal().map(f64::signum);
+        let rotation = decomposed.q() * DMatrix::from_diagonal(&signs);
+        (&rotation * &self.end, &rotation * &self.begin)
+    }
 }
 
 fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
@@ -222,15 +233,15 @@ mod tests {
     use super::course;
 
     const POSITIONS: usize = 40;
-    const REPEATS: usize = 4;
 
-    /// Two channels read together, four repeats, both directions, one reading a second; `reading` of channel, pass and
+    /// Two channels read together, so many repeats, both directions, one reading a second; `reading` of channel, pass and
     /// time.
     fn measured(
+        repeats: usize,
         reading: &mut dyn FnMut(usize, usize, f64) -> f64,
     ) -> (Vec<Place>, Vec<Range<usize>>, DVector<f64>) {
         let (mut places, mut values, mut traces) = (Vec::new(), Vec::new(), Vec::new());
-        for pass in 0..2 * REPEATS {
+        for pass in 0..2 * repeats {
             for channel in 0..2 {
                 let from = places.len();
                 for k in 0..POSITIONS {
@@ -253,47 +264,52 @@ mod tests {
         (places, traces, DVector::from_vec(values))
     }
 
-    fn p_value(reading: &mut dyn FnMut(usize, usize, f64) -> f64) -> f64 {
-        let (places, traces, values) = measured(reading);
+    fn p_value(repeats: usize, reading: &mut dyn FnMut(usize, usize, f64) -> f64) -> f64 {
+        let (places, traces, values) = measured(repeats, reading);
         course(&places, &traces, &values).unwrap().p_value
     }
 
     /// *Coverage*: traces that shift by themselves, each by five times what its readings scatter, are told as often as
-    /// is said: 5 % of 400 within 3.5 standard deviations (15 of 20).
+    /// is said, by rotations of four repeats and by exchanges of ten: 5 % of 400 within 3.5 standard deviations (15 of 20).
     #[test]
     fn what_begins_anew_in_every_trace_is_noise() {
-        let mut random = ChaCha8Rng::seed_from_u64(5);
-        let mut told = 0;
-        for _ in 0..400 {
-            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-            let shifts: Vec<f64> = (0..4 * REPEATS).map(|_| 5.0 * normal()).collect();
-            let mut one =
-                |channel: usize, pass: usize, _: f64| shifts[2 * pass + channel] + normal();
-            told += usize::from(p_value(&mut one) < 0.05);
+        for repeats in [4, 10] {
+            let mut random = ChaCha8Rng::seed_from_u64(5);
+            let mut told = 0;
+            for _ in 0..400 {
+                let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+                let shifts: Vec<f64> = (0..4 * repeats).map(|_| 5.0 * normal()).collect();
+                let mut one =
+                    |channel: usize, pass: usize, _: f64| shifts[2 * pass + channel] + normal();
+                told += usize::from(p_value(repeats, &mut one) < 0.05);
+            }
+            assert!((5..=35).contains(&told), "{repeats}: {told}");
         }
-        assert!((5..=35).contains(&told), "{told}");
     }
 
     /// *Simulated truth*: a wave of two and a half traces, three times as high as the readings scatter, goes on from
     /// trace to trace; one whose phase is another in each trace does not.
     #[test]
     fn a_slow_wave_goes_on() {
-        let mut random = ChaCha8Rng::seed_from_u64(6);
         let period = 2.5 * POSITIONS as f64;
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let phases: Vec<f64> = (0..2 * REPEATS).map(|_| normal()).collect();
-        let mut wave = |_: usize, _: usize, time: f64| 3.0 * (TAU * time / period).sin() + normal();
-        assert!(p_value(&mut wave) < 1e-3);
-        let mut anew = |_: usize, pass: usize, time: f64| {
-            3.0 * (TAU * (time / period + phases[pass])).sin() + normal()
-        };
-        assert!(p_value(&mut anew) > 0.01);
+        for repeats in [4, 10] {
+            let mut random = ChaCha8Rng::seed_from_u64(6);
+            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+            let phases: Vec<f64> = (0..2 * repeats).map(|_| normal()).collect();
+            let mut wave =
+                |_: usize, _: usize, time: f64| 3.0 * (TAU * time / period).sin() + normal();
+            assert!(p_value(repeats, &mut wave) < 1e-3, "{repeats}");
+            let mut anew = |_: usize, pass: usize, time: f64| {
+                3.0 * (TAU * (time / period + phases[pass])).sin() + normal()
+            };
+            assert!(p_value(repeats, &mut anew) > 0.01, "{repeats}");
+        }
     }
 
     /// *Limit*: two repeats have one contrast, whose sign alone may turn.
     #[test]
     fn two_repeats_tell_nothing() {
-        let (places, traces, values) = measured(&mut |_, pass, time| time + pass as f64);
+        let (places, traces, values) = measured(4, &mut |_, pass, time| time + pass as f64);
         let few: Vec<Range<usize>> = traces[..8].to_vec();
         assert_eq!(course(&places, &few, &values), None);
     }

@@ -9,8 +9,8 @@ set -e
 cd "$(dirname "$0")/.."
 file=benches/instructions.txt
 command -v valgrind > /dev/null || { echo "skipped: valgrind is not installed"; exit 0; }
-cargo build -q --release -p errsep-models --example kernels
-program=target/release/examples/kernels
+cargo build -q --release -p errsep-campaigns --bin kernels
+program=target/release/kernels
 counts=$(mktemp)
 trap 'rm -f "$counts" "$counts.out"' EXIT
 made_with="$(rustc --version), $(ldd --version | head -1 | sed 's/^ldd *//'), $(

@@ -18,7 +18,7 @@ for part in "$@"; do
     fit)
         benches/peers/reversal.sh 2000 20000 200000 2000000
         echo
-        cargo run -q --release -p errsep-models --example kernel_limits
+        cargo run -q --release -p errsep-campaigns --bin kernel_limits
         ;;
     reading)
         benches/peers/reading.sh 200001 2500000

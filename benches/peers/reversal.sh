@@ -28,7 +28,7 @@ if [ -e /usr/include/ceres/ceres.h ]; then
     c++ -O3 -march=native -std=c++17 -I/usr/include/eigen3 benches/peers/reversal.cc \
         -o "$place/reversal_ceres" -lceres -lglog
 fi
-cargo build -q --release -p errsep-models --example peer_reversal
+cargo build -q --release -p errsep-campaigns --bin peer_reversal
 
 echo "processors: $(nproc), load when begun:$(cut -d' ' -f1-3 /proc/loadavg | sed 's/^/ /')"
 [ ! -x "$place/reversal_ceres" ] ||
@@ -54,7 +54,7 @@ row() { # readings, words; line: name seconds processor memory cost passes tilts
         }' "$data.ours.equal" -
 }
 for n in "$@"; do
-    target/release/examples/peer_reversal "$n" "$data" > "$data.ours"
+    target/release/peer_reversal "$n" "$data" > "$data.ours"
     grep '^equal' "$data.ours" > "$data.ours.equal"
     row "$n" "ours, equal noise" < "$data.ours.equal"
     grep '^by-channel' "$data.ours" | row "$n" "ours, noise estimated by channel"

@@ -1,7 +1,7 @@
 //! Every threshold that decides what a diagnosis says, in one table.
 //!
 //! Kinds: a *quantile* follows from a probability; a *tuned* one was chosen on cases that were looked
-//! at, development seeds of `examples/blind_campaign.rs` and `examples/independent_maker`
+//! at, development seeds of `campaigns/blind` and `campaigns/independent_maker`
 //! (`docs/validation/diagnosis.md` and `independent.md` say which figures are of seeds that no version had
 //! seen, and of which version); a *limit* keeps work finite and costs power where it binds; a *reckoned*
 //! one follows from a model's own arithmetic.

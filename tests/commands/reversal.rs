@@ -369,7 +369,7 @@ fn help_has_an_example() {
     }
 }
 
-/// A million rows; ten million by `cargo run --release --example many_rows`.
+/// A million rows; ten million by `cargo run --release -p errsep-campaigns --bin many_rows`.
 #[test]
 fn a_million_rows() {
     use std::io::Write;

@@ -1,4 +1,4 @@
-//! A gap told as a law, on a few machines; many are in the example `law_campaign`.
+//! A gap told as a law, on a few machines; many are in `campaigns/law`.
 
 use errsep::diagnosis::{Law, LawFound, Options, Tabulated, TabulatedEffects, diagnose_with, law};
 use errsep_models::calibration_line::CalibrationLine;

@@ -1,5 +1,5 @@
-//! What is sealed before a measurement, against that measurement, on a few machines; many are in the example
-//! `seal_campaign`.
+//! What is sealed before a measurement, against that measurement, on a few machines; many are in
+//! `campaigns/seal.rs`.
 
 use errsep::diagnosis::{Options, Standing, checked, sealed};
 use errsep_models::model::FittedModel;

@@ -1,5 +1,5 @@
 //! What of a change shows beside the noise as it is, also where it is correlated: a generalised
-//! least-squares fit of this example's own.
+//! least-squares fit of its own.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,6 +1,6 @@
 //! How near the kernels of the structured fit come to what the machine can do.
 //!
-//! `cargo run --release -p errsep-models --example kernel_limits`
+//! `cargo run --release -p errsep-campaigns --bin kernel_limits`
 //!
 //! First the machine, on one thread: fused multiply-adds on registers alone (two operations each), and
 //! the speed at which 256 MB are read. Then each kernel: its floating-point operations as counted in

@@ -2,8 +2,8 @@
 //! answers by their digest; the solver sees readings only and its report is sealed too; then the
 //! judge opens both and counts.
 //!
-//! cargo run --release --example blind_campaign -- --set single --cases 40 --seed 1 --out outcomes.jsonl
-//! cargo run --release --example blind_campaign -- --judge outcomes.jsonl --page docs/validation/diagnosis.md
+//! cargo run --release -p errsep-campaigns --bin blind -- --set single --cases 40 --seed 1 --out outcomes.jsonl
+//! cargo run --release -p errsep-campaigns --bin blind -- --judge outcomes.jsonl --page docs/validation/diagnosis.md
 //!
 //! Sets: single, withheld (the effect is taken out of the catalogue), pairs, small (sizes about the
 //! smallest that can be seen), null.

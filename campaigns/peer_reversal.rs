@@ -1,7 +1,7 @@
 //! The structured fit of a simulated reversal, timed, and the readings for other solvers: what
 //! `benches/peers/reversal.sh` puts beside them.
 //!
-//! `cargo run --release -p errsep-models --example peer_reversal -- <readings a channel> <file> [cells]`
+//! `cargo run --release -p errsep-campaigns --bin peer_reversal -- <readings a channel> <file> [cells]`
 //!
 //! The file (little-endian doubles): number of readings a channel, cells, first and last break (mm),
 //! thickness (mm), then the start: three tilts (rad) and four offsets (µm); then for each channel 1A,

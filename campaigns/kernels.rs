@@ -1,7 +1,7 @@
 //! One kernel of the structured fit, run a number of times: what `benches/instructions.sh` counts
 //! the instructions of.
 //!
-//! `cargo run --release -p errsep-models --example kernels -- <kernel> <times> [readings a channel]`
+//! `cargo run --release -p errsep-campaigns --bin kernels -- <kernel> <times> [readings a channel]`
 
 use std::hint::black_box;
 

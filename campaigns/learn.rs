@@ -1,5 +1,5 @@
-//! What nobody listed, learnt from one campaign and tested on another: `cargo run --release --example
-//! learn_campaign -- CASES SEED [MODEL]`. Smooth effects by formulas of its own, bound to position, direction,
+//! What nobody listed, learnt from one campaign and tested on another: `cargo run --release -p errsep-campaigns --bin
+//! learn -- CASES SEED [MODEL]`. Smooth effects by formulas of its own, bound to position, direction,
 //! reading and time, are put into campaigns of every model; what the catalogue names is withheld until the
 //! verdict is `unknown`. Told is how often the gap of the second campaign closes (held-out, after at most 1.2
 //! floors), how often what is not smooth is refused, and what learning makes of campaigns without any effect.

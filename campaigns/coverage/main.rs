@@ -1,6 +1,6 @@
 //! How often the printed intervals hold the truth, for every uncertainty that a command prints.
 //!
-//! `cargo run --release --example coverage [--seeds N] [ROOM ...]`
+//! `cargo run --release -p errsep-campaigns --bin coverage [--seeds N] [ROOM ...]`
 //!
 //! Without a room all are run. A room is one model; it draws data with known truth (each case says from
 //! what), solves them as the command does and counts how often the truth lies within the intervals of

@@ -1,7 +1,7 @@
 //! Each effect made several ways, from physics that the catalogue does not share, and diagnosed
 //! blind; or nothing, or the effect withheld.
 //!
-//! cargo run --release --example realisations -- --seeds 3 --first 1 [--only zero-jump] [--withheld | --null]
+//! cargo run --release -p errsep-campaigns --bin realisations -- --seeds 3 --first 1 [--only zero-jump] [--withheld | --null]
 //! One line a case: effect, way, seed, what was said, seconds.
 
 use std::time::Instant;

@@ -1,5 +1,5 @@
-//! Blind campaign for every model but the reversal: `cargo run --release --example
-//! other_models_campaign -- CASES SEED [MODEL] [nulls | sizes]`. Prints, as tables, for each effect, how often it was
+//! Blind campaign for every model but the reversal: `cargo run --release -p errsep-campaigns --bin
+//! other_models -- CASES SEED [MODEL] [nulls | sizes]`. Prints, as tables, for each effect, how often it was
 //! named, how often its size was within two standard uncertainties (where no other sensor or channel is left open),
 //! and what was said with the effect withheld; for each pair of effects whether both were named; and the
 //! alarms with nothing there. `nulls`: the alarms only. `sizes`: how often an effect is seen in just the size that the

@@ -1,7 +1,7 @@
 //! Errors of the simultaneous solution over many seeds against the Cramér–Rao bound, and how often
 //! the stated 95 % intervals hold the truth.
 //!
-//! `cargo run --release -p errsep-models --example reversal_coverage [SEEDS]`
+//! `cargo run --release -p errsep-campaigns --bin reversal_coverage [SEEDS]`
 //!
 //! The bound is the covariance at the truth with the true noise: that of a fit to noise-free
 //! readings with the noise declared.

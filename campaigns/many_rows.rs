@@ -1,5 +1,5 @@
 //! Writes, reads and solves a table of many rows, and says what time and memory that took:
-//! `cargo run --release --example many_rows [ROWS]` (ten million without a number).
+//! `cargo run --release -p errsep-campaigns --bin many_rows [ROWS]` (ten million without a number).
 
 use std::error::Error;
 use std::io::{BufWriter, Write};

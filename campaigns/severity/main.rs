@@ -1,4 +1,4 @@
-//! What a named effect is worth: `cargo run --release --example severity_campaign -- CASES SEED [MODEL…]
+//! What a named effect is worth: `cargo run --release -p errsep-campaigns --bin severity -- CASES SEED [MODEL…]
 //! [other-formulas] [agreement]`, of every model or those named, with this project's own shapes or, of three models, with
 //! those of other formulas. For each effect at four times the size that is seen with 80 %: how often it is named, and
 //! strong, and whether these data could tell it there from every other effect that they show; with it withheld at 1.5 to

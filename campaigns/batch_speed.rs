@@ -1,5 +1,5 @@
 //! How many campaigns a second a batch works out, and how long it takes to find that all are done:
-//! `cargo run --release --example batch_speed [CAMPAIGNS [DONE]]`.
+//! `cargo run --release -p errsep-campaigns --bin batch_speed [CAMPAIGNS [DONE]]`.
 //!
 //! The campaigns (1000 without a number) are simulated reversals of 4 × 500 readings, solved with
 //! `--simultaneous` by one job; the `DONE` ones (100 000) profiles with a file each, worked out first and

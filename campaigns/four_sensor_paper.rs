@@ -2,7 +2,7 @@
 //! two positioning errors, by the published way and by the direct fit with each penalty and rule.
 //!
 //! Prints the table of docs/theory/four-sensor.md:
-//! `cargo run --release -p errsep-models --example four_sensor_paper`.
+//! `cargo run --release -p errsep-campaigns --bin four_sensor_paper`.
 
 use std::error::Error;
 

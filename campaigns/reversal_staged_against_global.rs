@@ -1,6 +1,6 @@
 //! The staged solution against the simultaneous one, on data of known truth.
 //!
-//! `cargo run --release -p errsep-models --example reversal_staged_against_global [SEEDS]`
+//! `cargo run --release -p errsep-campaigns --bin reversal_staged_against_global [SEEDS]`
 //!
 //! Each line changes one thing of a base case (4 × 151 readings over 300 mm, forms of 1 µm with waves
 //! down to 37 mm, tilts of 100 µrad, 40 mm thick, 20 nm noise). Errors are root mean squares over

@@ -9,7 +9,7 @@ pub const FROZEN: u64 = 1000;
 
 /// How to call it.
 pub const USAGE: &str = "\
-cargo run --release --example independent_maker -- [SET] [--cases N] [--seed S] [--from K]
+cargo run --release -p errsep-campaigns --bin independent_maker -- [SET] [--cases N] [--seed S] [--from K]
     [--design NAME] [--only EFFECT[/REALISATION]] [--dump DIR] [--certificate] [--severity N] [--frozen]
 SET: one effect a case (default), or --pairs, --withheld, --nulls
 --cases N     seeds a realisation; with --pairs, --withheld cases; with --nulls cases a law (4)

@@ -1,4 +1,4 @@
-//! Laws put into simulated campaigns and sought again: `cargo run --release --example law_campaign -- CASES SEED
+//! Laws put into simulated campaigns and sought again: `cargo run --release -p errsep-campaigns --bin law -- CASES SEED
 //! [laws|nulls|smooth]`. Twenty laws by formulas of this file, which shares no code with the grammar, with parameters
 //! of chance are laid over readings of a reversal, a calibration line and a circle, the whole catalogue withheld. Told
 //! is how often the law is found exactly: the same class of expression, and a visible change equal to 1 % of its root

@@ -1,4 +1,4 @@
-//! Time and peak memory of all fits of a long run of a turning bar: `cargo run --release -p errsep-models --example
+//! Time and peak memory of all fits of a long run of a turning bar: `cargo run --release -p errsep-campaigns --bin
 //! turning_bar_memory -- READINGS TURNS [FORM_CELLS TURN_CELLS]`; without cells they are chosen.
 
 use std::time::Instant;

@@ -1,5 +1,5 @@
-//! Plates with zero, turn, scales, squareness and a bend at once: `cargo run --release --example
-//! plate_campaign -- CASES SEED`. Prints how many are named exactly, how the sizes stand, what is said with
+//! Plates with zero, turn, scales, squareness and a bend at once: `cargo run --release -p errsep-campaigns --bin
+//! plate -- CASES SEED`. Prints how many are named exactly, how the sizes stand, what is said with
 //! the bend withheld, and the alarms where nothing but the pose is there.
 
 #[path = "../tests/plate/mod.rs"]

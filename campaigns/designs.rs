@@ -1,6 +1,6 @@
 //! Blind effects on eight channels: near, far, top and bottom at 0° and 180°.
 //!
-//! cargo run --release --example designs_campaign -- [--cases N] [--nulls N] [--seed N] [--only EFFECT,...]
+//! cargo run --release -p errsep-campaigns --bin designs -- [--cases N] [--nulls N] [--seed N] [--only EFFECT,...]
 //! `                                               ` [--minutes N]
 //!
 //! A maker draws slopes, forms and an effect in its exact form (the simulator's own code, not the catalogue's

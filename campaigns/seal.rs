@@ -1,5 +1,5 @@
-//! What is sealed before a measurement, against that measurement: `cargo run --release --example
-//! seal_campaign -- CASES SEED [EFFECT]`. Reversals by formulas of its own: one machine is measured, what a further
+//! What is sealed before a measurement, against that measurement: `cargo run --release -p errsep-campaigns --bin
+//! seal -- CASES SEED [EFFECT]`. Reversals by formulas of its own: one machine is measured, what a further
 //! measurement will show is sealed, the same machine is set up anew and measured again, and the seal is scored.
 //! Told is how often truth and findings lie in the sealed intervals, and how much of the readings in the
 //! pointwise band.

@@ -1,4 +1,4 @@
-//! What is asked of the product, and what it says: all of the product that this example touches.
+//! What is asked of the product, and what it says: all of the product that the campaign touches.
 
 use std::collections::HashMap;
 use std::time::Instant;

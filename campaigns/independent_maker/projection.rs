@@ -1,4 +1,4 @@
-//! What a fit with free forms cannot take up: a plain dense least-squares fit of this example's own.
+//! What a fit with free forms cannot take up: a plain dense least-squares fit of its own.
 //!
 //! Unknowns: M, S_A and S_B at every position, α, β, γ and an offset a channel; S_A and S_B have no
 //! straight line, that of M belongs to α. Readings of one channel at one position, whatever repeat and

@@ -252,14 +252,8 @@ fn fitted(context: &Context<'_>, readings: &DVector<f64>) -> Vec<Cause> {
         };
         let start = context.start(&remainder, effect).cloned().or_else(first);
         let start = start.unwrap_or_else(Shape::only);
-        let found = context.refine(
-            context.model,
-            readings,
-            effect,
-            (&start, Reach::WIDE),
-            &causes,
-        );
-        let (cause, _) = context.come_back(context.model, readings, found, &causes);
+        let beside = context.beside(context.model, readings, &causes);
+        let (cause, _) = beside.come_back(beside.refine(effect, (&start, Reach::WIDE)));
         causes.push(cause);
     }
     for _ in 0..if causes.len() > 1 { POLISHED } else { 0 } {
@@ -267,9 +261,8 @@ fn fitted(context: &Context<'_>, readings: &DVector<f64>) -> Vec<Cause> {
             let mut others = causes.clone();
             let own = others.remove(k);
             let start = (&own.shape, Reach::NEAR);
-            causes[k] = context
-                .refine(context.model, readings, own.effect, start, &others)
-                .0;
+            let beside = context.beside(context.model, readings, &others);
+            causes[k] = beside.refine(own.effect, start).0;
         }
     }
     context.relinearised(readings, &causes, f64::INFINITY)

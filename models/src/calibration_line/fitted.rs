@@ -243,7 +243,8 @@ impl FittedModel for CalibrationLine {
         self.noise
     }
 
-    /// A sensitivity that drifts, and a line of its own in every set.
+    /// A sensitivity that drifts, a line of its own in every set, and, where all loads are greater than zero, their
+    /// logarithm: what differs at small loads from decade to decade, such as powers of the load.
     fn covariates(&self) -> Vec<Covariate> {
         let places = self.record.places.iter();
         let loads: Vec<f64> = places.clone().map(|p| p.x).collect();
@@ -263,7 +264,14 @@ impl FittedModel for CalibrationLine {
             ..sensitivity.clone()
         };
         let by_set = (self.record.traces.len() > 1).then_some(by_set);
-        std::iter::once(sensitivity).chain(by_set).collect()
+        let logarithms = || self.record.places.iter().map(|p| p.x.ln()).collect();
+        let decades = self
+            .positive()
+            .then(|| Covariate::smooth("the logarithm of the load", logarithms()));
+        std::iter::once(sensitivity)
+            .chain(by_set)
+            .chain(decades)
+            .collect()
     }
 
     fn refit(&self, observed: DVector<f64>) -> Self {

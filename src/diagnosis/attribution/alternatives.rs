@@ -150,20 +150,12 @@ impl<'s> Replacement<'s> {
     fn relatives(&self) -> Vec<Cause> {
         let (context, cause) = (self.context, &self.best[self.k]);
         let relatives = context.catalogue[cause.effect].relatives(context.model, &cause.shape);
+        let beside = context.beside(context.model, self.readings, &self.others);
         let other = |shape: Shape| {
             let here = context.cause(context.model, cause.effect, shape.clone());
             let near = here.columns.len() <= cause.columns.len()
                 && self.strength(&here) > NEAR * self.own - HOPELESS;
-            near.then(|| {
-                let start = (&shape, Reach::WIDE);
-                context.refine_alone(
-                    context.model,
-                    self.readings,
-                    cause.effect,
-                    start,
-                    &self.others,
-                )
-            })
+            near.then(|| beside.refine_alone(cause.effect, (&shape, Reach::WIDE)).0)
         };
         let mut all = vec![cause.clone()];
         all.par_extend(relatives.into_par_iter().filter_map(other));
@@ -172,20 +164,17 @@ impl<'s> Replacement<'s> {
 
     /// Another effect in its place, where it stands out beside the others.
     fn another(&self, effect: usize) -> Option<Cause> {
-        let (context, readings) = (self.context, self.readings);
+        let context = self.context;
         if context.p_value(&self.beside, effect) > EARNED {
             return None;
         }
         let start = (context.start(&self.beside, effect)?, Reach::WIDE);
-        let found = context.refine(context.model, readings, effect, start, &self.others);
+        let beside = context.beside(context.model, self.readings, &self.others);
+        let found = beside.refine(effect, start);
         if self.strength(&found.0) < IN_REACH * self.own {
             return Some(found.0);
         }
-        Some(
-            context
-                .come_back(context.model, readings, found, &self.others)
-                .0,
-        )
+        Some(beside.come_back(found).0)
     }
 
     /// The causes with another in the place, fitted with the state, and their misfit; nothing where it explains too

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use crate::diagnosis::attribution::confidence::{Answer, confidence_set};
 use crate::diagnosis::attribution::context::{Cause, Context};
 use crate::diagnosis::attribution::fewer::in_fewest;
+use crate::diagnosis::attribution::refine::Beside;
 use crate::diagnosis::attribution::remainder::Remainder;
 use crate::diagnosis::attribution::standing::{possible, without};
 use crate::diagnosis::levels::{
@@ -29,7 +30,8 @@ pub(in crate::diagnosis) fn attribute(
     let strongest_alone = strongest(context, readings, first, (&[], begun));
     if let [only] = begun {
         let start = (&only.shape, Reach::NEAR);
-        let (cause, t) = context.refine(context.model, readings, only.effect, start, &[]);
+        let beside = context.beside(context.model, readings, &[]);
+        let (cause, t) = beside.refine(only.effect, start);
         let better = |(other, other_t): &(Cause, f64)| other.effect == only.effect && *other_t > t;
         if !strongest_alone.as_ref().is_some_and(better) {
             let answer = confidence_set(context, readings, &[cause]);
@@ -262,15 +264,16 @@ fn strongest(
     remainder: &Remainder,
     (causes, begun): (&[Cause], &[Cause]),
 ) -> Option<(Cause, f64)> {
-    let refined = standing_out(context, readings, remainder, (causes, begun));
-    greatest(context, readings, causes, refined, 0.0)
+    let beside = context.beside(context.model, readings, causes);
+    let refined = standing_out(context, &beside, remainder, (causes, begun));
+    greatest(context, readings, (&beside, causes), refined, 0.0)
 }
 
 /// The effects that stand out most beside the causes, refined, and those that were begun with: from the best entry of
 /// the family, and from where they stood. What follows the readings may find its way from there alone.
 fn standing_out(
     context: &Context<'_>,
-    readings: &DVector<f64>,
+    beside: &Beside<'_>,
     remainder: &Remainder,
     (causes, begun): (&[Cause], &[Cause]),
 ) -> Vec<(Cause, f64)> {
@@ -291,9 +294,7 @@ fn standing_out(
     sought
         .into_par_iter()
         .filter_map(|effect| {
-            let refine = |start: (&Shape, Reach)| {
-                context.refine(context.model, readings, effect, start, causes)
-            };
+            let refine = |start: (&Shape, Reach)| beside.refine(effect, start);
             let (found, again) = rayon::join(
                 || {
                     let start = context.start(remainder, effect)?;
@@ -312,7 +313,7 @@ fn standing_out(
 fn greatest(
     context: &Context<'_>,
     readings: &DVector<f64>,
-    causes: &[Cause],
+    (beside, causes): (&Beside<'_>, &[Cause]),
     refined: Vec<(Cause, f64)>,
     known: f64,
 ) -> Option<(Cause, f64)> {
@@ -323,7 +324,7 @@ fn greatest(
             if found.1 < IN_REACH * best {
                 return found;
             }
-            context.come_back(context.model, readings, found, causes)
+            beside.come_back(found)
         })
         .collect();
     settled
@@ -347,22 +348,20 @@ fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause], 
             let others = without(causes, k);
             let left = context.misfit(readings, &others);
             let again = (left - tried[k]).abs() > NO_BETTER;
-            let refine = |effect: usize, start: &Shape| {
-                let near = (start, Reach::NEAR);
-                context.refine(context.model, readings, effect, near, &others)
-            };
+            let beside = context.beside(context.model, readings, &others);
+            let refine = |effect: usize, start: &Shape| beside.refine(effect, (start, Reach::NEAR));
             let (refined, found) = rayon::join(
                 || refine(causes[k].effect, &causes[k].shape),
                 || {
                     again.then(|| {
                         let remainder = context.remainder(readings, &others);
-                        standing_out(context, readings, &remainder, (&others, begun))
+                        standing_out(context, &beside, &remainder, (&others, begun))
                     })
                 },
             );
             let swapped = found.map(|found| {
                 tried[k] = left;
-                let strongest = greatest(context, readings, &others, found, refined.1);
+                let strongest = greatest(context, readings, (&beside, &others), found, refined.1);
                 strongest.map(|(c, _)| refine(c.effect, &c.shape))
             });
             match swapped.flatten() {

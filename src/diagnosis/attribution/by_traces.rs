@@ -99,7 +99,7 @@ impl<'a, 's> ByTraces<'a, 's> {
             let change = value - held.column[row];
             held.column[row] = value;
             held.score += change * seen.adjoint[row];
-            for (along, direction) in held.along.iter_mut().zip(&seen.directions) {
+            for (along, direction) in held.along.iter_mut().zip(seen.directions) {
                 *along += change * direction[row];
             }
         }
@@ -120,7 +120,7 @@ impl Held {
             shape: shape.clone(),
             column: column.dense(seen.context.space.readings()),
             part: seen.context.space.part(column),
-            score: products(&columns, &seen.adjoint)[0],
+            score: products(&columns, seen.adjoint)[0],
             along: DVector::from_iterator(seen.directions.len(), along),
         })
     }
@@ -172,7 +172,8 @@ mod tests {
         let effect = place("stick-slip");
         let drift = place("thermal-drift");
         let beside = [context.cause(&model, drift, catalogue[drift].grid(&model)[3].clone())];
-        let seen = Seen::of(&context, &model, &readings, effect, &beside);
+        let beside = context.beside(&model, &readings, &beside);
+        let seen = beside.seen(effect);
         // What waves settle to is a sawtooth that begins anew in each pass.
         let waves = catalogue[effect].grid(&model);
         let waves = waves.iter().find(|shape| shape.variant > 0).unwrap();
@@ -203,7 +204,8 @@ mod tests {
             );
         }
         let straight = Shape::only();
-        let jump = Seen::of(&context, &model, &readings, place("gain-mismatch"), &[]);
+        let alone = context.beside(&model, &readings, &[]);
+        let jump = alone.seen(place("gain-mismatch"));
         assert!(ByTraces::new(&jump, &straight).is_none());
     }
 }

@@ -157,6 +157,7 @@ pub(in crate::diagnosis) fn variants_alike(
         starts.entry(shape.variant).or_insert(shape);
     }
     starts.remove(&cause.shape.variant);
+    let beside = context.beside(context.model, readings, &others);
     let alike = |start: Shape| {
         let near = Shape {
             values: cause.shape.values.clone(),
@@ -164,13 +165,7 @@ pub(in crate::diagnosis) fn variants_alike(
         };
         let fits = near.values.len() == near.steps.len() && effect.allowed(context.model, &near);
         let start = if fits { near } else { start };
-        let other = context.refine_alone(
-            context.model,
-            readings,
-            cause.effect,
-            (&start, Reach::WIDE),
-            &others,
-        );
+        let (other, _) = beside.refine_alone(cause.effect, (&start, Reach::WIDE));
         // One that holds this variant fits as well whatever the readings are.
         if other.unknowns() > cause.unknowns() {
             return None;

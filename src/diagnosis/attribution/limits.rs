@@ -87,10 +87,8 @@ mod tests {
         let context = Context::new(model, &catalogue, estimate(model, readings), 40, 1);
         let starts = catalogue[effect].grid(model);
         let starts = starts.iter().filter(|shape| lags(effect, shape)).step_by(3);
-        let found = starts.map(|start| {
-            let start = (start, Reach::WIDE);
-            context.refine(model, readings, effect, start, &[])
-        });
+        let alone = context.beside(model, readings, &[]);
+        let found = starts.map(|start| alone.refine(effect, (start, Reach::WIDE)));
         let (best, explained) = found.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         let whole = context.residual(readings).norm_squared();
         let beyond = is_beyond_limit(&context, readings, &[best], 0);

@@ -63,17 +63,17 @@ impl Context<'_> {
         let state = self.model.refit_as_smooth(clean);
         let state = self.seen_by(k, &state, causes, &changes);
         let mut starts: Vec<Shape> = self.catalogue[own.effect].relatives(&state, &own.shape);
-        let beside = self.remainder(readings, &others);
-        starts.extend(self.start(&beside, own.effect).cloned());
+        let left = self.remainder(readings, &others);
+        starts.extend(self.start(&left, own.effect).cloned());
         let misfit = |cause: &Cause| {
             let mut all = others.clone();
             all.insert(k, cause.clone());
             (self.misfit(readings, &all), all)
         };
-        let found = starts.par_iter().map(|start| {
-            let start = (start, Reach::WIDE);
-            misfit(&self.refine_alone(&state, readings, own.effect, start, &others))
-        });
+        let beside = self.beside(&state, readings, &others);
+        let found = starts
+            .par_iter()
+            .map(|start| misfit(&beside.refine_alone(own.effect, (start, Reach::WIDE)).0));
         let mut found: Vec<(f64, Vec<Cause>)> = found.collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found.truncate(FITTED);

@@ -14,58 +14,78 @@ use crate::diagnosis::search::{Reach, around, coordinate_search};
 /// How often values that come back are tried around their cycles.
 const ROUNDS: usize = 4;
 
-impl Context<'_> {
-    /// The best shape of an effect beside other causes, from a start, and the statistic there; its
-    /// relatives are tried too, and the one of greatest evidence is taken.
-    pub fn refine(
-        &self,
-        state: &AnyModel,
-        readings: &DVector<f64>,
-        effect: usize,
-        (start, reach): (&Shape, Reach),
-        beside: &[Cause],
-    ) -> (Cause, f64) {
-        let seen = Seen::of(self, state, readings, effect, beside);
+/// What readings hold beside other causes at a state of the model: the same for every effect that is sought there.
+pub(in crate::diagnosis) struct Beside<'s> {
+    context: &'s Context<'s>,
+    state: &'s AnyModel,
+    readings: &'s DVector<f64>,
+    causes: &'s [Cause],
+    /// What a column is multiplied with to get its score.
+    adjoint: DVector<f64>,
+    /// The same of the causes' directions.
+    directions: Vec<DVector<f64>>,
+}
+
+impl<'s> Context<'s> {
+    /// What readings hold beside causes.
+    pub fn beside(
+        &'s self,
+        state: &'s AnyModel,
+        readings: &'s DVector<f64>,
+        causes: &'s [Cause],
+    ) -> Beside<'s> {
+        let whole = self.residual(readings);
+        let basis = span(causes, self.space.readings());
+        let residual = &whole - &basis * basis.tr_mul(&whole);
+        let adjoint = column(self.space.adjoint(as_matrix(&residual)));
+        let directions = self.space.adjoint(basis);
+        Beside {
+            context: self,
+            state,
+            readings,
+            causes,
+            adjoint,
+            directions: directions.column_iter().map(|c| c.clone_owned()).collect(),
+        }
+    }
+}
+
+impl<'s> Beside<'s> {
+    /// The best shape of an effect from a start, and the statistic there; its relatives are tried too, and the one
+    /// of greatest evidence is taken.
+    pub fn refine(&self, effect: usize, (start, reach): (&Shape, Reach)) -> (Cause, f64) {
+        let seen = self.seen(effect);
         let (shape, t) = seen.of_greatest_evidence(seen.searched(start, reach), reach);
-        (self.cause(state, effect, shape), t)
+        (self.context.cause(self.state, effect, shape), t)
     }
 
     /// A refined cause once its values that come back were tried around their cycles, and its statistic; the
     /// cause as it is where none does.
-    pub fn come_back(
-        &self,
-        state: &AnyModel,
-        readings: &DVector<f64>,
-        (cause, t): (Cause, f64),
-        beside: &[Cause],
-    ) -> (Cause, f64) {
-        let cycles = self.catalogue[cause.effect].cycles(state, &cause.shape);
+    pub fn come_back(&self, (cause, t): (Cause, f64)) -> (Cause, f64) {
+        let cycles = self.context.catalogue[cause.effect].cycles(self.state, &cause.shape);
         if cycles.is_empty() {
             return (cause, t);
         }
-        let seen = Seen::of(self, state, readings, cause.effect, beside);
-        let (shape, t) = seen.come_back(&cause.shape, &cycles);
-        (self.cause(state, cause.effect, shape), t)
+        let (shape, t) = self.seen(cause.effect).come_back(&cause.shape, &cycles);
+        (self.context.cause(self.state, cause.effect, shape), t)
     }
 
-    /// The statistic of an effect at the best shape that is found from a start, without relatives.
-    pub fn greatest_near(&self, readings: &DVector<f64>, effect: usize, start: &Shape) -> f64 {
-        Seen::of(self, self.model, readings, effect, &[])
-            .searched(start, Reach::WIDE)
-            .1
+    /// As [`Beside::refine`], without relatives.
+    pub fn refine_alone(&self, effect: usize, (start, reach): (&Shape, Reach)) -> (Cause, f64) {
+        let (shape, t) = self.seen(effect).searched(start, reach);
+        (self.context.cause(self.state, effect, shape), t)
     }
 
-    /// As [`Context::refine`], without relatives.
-    pub fn refine_alone(
-        &self,
-        state: &AnyModel,
-        readings: &DVector<f64>,
-        effect: usize,
-        (start, reach): (&Shape, Reach),
-        beside: &[Cause],
-    ) -> Cause {
-        let (shape, _) = Seen::of(self, state, readings, effect, beside).searched(start, reach);
-        self.cause(state, effect, shape)
+    /// An effect as it is seen here.
+    pub(super) fn seen(&'s self, effect: usize) -> Seen<'s> {
+        Seen {
+            context: self.context,
+            effect: self.context.catalogue[effect].as_ref(),
+            state: self.state,
+            beside: self,
+            adjoint: &self.adjoint,
+            directions: &self.directions,
+        }
     }
 }
 
@@ -74,49 +94,25 @@ pub(super) struct Seen<'s> {
     pub context: &'s Context<'s>,
     pub effect: &'s dyn Effect<AnyModel>,
     pub state: &'s AnyModel,
-    readings: &'s DVector<f64>,
-    beside: &'s [Cause],
+    beside: &'s Beside<'s>,
     /// What a column is multiplied with to get its score.
-    pub adjoint: DVector<f64>,
+    pub adjoint: &'s DVector<f64>,
     /// The same of the other causes' directions.
-    pub directions: Vec<DVector<f64>>,
+    pub directions: &'s [DVector<f64>],
 }
 
-impl<'s> Seen<'s> {
-    pub fn of(
-        context: &'s Context<'s>,
-        state: &'s AnyModel,
-        readings: &'s DVector<f64>,
-        effect: usize,
-        beside: &'s [Cause],
-    ) -> Self {
-        let whole = context.residual(readings);
-        let basis = span(beside, context.space.readings());
-        let residual = &whole - &basis * basis.tr_mul(&whole);
-        let adjoint = column(context.space.adjoint(as_matrix(&residual)));
-        let directions = context.space.adjoint(basis);
-        Self {
-            context,
-            effect: context.catalogue[effect].as_ref(),
-            state,
-            readings,
-            beside,
-            adjoint,
-            directions: directions.column_iter().map(|c| c.clone_owned()).collect(),
-        }
-    }
-
+impl Seen<'_> {
     /// Statistic, EᵀPE and score of a shape; nothing stands out of one that the fit takes up whole.
     pub fn value(&self, shape: &Shape) -> (f64, DMatrix<f64>, DVector<f64>) {
         let columns = self.effect.columns(self.state, shape);
         let gram = self.context.space.gram(&columns);
         let visible = gram.is_visible();
         let mut gram = gram.matrix;
-        for direction in &self.directions {
+        for direction in self.directions {
             let along = products(&columns, direction);
             gram -= &along * along.transpose();
         }
-        let score = products(&columns, &self.adjoint);
+        let score = products(&columns, self.adjoint);
         let positive = is_positive(self.effect, shape);
         let statistic = if visible {
             statistic(&gram, &score, positive)
@@ -234,17 +230,16 @@ impl<'s> Seen<'s> {
     /// A shape as the readings tell it, less what the other causes change in them when all are fitted together.
     fn traced(&self, shape: &Shape) -> Option<Shape> {
         let left = || {
-            if self.beside.is_empty() {
-                return Some(self.readings.clone());
+            let (readings, causes) = (self.beside.readings, self.beside.causes);
+            if causes.is_empty() {
+                return Some(readings.clone());
             }
             let columns = self.effect.columns(self.state, shape);
             let own = self.context.space.forward_columns(&columns).0;
             let sizes: Vec<f64> = own.column_iter().map(|c| c.norm()).collect();
             let basis = orthonormal(&own, &sizes);
-            let others = self
-                .context
-                .amplitudes_beside(self.readings, self.beside, &basis)?;
-            Some(self.readings - self.context.change(self.beside, &others))
+            let others = self.context.amplitudes_beside(readings, causes, &basis)?;
+            Some(readings - self.context.change(causes, &others))
         };
         self.effect.traced(self.state, &left, shape)
     }
@@ -283,7 +278,6 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::Seen;
     use crate::diagnosis::attribution::context::Context;
     use crate::diagnosis::detection::estimate::estimate;
 
@@ -309,7 +303,8 @@ mod tests {
         let context = Context::new(&model, &catalogue, law, 40, 1);
         let name = "local-contamination";
         let effect = catalogue.iter().position(|e| e.name() == name).unwrap();
-        let seen = Seen::of(&context, &model, &readings, effect, &[]);
+        let alone = context.beside(&model, &readings, &[]);
+        let seen = alone.seen(effect);
         let in_words = |shape: &_| catalogue[effect].variant_name(&model, shape).unwrap();
         let bumps = catalogue[effect].grid(&model).into_iter();
         let statistics: Vec<(bool, f64)> = bumps

@@ -95,10 +95,11 @@ impl Context<'_> {
         let (effect, shape) = (cause.effect, &cause.shape);
         if round < SEARCHED {
             let start = (shape, Reach::NEAR);
-            self.refine(state, readings, effect, start, others).0
+            self.beside(state, readings, others).refine(effect, start).0
         } else if shape.free() <= MANY {
             let start = (shape, Reach::CLOSE);
-            self.refine_alone(state, readings, effect, start, others)
+            let beside = self.beside(state, readings, others);
+            beside.refine_alone(effect, start).0
         } else {
             self.at_rest(state, readings, cause, others)
         }
@@ -114,13 +115,8 @@ impl Context<'_> {
     ) -> Cause {
         let mut shape = cause.shape.clone();
         shape.steps.fill(0.0);
-        let mut kept = self.refine_alone(
-            state,
-            readings,
-            cause.effect,
-            (&shape, Reach::CLOSE),
-            others,
-        );
+        let beside = self.beside(state, readings, others);
+        let (mut kept, _) = beside.refine_alone(cause.effect, (&shape, Reach::CLOSE));
         kept.shape.steps.clone_from(&cause.shape.steps);
         kept
     }

@@ -65,12 +65,12 @@ fn is_first(context: &Context<'_>, name: &Name, rivals: &Drawn, rival: usize) ->
         .collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     ranked.truncate(REFINED);
+    let alone = context.beside(context.model, &readings, &[]);
     let refined: Vec<(Cause, f64)> = ranked
         .into_iter()
         .filter_map(|(_, effect)| {
             let start = context.start(&first, effect)?;
-            let (cause, t) =
-                context.refine(context.model, &readings, effect, (start, Reach::WIDE), &[]);
+            let (cause, t) = alone.refine(effect, (start, Reach::WIDE));
             possible(context, &readings, &[], &cause).then_some((cause, t))
         })
         .collect();

@@ -12,6 +12,7 @@ use crate::diagnosis::detection::null::{BATCH, seen, statistics};
 use crate::diagnosis::levels::{INVISIBLE, SAME};
 use crate::diagnosis::noise::law::draw_scatter;
 use crate::diagnosis::noise::spikes::Spikes;
+use crate::diagnosis::search::Reach;
 use crate::diagnosis::severity::grounds::{Ground, Grounds};
 use crate::diagnosis::severity::stage::Name;
 
@@ -254,9 +255,10 @@ fn unlisted(
 /// Cosine of a gap to the nearest member of the group, whose shape is searched.
 fn searched(context: &Context<'_>, name: &Name, gap: &DVector<f64>) -> f64 {
     let first = context.remainder(gap, &[]);
+    let alone = context.beside(context.model, gap, &[]);
     let nearest = name.members.iter().filter_map(|member| {
         let start = context.start(&first, *member)?;
-        Some(context.greatest_near(gap, *member, start))
+        Some(alone.refine_alone(*member, (start, Reach::WIDE)).1)
     });
     nearest.fold(0.0, f64::max).sqrt() / name.size
 }

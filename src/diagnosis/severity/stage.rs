@@ -223,6 +223,7 @@ fn refined(
     effect: usize,
 ) -> Option<(Cause, f64)> {
     let start = context.start(first, effect)?;
-    let (cause, t) = context.refine(context.model, readings, effect, (start, Reach::WIDE), &[]);
+    let alone = context.beside(context.model, readings, &[]);
+    let (cause, t) = alone.refine(effect, (start, Reach::WIDE));
     possible(context, readings, &[], &cause).then_some((cause, t))
 }

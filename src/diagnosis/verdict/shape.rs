@@ -46,15 +46,12 @@ fn nearest(
     excess: f64,
 ) -> Option<Nearest> {
     let whole = first.residual.norm_squared();
+    let alone = context.beside(context.model, readings, &[]);
     let explained: Vec<(f64, Vec<Cause>)> = (0..context.catalogue.len())
         .into_par_iter()
         .filter_map(|effect| {
             let start = context.start(first, effect)?;
-            let cause = vec![
-                context
-                    .refine(context.model, readings, effect, (start, Reach::WIDE), &[])
-                    .0,
-            ];
+            let cause = vec![alone.refine(effect, (start, Reach::WIDE)).0];
             let explained = whole - context.misfit(readings, &cause);
             Some((explained, cause))
         })

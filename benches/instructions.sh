@@ -14,7 +14,7 @@ program=target/release/kernels
 counts=$(mktemp)
 trap 'rm -f "$counts" "$counts.out"' EXIT
 made_with="$(rustc --version), $(ldd --version | head -1 | sed 's/^ldd *//'), $(
-    grep -o -w -m 1 -E 'avx512f|avx2' /proc/cpuinfo | sort | head -1)"
+    grep -o -w -m 1 -E 'avx512f|avx2' /proc/cpuinfo | sort | tail -1)"
 
 count() { # kernel, times: instructions of the whole program
     RAYON_NUM_THREADS=1 valgrind --tool=callgrind --callgrind-out-file="$counts.out" \

@@ -33,6 +33,11 @@ pub fn fit<P: Problem + ?Sized>(
     start: DVector<f64>,
     options: &Options,
 ) -> Result<Fit, FitError> {
+    fit_any(&problem, start, options)
+}
+
+/// [`fit`], compiled once for all problems rather than once for each.
+fn fit_any(problem: &dyn Problem, start: DVector<f64>, options: &Options) -> Result<Fit, FitError> {
     fit_with(problem, start, options, |executor| executor)
 }
 
@@ -170,6 +175,17 @@ pub fn fit_separable<P: SeparableProblem + ?Sized>(
     let linear = projection
         .linear_parameters(&projected.parameters)
         .map_err(|no| FitError::NoJacobian { reason: no.reason })?;
+    in_all_parameters(&joint, projected, &linear, options)
+}
+
+/// A fit in the nonlinear parameters as one in all of them.
+fn in_all_parameters(
+    joint: &dyn Problem,
+    projected: Fit,
+    linear: &DVector<f64>,
+    options: &Options,
+) -> Result<Fit, FitError> {
+    let parameters = joint.parameter_count();
     let k = projected.parameters.len();
     let all = DVector::from_fn(parameters, |i, _| match i.checked_sub(k) {
         Some(j) => linear[j],
@@ -179,25 +195,21 @@ pub fn fit_separable<P: SeparableProblem + ?Sized>(
         bounds: options.bounds.as_ref().map(|b| b.extended(linear.len())),
         ..options.clone()
     };
-    let system = dense(&joint, &free);
+    let system = dense(joint, &free);
     let unit = projected.unit;
     let point = point_at(&system, all, unit)?;
-    let ending = joint_ending(projected.ending, &joint, &point);
+    let ending = joint_ending(projected.ending, joint, &point);
     let effort = Effort {
         iterations: projected.iterations,
         residual_evaluations: projected.residual_evaluations,
         jacobian_evaluations: projected.jacobian_evaluations,
         history: projected.history,
     };
-    assemble(&joint, &system, (point, unit), ending, effort, &free)
+    assemble(joint, &system, (point, unit), ending, effort, &free)
 }
 
 /// The ending in all parameters: a minimum may leave linear parameters undetermined.
-fn joint_ending<P: Problem + ?Sized>(
-    projected: Ending,
-    joint: &P,
-    point: &Point<DenseModel>,
-) -> Ending {
+fn joint_ending(projected: Ending, joint: &dyn Problem, point: &Point<DenseModel>) -> Ending {
     let by = match &projected {
         Ending::Converged(by) | Ending::NotIdentifiable { by, .. } => *by,
         _ => return projected,

@@ -48,3 +48,26 @@ pub trait Problem {
         format!("p{index}")
     }
 }
+
+/// A reference to a problem is that problem, so that a fit can be compiled once for all of them.
+impl<P: Problem + ?Sized> Problem for &P {
+    fn parameter_count(&self) -> usize {
+        (**self).parameter_count()
+    }
+
+    fn residual_count(&self) -> usize {
+        (**self).residual_count()
+    }
+
+    fn residuals(&self, parameters: &DVector<f64>) -> Result<DVector<f64>, NoValue> {
+        (**self).residuals(parameters)
+    }
+
+    fn jacobian(&self, parameters: &DVector<f64>) -> Result<DMatrix<f64>, NoValue> {
+        (**self).jacobian(parameters)
+    }
+
+    fn parameter_name(&self, index: usize) -> String {
+        (**self).parameter_name(index)
+    }
+}

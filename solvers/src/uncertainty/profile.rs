@@ -89,6 +89,18 @@ pub fn profile_interval<P: Problem + ?Sized>(
     scale: ResidualScale,
     options: &Options,
 ) -> Result<ProfileInterval, FitError> {
+    interval(&problem, fit, index, level, scale, options)
+}
+
+/// [`profile_interval`], compiled once for all problems.
+fn interval(
+    problem: &dyn Problem,
+    fit: &Fit,
+    index: usize,
+    level: f64,
+    scale: ResidualScale,
+    options: &Options,
+) -> Result<ProfileInterval, FitError> {
     let wrong = |setting, value: String, must| {
         Err(FitError::Setting {
             setting,
@@ -146,8 +158,8 @@ fn normal_quantile(probability: f64) -> f64 {
     Normal::standard().inverse_cdf(probability)
 }
 
-struct Profile<'a, P: ?Sized> {
-    problem: &'a P,
+struct Profile<'a> {
+    problem: &'a dyn Problem,
     fit: &'a Fit,
     index: usize,
     variance: f64,
@@ -163,7 +175,7 @@ struct Place {
     excess: f64,
 }
 
-impl<P: Problem + ?Sized> Profile<'_, P> {
+impl Profile<'_> {
     /// Follows the profile in one direction: out until the quantile is passed, then in between.
     fn limit(&self, sign: f64) -> Result<Limit, FitError> {
         let estimate = self.fit.parameters[self.index];

@@ -1,9 +1,10 @@
 //! What is concluded: verdict and gap decided together, so that neither can contradict the other.
 //!
 //! Whether there is a gap at all is decided once, by the test of detection, which looks at every
-//! effect, every place and the misfit as a whole. The verdict is `none` if and only if that test
-//! does not reject, and a size of zero is then in the interval of the gap: an interval is the set of
-//! sizes that are not rejected, and the test speaks for zero, the misfit's own spread for the rest.
+//! effect, every place and the misfit as a whole. The verdict is `none` where that test does not
+//! reject and what differs between repeats is noise (`compose.rs`), and a size of zero is then in the
+//! interval of the gap: an interval is the set of sizes that are not rejected, and the test speaks for
+//! zero, the misfit's own spread for the rest.
 //! The sentence, the text, the page and the JSON are all made from this.
 
 use crate::diagnosis::attribution::confidence::Answer;

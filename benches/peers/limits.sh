@@ -25,8 +25,8 @@ for part in "$@"; do
         ;;
     work)
         cargo build -q --release
-        cargo bench -q --bench circle -- "circles of 36 points|all reference circles" > /dev/null
-        cargo bench -q -p errsep-models --bench machine_monte_carlo > /dev/null
+        cargo bench -q -p errsep-campaigns --bench circle -- "circles of 36 points|all reference circles" > /dev/null
+        cargo bench -q -p errsep-campaigns --bench machine_monte_carlo > /dev/null
         python3 benches/peers/limits.py "$target/release/errsep" "$target"
         ;;
     build)

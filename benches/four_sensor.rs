@@ -1,7 +1,7 @@
 //! The L-curve of the direct four-sensor system: through the band up to 10⁵ points, and by the dense
 //! decomposition where that still fits.
 //!
-//! `cargo bench -p errsep-models --bench four_sensor`
+//! `cargo bench -p errsep-campaigns --bench four_sensor`
 
 use std::hint::black_box;
 

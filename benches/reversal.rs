@@ -1,6 +1,6 @@
 //! Time of the simultaneous fit by readings and by knots, beside dense ways to the same minimum.
 //!
-//! `cargo bench -p errsep-models --bench reversal`
+//! `cargo bench -p errsep-campaigns --bench reversal`
 //!
 //! Four channels × N readings, 60 interior knots in each of three forms, exact rotation and a
 //! thickness of 42 mm. The structured times are of the whole library call: sorting, seed, gauge,

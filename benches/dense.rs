@@ -1,6 +1,6 @@
 //! The dense kernels beside nalgebra's on the same matrices in the same run.
 //!
-//! `cargo bench -p errsep-solvers --bench dense`
+//! `cargo bench -p errsep-campaigns --bench dense`
 
 use std::hint::black_box;
 

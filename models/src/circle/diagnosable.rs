@@ -375,4 +375,8 @@ impl FittedModel for CirclePoints {
     fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
         effects::all()
     }
+
+    fn zero_may_jump(&self) -> bool {
+        true
+    }
 }

@@ -260,4 +260,8 @@ impl FittedModel for FourSensors {
     fn effects(&self) -> Vec<Box<dyn Effect<Self>>> {
         effects::all()
     }
+
+    fn zero_may_jump(&self) -> bool {
+        true
+    }
 }

@@ -1,7 +1,11 @@
-//! The part lay otherwise in one pass.
+//! The part lay otherwise in one pass, or from some moment on.
 
 use super::CirclePoints;
+use crate::model::Moments;
 use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
+
+/// Moments at which the search begins.
+const MOST: usize = 40;
 
 /// See the head of the file.
 pub(super) struct PartMoved;
@@ -13,9 +17,9 @@ impl Effect<CirclePoints> for PartMoved {
 
     fn about(&self) -> About {
         About {
-            physics: "the part, or the zero of the axes, moved between two passes, so that one pass has a centre of its own",
+            physics: "the part, or the zero of the axes, moved: one pass has a centre of its own, or all points from some moment on",
             confirm: "clamp anew, measure a reference point before and after every pass",
-            source: "a centre for each pass",
+            source: "a centre for each pass; another centre from a moment on",
         }
     }
 
@@ -26,6 +30,11 @@ impl Effect<CirclePoints> for PartMoved {
         ]
     }
 
+    fn shape_parameters(&self) -> Vec<Parameter> {
+        vec![Parameter::between("time", "readings", 0.0, 1e9)]
+    }
+
+    /// One for each pass, without a moment, then those of all moments.
     fn grid(&self, model: &CirclePoints) -> Vec<Shape> {
         // With two passes the place of the one is that of the other, turned round.
         let passes = model.traces().len();
@@ -34,24 +43,38 @@ impl Effect<CirclePoints> for PartMoved {
             2 => 1..2,
             _ => 0..passes,
         };
-        different.map(Shape::variant).collect()
+        let from_on = Moments::of(model.places().iter()).grid(passes, MOST);
+        different.map(Shape::variant).chain(from_on).collect()
+    }
+
+    fn resolution(&self, model: &CirclePoints, shape: &Shape) -> Vec<f64> {
+        let moments = Moments::of(model.places().iter());
+        let of = |moment: &f64| moments.resolution(*moment);
+        shape.values.iter().map(of).collect()
     }
 
     fn variant_name(&self, model: &CirclePoints, shape: &Shape) -> Option<String> {
-        let trace = model.traces().get(shape.variant)?;
+        let Some(trace) = model.traces().get(shape.variant) else {
+            return Some("from a moment on".to_owned());
+        };
         let place = model.places().get(trace.start)?;
         Some(format!("repeat {}", place.repeat))
     }
 
     fn columns(&self, model: &CirclePoints, shape: &Shape) -> Vec<Column> {
-        let Some(trace) = model.traces().get(shape.variant) else {
-            return Vec::new();
+        let rows: Vec<usize> = match (model.traces().get(shape.variant), shape.values.first()) {
+            (Some(pass), _) => pass.clone().collect(),
+            (None, Some(moment)) => {
+                let later = |row: &usize| model.places()[*row].time > *moment;
+                (0..model.places().len()).filter(later).collect()
+            }
+            (None, None) => return Vec::new(),
         };
         let angle = |k: usize| CirclePoints::angle(&model.places()[k]);
         [f64::cos, f64::sin]
             .map(|along| Column {
-                rows: trace.clone().collect(),
-                values: trace.clone().map(|k| along(angle(k))).collect(),
+                values: rows.iter().map(|k| along(angle(*k))).collect(),
+                rows: rows.clone(),
             })
             .into()
     }

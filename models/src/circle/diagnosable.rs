@@ -79,14 +79,11 @@ impl CirclePoints {
                 .atan2(p.x - fixed.centre.x)
                 .to_degrees()
         };
-        let seam = seam(
-            points
-                .iter()
-                .filter(|p| p.1 == points[0].1)
-                .map(|p| raw(p.0)),
-        );
-        let degrees = |p: Point| seam + (raw(p) - seam).rem_euclid(360.0);
         let directions = directions(points, raw);
+        let first = points.iter().filter(|p| p.1 == points[0].1);
+        let sense = directions.get(&points[0].1).copied().unwrap_or(1.0);
+        let seam = seam(first.map(|p| raw(p.0)).collect(), sense);
+        let degrees = |p: Point| seam + (raw(p) - seam).rem_euclid(360.0);
         let mut sorted: Vec<(u32, f64, Point, usize)> = points
             .iter()
             .enumerate()
@@ -219,23 +216,35 @@ fn directions(points: &[(Point, u32)], degrees: impl Fn(Point) -> f64) -> BTreeM
         .collect()
 }
 
-/// Where a pass is cut open, degrees: the middle of the widest gap between its points, so that noise
-/// moves none of them to the other end.
-fn seam(angles: impl Iterator<Item = f64>) -> f64 {
-    let mut angles: Vec<f64> = angles.map(|a| a.rem_euclid(360.0)).collect();
-    angles.sort_by(f64::total_cmp);
-    let (Some(first), Some(last)) = (angles.first(), angles.last()) else {
+/// A gap between points is so much wider than the one where the pass began, at least, if it is to be cut there.
+const WIDER: f64 = 1.1;
+
+/// Where a pass is cut open, degrees: in the middle of the widest gap between its points, so that noise moves none of
+/// them to the other end; of gaps that are nearly even in that where it began. `angles` in the order of time, `sense` of
+/// travel.
+fn seam(angles: Vec<f64>, sense: f64) -> f64 {
+    let Some(first) = angles.first().map(|a| a.rem_euclid(360.0)) else {
         return 0.0;
     };
-    let (mut widest, mut middle) = (first + 360.0 - last, 0.5 * (first + last) - 180.0);
-    for pair in angles.windows(2) {
-        // A hair wider: even gaps stay cut at their first point.
-        if pair[1] - pair[0] > widest + 1e-3 * widest.abs() {
-            widest = pair[1] - pair[0];
-            middle = 0.5 * (pair[0] + pair[1]);
-        }
-    }
-    middle
+    let mut sorted: Vec<f64> = angles.iter().map(|a| a.rem_euclid(360.0)).collect();
+    sorted.sort_by(f64::total_cmp);
+    let count = sorted.len();
+    // The gap below each point.
+    let gap = |k: usize| {
+        let below = if k == 0 {
+            sorted[count - 1] - 360.0
+        } else {
+            sorted[k - 1]
+        };
+        (sorted[k] - below, 0.5 * (sorted[k] + below))
+    };
+    let own = sorted.partition_point(|a| *a < first);
+    let began = gap(if sense < 0.0 { (own + 1) % count } else { own });
+    let widest = (0..count).map(gap).max_by(|a, b| a.0.total_cmp(&b.0));
+    widest
+        .filter(|(width, _)| *width > WIDER * began.0)
+        .unwrap_or(began)
+        .1
 }
 
 impl FittedModel for CirclePoints {
@@ -376,7 +385,13 @@ impl FittedModel for CirclePoints {
         effects::all()
     }
 
-    fn zero_may_jump(&self) -> bool {
-        true
+    fn jumps(&self) -> Vec<DMatrix<f64>> {
+        let angles: Vec<f64> = self.places().iter().map(Self::angle).collect();
+        let rows = angles.len();
+        let centre = DMatrix::from_fn(rows, 2, |row, axis| match axis {
+            0 => angles[row].cos(),
+            _ => angles[row].sin(),
+        });
+        vec![DMatrix::from_element(rows, 1, 1.0), centre]
     }
 }

@@ -261,7 +261,7 @@ impl FittedModel for FourSensors {
         effects::all()
     }
 
-    fn zero_may_jump(&self) -> bool {
-        true
+    fn jumps(&self) -> Vec<DMatrix<f64>> {
+        vec![DMatrix::from_element(self.places().len(), 1, 1.0)]
     }
 }

@@ -72,7 +72,7 @@ trait Behind: Send + Sync {
     fn quantities(&self) -> Vec<Quantity>;
     fn profiles(&self) -> Vec<Profile>;
     fn correlated_noise(&self) -> bool;
-    fn zero_may_jump(&self) -> bool;
+    fn jumps(&self) -> Vec<DMatrix<f64>>;
     fn names_single_readings(&self) -> bool;
     fn expected_scatter(&self) -> &[Column];
     fn rounding(&self) -> f64;
@@ -140,8 +140,8 @@ impl<M: FittedModel + 'static> Behind for M {
     fn correlated_noise(&self) -> bool {
         FittedModel::correlated_noise(self)
     }
-    fn zero_may_jump(&self) -> bool {
-        FittedModel::zero_may_jump(self)
+    fn jumps(&self) -> Vec<DMatrix<f64>> {
+        FittedModel::jumps(self)
     }
     fn names_single_readings(&self) -> bool {
         FittedModel::names_single_readings(self)
@@ -237,8 +237,8 @@ impl FittedModel for AnyModel {
     fn correlated_noise(&self) -> bool {
         self.0.correlated_noise()
     }
-    fn zero_may_jump(&self) -> bool {
-        self.0.zero_may_jump()
+    fn jumps(&self) -> Vec<DMatrix<f64>> {
+        self.0.jumps()
     }
     fn names_single_readings(&self) -> bool {
         self.0.names_single_readings()

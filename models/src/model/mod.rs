@@ -282,10 +282,10 @@ pub trait FittedModel: Clone + Send + Sync {
         true
     }
 
-    /// Whether a zero that jumps between two traces and stays is an effect of the catalogue, and no
-    /// shift of a trace by its noise.
-    fn zero_may_jump(&self) -> bool {
-        false
+    /// What of the catalogue jumps at some moment and stays, and is no shift of traces by their noise: of each such what
+    /// it adds to all readings, readings × amplitudes.
+    fn jumps(&self) -> Vec<DMatrix<f64>> {
+        Vec::new()
     }
 
     /// Whether a single wrong reading is an effect of the catalogue, and not to be calmed as noise.

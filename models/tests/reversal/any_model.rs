@@ -40,7 +40,7 @@ fn all_is_passed_on() {
     assert_eq!(any.quantities().len(), own.quantities().len());
     assert_eq!(any.profiles().len(), own.profiles().len());
     assert_eq!(any.correlated_noise(), own.correlated_noise());
-    assert_eq!(any.zero_may_jump(), own.zero_may_jump());
+    assert_eq!(any.jumps(), own.jumps());
     assert_eq!(any.names_single_readings(), own.names_single_readings());
     assert_eq!(any.expected_scatter(), own.expected_scatter());
     assert_eq!(any.rounding(), own.rounding());

@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use errsep_models::model::{AnyModel, FittedModel};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::levels::{
     AS_BESIDE, KEPT, LASTING_STEP, MOST_STEPS, STAYS, STAYS_FREEDOM, STEP,
@@ -20,24 +20,11 @@ const ELSEWHERE: usize = 16 * SIDE;
 /// Standard deviation of the difference of two medians of [`SIDE`] independent readings over that of two readings.
 const OF_MEDIANS: f64 = 0.42;
 
-/// Readings beyond a step.
-struct Lifted {
-    parts: Vec<Range<usize>>,
-    height: f64,
-}
-
-impl Lifted {
-    fn lower(&self, readings: &mut DVector<f64>) {
-        for part in &self.parts {
-            let mut rows = readings.rows_mut(part.start, part.len());
-            rows.add_scalar_mut(-self.height);
-        }
-    }
-}
-
 /// Readings without steps of single repeats.
 pub(in crate::diagnosis) fn levelled(model: &AnyModel, readings: &DVector<f64>) -> DVector<f64> {
     let mut level = readings.clone();
+    let zero = DMatrix::from_element(readings.len(), 1, 1.0);
+    let jumps = model.jumps();
     for channel in 0..model.channel_names().len() {
         let all = groups(model).filter(|g| g.starts.len() > 1);
         let own: Vec<Group> = all
@@ -46,25 +33,95 @@ pub(in crate::diagnosis) fn levelled(model: &AnyModel, readings: &DVector<f64>) 
         let traces = in_time(model, &own);
         for (k, group) in own.iter().enumerate() {
             for _ in 0..MOST_STEPS {
-                let step = greatest(group, &level).and_then(|(place, height)| {
-                    let jumped = traces.iter().enumerate().filter(|(_, t)| t.group == k);
-                    let beyond = jumped.flat_map(|(own, trace)| {
-                        let stays = model.zero_may_jump().then_some(&traces[own + 1..]);
-                        trace.beyond(place, stays)
-                    });
-                    nearest(beyond.collect(), height, &own, &level)
+                let Some((place, height)) = greatest(group, &level) else {
+                    break;
+                };
+                let of_group = || traces.iter().enumerate().filter(|(_, t)| t.group == k);
+                let one = of_group().flat_map(|(_, trace)| {
+                    let sides = [trace.before(place), trace.after(place)];
+                    sides.map(|rows| Lifted::by(&zero, &[rows], Some(height), (&own, &level)))
                 });
-                let Some(lifted) = step else { break };
-                lifted.lower(&mut level);
+                let stays = of_group().flat_map(|(from, trace)| {
+                    let mut rows = vec![trace.later(place)];
+                    rows.extend(traces[from + 1..].iter().map(|t| t.rows.clone()));
+                    let (own, level) = (&own, &level);
+                    jumps.iter().map(move |jump| {
+                        let height = (jump.ncols() == 1).then_some(height);
+                        Lifted::by(jump, &rows, height, (own, level))
+                    })
+                });
+                let best = one
+                    .chain(stays)
+                    .flatten()
+                    .filter(|lifted| lifted.gain > 0.0);
+                let Some(best) = best.max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
+                    break;
+                };
+                level -= best.change;
             }
         }
-        if model.zero_may_jump()
-            && let Some(lifted) = later(&traces, own.len(), &level)
+        if !jumps.is_empty()
+            && let Some((rows, height)) = later(&traces, own.len(), &level)
         {
-            lifted.lower(&mut level);
+            for part in rows {
+                level
+                    .rows_mut(part.start, part.len())
+                    .add_scalar_mut(-height);
+            }
         }
     }
     level
+}
+
+/// What may have been lifted beyond a step. A step is seen, from the other side, in the repeats that its own is
+/// compared with too; the one that leaves all repeats nearest to each other is taken.
+struct Lifted {
+    change: DVector<f64>,
+    /// Squares that it takes from what the repeats differ by.
+    gain: f64,
+}
+
+impl Lifted {
+    /// Rows of a channel, lifted by what a jump adds; a jump of one amplitude by about the height, where that is known.
+    fn by(
+        jump: &DMatrix<f64>,
+        rows: &[Range<usize>],
+        height: Option<f64>,
+        (own, readings): (&[Group], &DVector<f64>),
+    ) -> Option<Self> {
+        let mut shape = DMatrix::zeros(jump.nrows(), jump.ncols());
+        for rows in rows {
+            let part = jump.rows(rows.start, rows.len());
+            shape.rows_mut(rows.start, rows.len()).copy_from(&part);
+        }
+        // With P the projector that takes off the means of repeats, |P(y − S a)|² is least where SᵀPS a = SᵀPy.
+        let projected = from_means(own, &shape);
+        let (normal, along) = (projected.tr_mul(&shape), projected.tr_mul(readings));
+        let mut sizes = normal.clone().cholesky()?.solve(&along);
+        if let Some(height) = height {
+            let clamp = |a: f64| a.signum() * a.abs().clamp(height * AS_BESIDE, height / AS_BESIDE);
+            sizes.apply(|a| *a = clamp(*a));
+        }
+        let gain = 2.0 * sizes.dot(&along) - sizes.dot(&(&normal * &sizes));
+        let change = shape * sizes;
+        Some(Self { change, gain })
+    }
+}
+
+/// Values of a channel less their means over the repeats.
+fn from_means(own: &[Group], values: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut away = DMatrix::zeros(values.nrows(), values.ncols());
+    for group in own {
+        for k in 0..group.length {
+            let of = || group.starts.iter().map(|start| start + k);
+            for column in 0..values.ncols() {
+                let sum: f64 = of().map(|row| values[(row, column)]).sum();
+                let mean = sum / group.starts.len() as f64;
+                of().for_each(|row| away[(row, column)] = values[(row, column)] - mean);
+            }
+        }
+    }
+    away
 }
 
 /// A trace of a channel.
@@ -79,20 +136,21 @@ struct Trace {
 }
 
 impl Trace {
-    /// What may have been lifted where a step at a place of this trace is seen: its rows before it, those after
-    /// it, and where the zero may stay where it jumped, those later in time with all traces that follow.
-    fn beyond(&self, place: usize, follow: Option<&[Trace]>) -> Vec<Vec<Range<usize>>> {
-        let (before, after) = (
-            self.rows.start..self.rows.start + place,
-            self.rows.start + place..self.rows.end,
-        );
-        let mut all = vec![vec![before.clone()], vec![after.clone()]];
-        if let Some(follow) = follow {
-            let own = if self.forward { after } else { before };
-            let follow = follow.iter().map(|t| t.rows.clone());
-            all.push(std::iter::once(own).chain(follow).collect());
+    fn before(&self, place: usize) -> Range<usize> {
+        self.rows.start..self.rows.start + place
+    }
+
+    fn after(&self, place: usize) -> Range<usize> {
+        self.rows.start + place..self.rows.end
+    }
+
+    /// What of it is later in time than a place.
+    fn later(&self, place: usize) -> Range<usize> {
+        if self.forward {
+            self.after(place)
+        } else {
+            self.before(place)
         }
-        all
     }
 }
 
@@ -118,7 +176,11 @@ fn in_time(model: &AnyModel, own: &[Group]) -> Vec<Trace> {
 
 /// The step between the traces of a channel, in the order of time and each against the others of its
 /// direction, beside which next to nothing differs.
-fn later(traces: &[Trace], groups: usize, readings: &DVector<f64>) -> Option<Lifted> {
+fn later(
+    traces: &[Trace],
+    groups: usize,
+    readings: &DVector<f64>,
+) -> Option<(Vec<Range<usize>>, f64)> {
     let freedom = traces.len().checked_sub(groups + 1)?;
     if freedom < STAYS_FREEDOM {
         return None;
@@ -149,9 +211,9 @@ fn later(traces: &[Trace], groups: usize, readings: &DVector<f64>) -> Option<Lif
         .map(step)
         .max_by(|a, b| a.2.total_cmp(&b.2))?;
     let rest = (means.norm_squared() - square).max(0.0) / freedom as f64;
-    (square > STAYS * STAYS * rest && square > 0.0).then(|| Lifted {
-        parts: traces[from..].iter().map(|t| t.rows.clone()).collect(),
-        height,
+    (square > STAYS * STAYS * rest && square > 0.0).then(|| {
+        let rows = traces[from..].iter().map(|t| t.rows.clone());
+        (rows.collect(), height)
     })
 }
 
@@ -161,49 +223,6 @@ fn greatest(group: &Group, readings: &DVector<f64>) -> Option<(usize, f64)> {
     let all = sudden(&away).into_iter().chain(lasting(&away));
     let (_, place, height) = all.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
     Some((place, height.abs()))
-}
-
-/// That of the candidates whose lowering, by about the height, leaves the repeats of a channel nearest to each
-/// other. (A step is seen, from the other side, in the traces that its own is compared with too.)
-fn nearest(
-    candidates: Vec<Vec<Range<usize>>>,
-    height: f64,
-    own: &[Group],
-    readings: &DVector<f64>,
-) -> Option<Lifted> {
-    // Sum of squares about the means of repeats: |P(y − h s)|², with P the projector that takes off these means and
-    // s one in what is lifted; least at h = sᵀPy/sᵀPs.
-    let from_means = |values: &DVector<f64>| {
-        let mut away = DVector::zeros(values.len());
-        for group in own {
-            for k in 0..group.length {
-                let of = || group.starts.iter().map(|start| start + k);
-                let mean = of().map(|row| values[row]).sum::<f64>() / group.starts.len() as f64;
-                of().for_each(|row| away[row] = values[row] - mean);
-            }
-        }
-        away
-    };
-    let away = from_means(readings);
-    let lowered = |parts: Vec<Range<usize>>| {
-        let over = |values: &DVector<f64>| -> f64 {
-            let sums = parts.iter().map(|p| values.rows(p.start, p.len()).sum());
-            sums.sum()
-        };
-        let mut shape = DVector::zeros(readings.len());
-        parts
-            .iter()
-            .for_each(|p| shape.rows_mut(p.start, p.len()).fill(1.0));
-        let (along, square) = (over(&away), over(&from_means(&shape)));
-        let best = along / square.max(f64::MIN_POSITIVE);
-        let height = best.signum() * best.abs().clamp(height * AS_BESIDE, height / AS_BESIDE);
-        let gain = height * (2.0 * along - height * square);
-        (gain, Lifted { parts, height })
-    };
-    let all = candidates.into_iter().map(lowered);
-    all.filter(|(gain, _)| *gain > 0.0)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, lifted)| lifted)
 }
 
 /// Steps from one reading to the next, of which enough lasts: trace, reading, height.

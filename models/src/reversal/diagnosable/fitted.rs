@@ -152,8 +152,8 @@ impl FittedModel for Linearised {
             .collect()
     }
 
-    fn zero_may_jump(&self) -> bool {
-        true
+    fn jumps(&self) -> Vec<DMatrix<f64>> {
+        vec![DMatrix::from_element(self.places().len(), 1, 1.0)]
     }
 
     fn stated_noise(&self) -> Option<f64> {

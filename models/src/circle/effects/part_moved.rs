@@ -6,6 +6,9 @@ use crate::model::{About, Column, Effect, FittedModel, Parameter, Shape};
 
 /// Moments at which the search begins.
 const MOST: usize = 40;
+/// Readings before and after a moment, at least: of fewer its two amplitudes make whatever they are, as a wrong reading
+/// does.
+const FEWEST: usize = 3;
 
 /// See the head of the file.
 pub(super) struct PartMoved;
@@ -44,7 +47,18 @@ impl Effect<CirclePoints> for PartMoved {
             _ => 0..passes,
         };
         let from_on = Moments::of(model.places().iter()).grid(passes, MOST);
-        different.map(Shape::variant).chain(from_on).collect()
+        let seen = from_on
+            .into_iter()
+            .filter(|shape| self.allowed(model, shape));
+        different.map(Shape::variant).chain(seen).collect()
+    }
+
+    fn allowed(&self, model: &CirclePoints, shape: &Shape) -> bool {
+        shape.values.first().is_none_or(|moment| {
+            let places = model.places().iter();
+            let later = places.filter(|place| place.time > *moment).count();
+            (FEWEST..=model.places().len().saturating_sub(FEWEST)).contains(&later)
+        })
     }
 
     fn resolution(&self, model: &CirclePoints, shape: &Shape) -> Vec<f64> {

@@ -46,8 +46,8 @@ pub(in crate::diagnosis) const KEPT: f64 = 0.6;
 /// *Quantile*, 6 · 10⁻⁷ of normal readings: standard deviations of the difference of two neighbours
 /// that make a step.
 pub(in crate::diagnosis) const STEP: f64 = 5.0;
-/// *Quantile.* Standard deviations of the difference of two medians of eight readings that make a step: of normal
-/// noise, correlated or not, 5000 of these in a reversal go beyond in one of 10⁵.
+/// *Quantile*, 2 · 10⁻⁹ of normal readings: standard deviations of the difference of two medians of eight readings that
+/// make a step.
 pub(in crate::diagnosis) const LASTING_STEP: f64 = 6.0;
 /// *Tuned.* Height of a step by all readings of its channel over that by the medians beside it, at least, and one
 /// over that, at most: a shift between traces is no part of a step.

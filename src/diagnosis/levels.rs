@@ -49,8 +49,8 @@ pub(in crate::diagnosis) const STEP: f64 = 5.0;
 /// *Quantile*, 2 · 10⁻⁹ of normal readings: standard deviations of the difference of two medians of eight readings that
 /// make a step.
 pub(in crate::diagnosis) const LASTING_STEP: f64 = 6.0;
-/// *Tuned.* Height of a step by all readings of its channel over that by the medians beside it, at least, and one
-/// over that, at most: a shift between traces is no part of a step.
+/// *Tuned*, the first value that was tried: height of a step by all readings of its channel over that by the medians
+/// beside it, at least, and one over that, at most, as a shift between traces is no part of a step.
 pub(in crate::diagnosis) const AS_BESIDE: f64 = 0.7;
 /// *Limit.* Steps that are taken out of one group of repeats.
 pub(in crate::diagnosis) const MOST_STEPS: usize = 8;

@@ -2,8 +2,9 @@
 //! and the set-up.
 
 pub mod cli;
-pub mod diagnosis;
 pub mod export;
 pub mod io;
-pub mod number;
 pub mod report;
+
+pub use errsep_diagnosis as diagnosis;
+pub use errsep_models::number;

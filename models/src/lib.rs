@@ -10,6 +10,7 @@ pub mod fourier;
 pub mod machine;
 pub mod model;
 pub mod noise;
+pub mod number;
 pub mod positioning;
 pub mod reversal;
 pub mod straightness;

@@ -160,3 +160,42 @@ fn as_json(s: &Straightness) -> serde_json::Value {
         "slope": {"value": s.slope * 1e-3, "unit": "rad"},
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::common::{Called, Wanted};
+    use crate::io::source::{InMemory, begin_record_with};
+
+    #[derive(Parser)]
+    struct Alone {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    #[test]
+    fn where_the_json_is_wanted_nothing_else_is_made() {
+        let Alone { args } = Alone::try_parse_from(["errsep", "<data>"]).unwrap();
+        begin_record_with(
+            true,
+            vec![InMemory {
+                name: "<data>".to_owned(),
+                bytes: Arc::from(&b"x,deviation\n0,0\n1,2\n2,0\n"[..]),
+            }],
+        );
+        let answer = |wanted| {
+            let _called = Called::begin(wanted);
+            run(&args).unwrap()
+        };
+        let (lean, whole) = (answer(Wanted::Json), answer(Wanted::Everything));
+        assert_eq!(lean.json, whole.json);
+        assert_eq!(lean.page.figures().count(), 0);
+        assert!(whole.page.figures().count() > 0);
+        // What a thread is called for does not outlive the call.
+        assert!(!args.common.wants_folder());
+    }
+}

@@ -2,6 +2,7 @@
 
 mod anova;
 mod batch;
+mod called;
 mod circle;
 mod columns;
 #[path = "../command/mod.rs"]

@@ -1,0 +1,290 @@
+//! Noise first: the covariance of the readings from repeats alone.
+//!
+//! One reading = white noise + a part correlated along its trace (Ornstein–Uhlenbeck: variance
+//! o, correlation exp(−|Δx|/ℓ)) + a shift of the whole trace. Repeats of a trace differ by noise,
+//! but also by whatever drifts steadily between them; contrasts orthogonal to {1, t} hold neither
+//! the model nor the drift, so their likelihood estimates the noise alone.
+
+use std::sync::Arc;
+
+use errsep_models::model::{AnyModel, FittedModel};
+use nalgebra::{DMatrix, DVector};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{ChiSquared, Distribution, StandardNormal, StudentT};
+use serde::{Deserialize, Serialize};
+
+use crate::levels::FEWEST_CONTRASTS;
+use crate::noise::contrasts::Contrasts;
+use crate::noise::spikes::{Spikes, Tails};
+
+/// Seed of the laws drawn from the repeats: an estimate must not depend on the user's seed.
+pub(crate) const SEED: u64 = 0x6c61_7773;
+
+/// How far the noise is known from the readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoiseSource {
+    /// From repeats.
+    Repeats,
+    /// Stated in the set-up.
+    Stated,
+    /// From differences of neighbouring readings: effects rougher than the spacing count as noise.
+    Neighbours,
+}
+
+/// The parts of the noise of one reading; variances in the square of the reading's unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Components {
+    /// Variance of the white part.
+    pub white: f64,
+    /// Variance of the part correlated along a trace.
+    pub correlated: f64,
+    /// Its correlation length, in the unit of the positions.
+    pub length: f64,
+    /// Variance of the shift of a whole trace.
+    pub shift: f64,
+}
+
+impl Components {
+    /// Variance of one reading.
+    fn whole(&self) -> f64 {
+        self.white + self.correlated + self.shift
+    }
+
+    /// Noise of all readings of a model.
+    pub(crate) fn draw_all(&self, model: &AnyModel, random: &mut ChaCha8Rng) -> DVector<f64> {
+        let mut noise = DVector::zeros(model.places().len());
+        for trace in model.traces() {
+            let x: Vec<f64> = model.places()[trace.clone()].iter().map(|p| p.x).collect();
+            self.draw(&x, random, &mut noise.as_mut_slice()[trace.clone()]);
+        }
+        noise
+    }
+
+    /// Noise of one trace.
+    pub(crate) fn draw(&self, positions: &[f64], random: &mut ChaCha8Rng, noise: &mut [f64]) {
+        let mut normal = || -> f64 { StandardNormal.sample(random) };
+        let white = self.white.sqrt();
+        let shift = if self.shift > 0.0 {
+            self.shift.sqrt() * normal()
+        } else {
+            0.0
+        };
+        if self.correlated <= 0.0 {
+            noise.iter_mut().for_each(|v| *v = shift + white * normal());
+            return;
+        }
+        let mut state = self.correlated.sqrt() * normal();
+        // Of the last spacing, as most are equal.
+        let (mut known, mut decay, mut fresh) = (f64::NAN, 0.0, 0.0);
+        for (k, value) in noise.iter_mut().enumerate() {
+            if k > 0 {
+                let spacing = (positions[k] - positions[k - 1]).abs();
+                if spacing != known {
+                    known = spacing;
+                    decay = (-spacing / self.length).exp();
+                    fresh = (self.correlated * (1.0 - decay * decay)).sqrt();
+                }
+                state = decay * state + fresh * normal();
+            }
+            *value = shift + state + white * normal();
+        }
+    }
+}
+
+/// The law of the noise; variances in the square of the reading's unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseLaw {
+    /// Variance of the white part.
+    pub white: f64,
+    /// Variance of the part correlated along a trace.
+    pub correlated: f64,
+    /// Its correlation length, in the unit of the positions.
+    pub length: f64,
+    /// Variance of the shift of a whole trace.
+    pub shift: f64,
+    /// Degrees of freedom behind the variance of one reading.
+    pub freedom: f64,
+    /// Where it comes from.
+    pub source: NoiseSource,
+    /// Laws drawn from what the repeats allow; empty where only the white variance is in doubt.
+    possible: Arc<Vec<Components>>,
+    /// Heavy tails of the single readings.
+    tails: Option<Tails>,
+}
+
+impl NoiseLaw {
+    /// White noise of a known standard deviation.
+    pub fn white(sigma: f64, freedom: f64, source: NoiseSource) -> Self {
+        Self {
+            white: sigma * sigma,
+            correlated: 0.0,
+            length: 1.0,
+            shift: 0.0,
+            freedom,
+            source,
+            possible: Arc::new(Vec::new()),
+            tails: None,
+        }
+    }
+
+    /// A law that is known from elsewhere.
+    pub fn stated(parts: Components) -> Self {
+        Self {
+            white: parts.white,
+            correlated: parts.correlated,
+            length: parts.length,
+            shift: parts.shift,
+            ..Self::white(1.0, f64::INFINITY, NoiseSource::Stated)
+        }
+    }
+
+    /// A law of given parts.
+    #[cfg(test)]
+    pub(crate) fn of(white: f64, correlated: f64, length: f64, shift: f64) -> Self {
+        Self::stated(Components {
+            white,
+            correlated,
+            length,
+            shift,
+        })
+    }
+
+    /// The mean of laws drawn from what the repeats allow.
+    pub(crate) fn mean_of(laws: Vec<Components>) -> Self {
+        let count = laws.len().max(1) as f64;
+        let mean = |value: fn(&Components) -> f64| laws.iter().map(value).sum::<f64>() / count;
+        let whole = mean(Components::whole);
+        let variance = laws
+            .iter()
+            .map(|l| (l.whole() - whole).powi(2))
+            .sum::<f64>()
+            / (count - 1.0).max(1.0);
+        let correlated = mean(|l| l.correlated);
+        let length = if correlated > 0.0 {
+            (mean(|l| l.correlated * l.length.ln()) / correlated).exp()
+        } else {
+            1.0
+        };
+        Self {
+            white: mean(|l| l.white),
+            correlated,
+            length,
+            shift: mean(|l| l.shift),
+            freedom: (2.0 * whole * whole / variance.max(f64::MIN_POSITIVE)).clamp(1.0, 1e9),
+            source: NoiseSource::Repeats,
+            possible: Arc::new(laws),
+            tails: None,
+        }
+    }
+
+    /// The law with another white variance, by a factor.
+    pub(crate) fn whiter(mut self, factor: f64) -> Self {
+        if factor != 1.0 {
+            self.white *= factor;
+            let mut laws = self.possible.to_vec();
+            laws.iter_mut().for_each(|law| law.white *= factor);
+            self.possible = Arc::new(laws);
+        }
+        self
+    }
+
+    /// The law with heavy tails of the single readings.
+    pub(crate) fn with_tails(mut self, tails: Option<Tails>) -> Self {
+        self.tails = tails;
+        self
+    }
+
+    /// The parts.
+    pub fn components(&self) -> Components {
+        Components {
+            white: self.white,
+            correlated: self.correlated,
+            length: self.length,
+            shift: self.shift,
+        }
+    }
+
+    /// Noise of all readings of a model.
+    pub(crate) fn draw(&self, model: &AnyModel, random: &mut ChaCha8Rng) -> DVector<f64> {
+        self.components().draw_all(model, random)
+    }
+
+    /// Noise of all readings for a draw of the null law: by a law that the readings allow, with
+    /// the tails of the readings, its spikes pulled in.
+    pub(crate) fn draw_possible(
+        &self,
+        model: &AnyModel,
+        spikes: &Spikes,
+        draw: usize,
+        random: &mut ChaCha8Rng,
+    ) -> DVector<f64> {
+        let law = self.possible(draw, random);
+        let Some((tails, student)) = self
+            .tails
+            .and_then(|t| Some((t, StudentT::new(t.freedom).ok()?)))
+        else {
+            return law.draw_all(model, random);
+        };
+        let scale = (law.white / tails.variance).sqrt();
+        let mut noise = Components { white: 0.0, ..law }.draw_all(model, random);
+        for value in noise.iter_mut() {
+            *value += scale * student.sample(random);
+        }
+        spikes.pull_in(&mut noise);
+        noise
+    }
+
+    /// A law that the readings allow.
+    pub(crate) fn possible(&self, draw: usize, random: &mut ChaCha8Rng) -> Components {
+        match self.possible.get(draw % self.possible.len().max(1)) {
+            Some(law) => *law,
+            None => self.rescaled(random),
+        }
+    }
+
+    /// The white variance drawn from what its degrees of freedom allow.
+    fn rescaled(&self, random: &mut ChaCha8Rng) -> Components {
+        let mut law = self.components();
+        if let (true, Ok(chi)) = (self.freedom < 1e6, ChiSquared::new(self.freedom)) {
+            law.white *= self.freedom / chi.sample(random);
+        }
+        law
+    }
+
+    /// Standard deviation of one reading.
+    pub fn sigma(&self) -> f64 {
+        self.components().whole().sqrt()
+    }
+
+    /// Covariance of the readings of one trace.
+    pub fn covariance(&self, positions: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_fn(positions.len(), positions.len(), |i, j| {
+            let apart = (positions[i] - positions[j]).abs();
+            let same = if i == j { self.white } else { 0.0 };
+            same + self.correlated * (-apart / self.length).exp() + self.shift
+        })
+    }
+}
+
+/// A draw of the scatter that the model expects beside the noise.
+pub(crate) fn draw_scatter(model: &AnyModel, random: &mut ChaCha8Rng) -> DVector<f64> {
+    let mut scatter = DVector::zeros(model.places().len());
+    for column in model.expected_scatter() {
+        let size: f64 = StandardNormal.sample(random);
+        for (&row, value) in column.rows.iter().zip(&column.values) {
+            scatter[row] += size * value;
+        }
+    }
+    scatter
+}
+
+/// What the repeats say of a single reading's noise where it is stated: standard deviation and
+/// degrees of freedom.
+pub(crate) fn of_repeats(model: &AnyModel, readings: &DVector<f64>) -> Option<(f64, f64)> {
+    let contrasts = Contrasts::new(model.places(), model.traces(), readings);
+    (contrasts.count() >= FEWEST_CONTRASTS).then(|| {
+        let (variance, freedom) = contrasts.scatter();
+        (variance.sqrt(), freedom)
+    })
+}

@@ -1,0 +1,52 @@
+//! A command called by a program.
+
+use std::sync::Arc;
+
+use errsep::cli::call::call;
+use errsep::io::Trouble;
+use errsep::io::source::InMemory;
+
+fn profile(text: &str) -> Vec<InMemory> {
+    vec![InMemory {
+        name: "<data>".to_owned(),
+        bytes: Arc::from(text.as_bytes()),
+    }]
+}
+
+#[test]
+fn a_message_points_into_what_is_in_memory() {
+    let message = call(
+        &["straightness", "<data>"],
+        profile("x,deviation\n0,1\n1,a\n"),
+    )
+    .map(|_| ())
+    .unwrap_err();
+    let place = message.place().unwrap();
+    assert_eq!((place.line, place.column), (3, 3));
+    assert_eq!(place.file.to_str(), Some("<data>"));
+    assert_eq!(message.trouble(), Trouble::BadInput);
+}
+
+#[test]
+fn an_unknown_option_is_told_with_its_hint() {
+    let message = call(&["reversal", "<data>", "--simultaneus"], profile(""))
+        .map(|_| ())
+        .unwrap_err();
+    assert!(message.what().contains("'--simultaneus'"), "{message}");
+    let hint = message.remedy_words().unwrap();
+    assert!(hint.contains("'--simultaneous'"), "{hint}");
+}
+
+#[test]
+fn a_reversal_is_answered_whole() {
+    let readings: String = ["1A", "1B", "2A", "2B"]
+        .iter()
+        .flat_map(|c| (0..9).map(move |i| format!("{c},{i},0.{}\n", i * i % 7)))
+        .collect();
+    let data = format!("channel,x,reading\n{readings}");
+    let called = call(&["reversal", "<data>"], profile(&data)).unwrap();
+    assert!(called.answer.json["tilts"]["alpha"]["std"].is_number());
+    assert!(!called.answer.tables.is_empty());
+    assert!(called.answer.page.render().contains("<svg"));
+    assert_eq!(called.provenance.command, ["reversal", "<data>"]);
+}

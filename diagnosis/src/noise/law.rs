@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::levels::FEWEST_CONTRASTS;
 use crate::noise::contrasts::Contrasts;
+use crate::noise::posterior::Allowed;
 use crate::noise::spikes::{Spikes, Tails};
 
 /// Seed of the laws drawn from the repeats: an estimate must not depend on the user's seed.
@@ -111,6 +112,8 @@ pub struct NoiseLaw {
     possible: Arc<Vec<Components>>,
     /// Heavy tails of the single readings.
     tails: Option<Tails>,
+    /// Logarithm of how likely all laws together make the repeats from which it is learnt, to a constant of their places.
+    pub(crate) log_evidence: Option<f64>,
 }
 
 impl NoiseLaw {
@@ -125,6 +128,7 @@ impl NoiseLaw {
             source,
             possible: Arc::new(Vec::new()),
             tails: None,
+            log_evidence: None,
         }
     }
 
@@ -151,7 +155,7 @@ impl NoiseLaw {
     }
 
     /// The mean of laws drawn from what the repeats allow.
-    pub(crate) fn mean_of(laws: Vec<Components>) -> Self {
+    pub(crate) fn mean_of(Allowed { laws, log_evidence }: Allowed) -> Self {
         let count = laws.len().max(1) as f64;
         let mean = |value: fn(&Components) -> f64| laws.iter().map(value).sum::<f64>() / count;
         let whole = mean(Components::whole);
@@ -175,7 +179,14 @@ impl NoiseLaw {
             source: NoiseSource::Repeats,
             possible: Arc::new(laws),
             tails: None,
+            log_evidence: Some(log_evidence),
         }
+    }
+
+    /// Whether its repeats are likelier than those of another law by more than a logarithm, where both tell.
+    pub(crate) fn is_likelier(&self, other: &Self, by: f64) -> bool {
+        let both = self.log_evidence.zip(other.log_evidence);
+        both.is_some_and(|(own, other)| own - other > by)
     }
 
     /// The law with another white variance, by a factor.

@@ -4,6 +4,7 @@
 pub(super) mod contrasts;
 mod course;
 pub(super) mod dependence;
+pub(super) mod jumps;
 pub(super) mod law;
 pub(super) mod posterior;
 pub(super) mod spikes;

@@ -60,11 +60,18 @@ struct Proposal {
     weight: f64,
 }
 
-/// Laws of noise drawn from what the contrasts allow.
-pub(crate) fn possible_laws(contrasts: &Contrasts, seed: u64) -> Vec<Components> {
-    let Some((spacing, travel)) = contrasts.reach() else {
-        return Vec::new();
-    };
+/// What contrasts allow.
+pub(crate) struct Allowed {
+    /// Laws of noise drawn from their posterior.
+    pub laws: Vec<Components>,
+    /// Logarithm of the probability density of the contrasts under all laws together, to a constant that their number
+    /// and places alone decide.
+    pub log_evidence: f64,
+}
+
+/// Laws of noise drawn from what the contrasts allow, where any can be told.
+pub(crate) fn allowed(contrasts: &Contrasts, seed: u64) -> Option<Allowed> {
+    let (spacing, travel) = contrasts.reach()?;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let range = (spacing.ln(), travel.max(2.0 * spacing).ln());
     let mut proposals: Vec<Proposal> = Vec::new();
@@ -287,7 +294,7 @@ fn spread(mode: &[f64], value: impl Fn(&[f64]) -> f64) -> Option<DMatrix<f64>> {
 }
 
 /// Laws drawn by their weights, each with a white variance drawn from its posterior.
-fn resampled(proposals: &[Proposal], count: f64, random: &mut ChaCha8Rng) -> Vec<Components> {
+fn resampled(proposals: &[Proposal], count: f64, random: &mut ChaCha8Rng) -> Option<Allowed> {
     let top = proposals
         .iter()
         .map(|p| p.weight)
@@ -300,15 +307,13 @@ fn resampled(proposals: &[Proposal], count: f64, random: &mut ChaCha8Rng) -> Vec
             sum
         })
         .collect();
-    let Ok(chi) = ChiSquared::new(count) else {
-        return Vec::new();
-    };
+    let chi = ChiSquared::new(count).ok()?;
     if !sum.is_finite() || sum <= 0.0 {
-        return Vec::new();
+        return None;
     }
     // Systematic resampling: the only chance is where it begins.
     let begin: f64 = random.random();
-    (0..LAWS)
+    let laws = (0..LAWS)
         .map(|k| {
             let at = (k as f64 + begin) / LAWS as f64 * sum;
             let chosen = cumulative
@@ -325,7 +330,11 @@ fn resampled(proposals: &[Proposal], count: f64, random: &mut ChaCha8Rng) -> Vec
                 shift: white * ratios.shift,
             }
         })
-        .collect()
+        .collect();
+    Some(Allowed {
+        laws,
+        log_evidence: top + sum.ln(),
+    })
 }
 
 #[cfg(test)]
@@ -377,7 +386,7 @@ mod tests {
             ];
             let mut held = [0; 3];
             for seed in 0..40 {
-                let laws = possible_laws(&contrasts(&law, seed), seed);
+                let laws = allowed(&contrasts(&law, seed), seed).unwrap().laws;
                 assert_eq!(laws.len(), LAWS);
                 for (count, measure) in held.iter_mut().zip(measures) {
                     let mut values: Vec<f64> = laws.iter().map(measure).collect();

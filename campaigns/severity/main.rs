@@ -162,6 +162,8 @@ fn outcome(maker: &Maker, effect: &str, smallest: f64, told: &Told, seed: u64) -
             said.push(format!("{effect} weak by what is left"));
         } else if severity.beside_others {
             said.push(format!("{effect} weak as one of several"));
+        } else if severity.jump_beside {
+            said.push(format!("{effect} weak by a jump"));
         }
     }
     if wrong {

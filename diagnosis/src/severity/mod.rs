@@ -27,6 +27,7 @@ use statrs::distribution::{Beta, ContinuousCDF};
 
 use crate::attribution::confidence::Answer;
 use crate::attribution::context::Context;
+use crate::detection::estimate::jumps_instead;
 use crate::detection::null::BATCH;
 use crate::levels::{STRONG, SURE, SUSPECT};
 use crate::noise::dependence::Dependence;
@@ -44,6 +45,9 @@ pub(crate) const TOGETHER: &str =
     "each of several causes is judged alone, and what they may imitate together is not known";
 /// Why no name is strong where the noise is not independent.
 pub(crate) const NO_NOISE: &str = "what differs from repeat to repeat is not independent noise";
+/// Why no name is strong beside which the repeats are likelier with a jump.
+pub(crate) const JUMP: &str =
+    "something that jumps would make the repeats more alike than what is named does";
 /// Rivals that a line tells.
 const TOLD: usize = 3;
 
@@ -52,7 +56,7 @@ const TOLD: usize = 3;
 #[serde(rename_all = "lowercase")]
 pub enum Confidence {
     /// The lower limit of the severity is 0.95 or more, what the cause leaves is such as noise leaves, what differs between
-    /// repeats is noise too, and it is named alone.
+    /// repeats is noise too and no likelier with a jump, and it is named alone.
     Strong,
     /// It is not.
     Weak,
@@ -73,8 +77,10 @@ pub struct Severity {
     pub beside_others: bool,
     /// Whether what differs between repeats is not independent noise.
     pub dependent_noise: bool,
-    /// Strong where the lower limit reaches 0.95, `left` is above 0.05, no cause is named beside it and the noise is
-    /// that of independent readings.
+    /// Whether jumps, each at some moment and of whatever kind, would make the repeats likelier than what is named does.
+    pub jump_beside: bool,
+    /// Strong where the lower limit reaches 0.95, `left` is above 0.05, no cause is named beside it, the noise is
+    /// that of independent readings and no jump does better.
     pub confidence: Confidence,
     /// The families of rivals, the greatest probability first.
     pub rivals: Vec<Rival>,
@@ -138,6 +144,7 @@ impl Severity {
                 percent(self.left)
             ),
             Confidence::Weak if self.dependent_noise => format!("weak, as {NO_NOISE}"),
+            Confidence::Weak if self.jump_beside => format!("weak, as {JUMP}"),
             Confidence::Weak if !self.is_weak_by_rivals() => format!("weak, as {TOGETHER}"),
             Confidence::Weak => "weak".to_owned(),
         };
@@ -196,10 +203,14 @@ pub(crate) fn severities(
 ) -> Vec<Severity> {
     let grounds = Grounds::of(context);
     let left = context.chance_beside(readings, &answer.causes);
+    let clean = context
+        .changes(readings, &answer.causes)
+        .map(|changes| context.without(readings, &answer.causes, &changes));
     let beside = Beside {
         left,
         several: answer.causes.len() > 1,
         dependent_noise: dependence.is_seen(),
+        jump: clean.is_some_and(|clean| jumps_instead(context.model, readings, &clean)),
     };
     Name::all(context, readings, answer, options.false_alarm)
         .iter()
@@ -214,6 +225,7 @@ struct Beside {
     left: f64,
     several: bool,
     dependent_noise: bool,
+    jump: bool,
 }
 
 /// The severity of one name.
@@ -243,10 +255,12 @@ fn severity(
         left: beside.left,
         beside_others: beside.several,
         dependent_noise: beside.dependent_noise,
+        jump_beside: beside.jump,
         confidence: if lower >= STRONG
             && beside.left > SUSPECT
             && !beside.several
             && !beside.dependent_noise
+            && !beside.jump
         {
             Confidence::Strong
         } else {

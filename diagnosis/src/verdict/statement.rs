@@ -3,7 +3,7 @@
 use crate::attribution::reported::{Candidate, ParameterOut};
 use crate::levels::MOSTLY;
 use crate::planning::splitting::Split;
-use crate::severity::{Confidence, NO_NOISE, Severity, TOGETHER};
+use crate::severity::{Confidence, JUMP, NO_NOISE, Severity, TOGETHER};
 use crate::verdict::told::for_people;
 use crate::verdict::types::{Fingerprint, Gap, Hidden, Kind, NoiseOut, Verdict, Where};
 use errsep_models::number::{percent, plain, probability};
@@ -246,6 +246,9 @@ fn weakness(verdict: &Verdict) -> String {
     }
     if of_any(|s| s.dependent_noise) {
         each.push(NO_NOISE.to_owned());
+    }
+    if of_any(|s| s.jump_beside) {
+        each.push(JUMP.to_owned());
     }
     if each.is_empty() {
         String::new()

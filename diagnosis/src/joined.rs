@@ -84,8 +84,10 @@ pub struct JoinedEffect {
 pub struct JoinedGap {
     /// Unit of the readings.
     pub unit: &'static str,
-    /// Standard deviation of one reading.
+    /// Standard deviation of one reading, or of the mean of those that each is gathered from.
     pub noise: f64,
+    /// How many those are.
+    pub readings_in_each: f64,
     /// Without them.
     pub before: Size,
     /// With them.
@@ -339,6 +341,7 @@ fn told(
         gap: JoinedGap {
             unit: context.model.reading_unit(),
             noise: context.law.sigma(),
+            readings_in_each: context.model.readings_in_each(),
             before,
             after,
             shrink: shrink(before.rms, after.rms),

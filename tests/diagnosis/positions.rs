@@ -230,6 +230,9 @@ fn stated_noise_is_that_of_one_reading() {
     let diagnosis = diagnose(&model, &Options::default());
     // Rounding of the square root.
     assert!((diagnosis.noise.white * each.sqrt() / NOISE - 1.0).abs() < 1e-12);
+    assert!((diagnosis.gap.readings_in_each - each).abs() < f64::EPSILON);
+    let of_what = diagnosis.gap.of_what();
+    assert!(of_what.starts_with("a mean of "), "{of_what}");
     assert!(
         diagnosis
             .verdict

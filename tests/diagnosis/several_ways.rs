@@ -11,14 +11,9 @@ use rayon::prelude::*;
 const POSITIONS: usize = 60;
 
 fn diagnosed(readings: &Observations) -> Diagnosis {
-    told(readings, Options::default().severity)
-}
-
-fn told(readings: &Observations, severity: usize) -> Diagnosis {
     let model = Linearised::new(readings, Assumptions::default()).unwrap();
     let options = Options {
         draws: 200,
-        severity,
         ..Options::default()
     };
     diagnose(&model, &options)
@@ -166,13 +161,13 @@ fn a_lag_that_begins_anew_in_each_pass_is_named() {
     );
 }
 
-/// By the indicator that has it; counted, at least 8 of 12 (10 when it was written): of a rate of 90 % fewer come once in
-/// two hundred. What it will do in a further measurement hangs on what comes before there.
+/// By the indicator that has it; counted, at least 3 of 6 (4 when it was written, 10 of 12 with six more): of a rate of 90 %
+/// fewer come once in a thousand. What it will do in a further measurement hangs on what comes before there.
 #[test]
 fn a_plunger_that_sticks_is_named_and_not_predicted() {
-    let named = (101..113u64).into_par_iter().filter(|seed| {
+    let named = (101..107u64).into_par_iter().filter(|seed| {
         let readings = measured("sticking-plunger", 0, 1.2, *seed, 120).unwrap();
-        let diagnosis = told(&readings, 0);
+        let diagnosis = diagnosed(&readings);
         if diagnosis.verdict.effects != ["sticking-plunger"] {
             let said = &diagnosis.verdict.statement;
             assert_eq!(diagnosis.verdict.kind, Kind::Unknown, "{seed}: {said}");
@@ -190,7 +185,7 @@ fn a_plunger_that_sticks_is_named_and_not_predicted() {
         true
     });
     let named = named.count();
-    assert!(named >= 8, "{named}");
+    assert!(named >= 3, "{named}");
 
     let readings = measured("sticking-plunger", 0, 1.2, 102, 120).unwrap();
     let model = Linearised::new(&readings, Assumptions::default()).unwrap();

@@ -150,6 +150,7 @@ impl<'a> Told<'a> {
         let measured = Measured {
             unit: context.model.reading_unit(),
             noise: context.law.sigma(),
+            readings_in_each: context.model.readings_in_each(),
             before,
             after: meter.size(&(readings - &self.change), unknowns),
             predicted_shrink: if before.rms > 0.0 {

@@ -17,8 +17,10 @@ use crate::verdict::types::{Gap, Kind};
 pub(crate) struct Measured {
     /// Unit of the readings.
     pub unit: &'static str,
-    /// Standard deviation of one reading.
+    /// Standard deviation of one reading, or of the mean of those that each is gathered from.
     pub noise: f64,
+    /// How many those are.
+    pub readings_in_each: f64,
     /// Without the causes.
     pub before: Size,
     /// With them.
@@ -43,6 +45,7 @@ impl Conclusion {
         let Measured {
             unit,
             noise,
+            readings_in_each,
             before,
             after,
             predicted_shrink,
@@ -74,6 +77,7 @@ impl Conclusion {
             gap: Gap {
                 unit,
                 noise,
+                readings_in_each,
                 before: told(before),
                 after: told(after),
                 shrink: shrunk,

@@ -80,9 +80,14 @@ fn nothing(gap: &Gap, hidden: &[Hidden]) -> String {
         }
     };
     format!(
-        "No significant misfit at a noise of {} {}{}{}.",
+        "No significant misfit at a noise of {} {}{}{}{}.",
         gap.noise_figure(),
         for_people(gap.unit),
+        if gap.is_of_means() {
+            format!(" in {}", gap.of_what())
+        } else {
+            String::new()
+        },
         said(false, "not show in such readings whatever their size"),
         said(true, "show only at sizes that are not plausible")
     )

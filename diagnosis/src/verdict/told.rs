@@ -4,6 +4,7 @@ use errsep_models::model::{AnyModel, FittedModel};
 
 use crate::attribution::reported::ParameterOut;
 use crate::attribution::shrink::Size;
+use crate::joined::JoinedGap;
 use crate::levels::DEPENDENT;
 use crate::noise::dependence::Dependence;
 use crate::verdict::types::Gap;
@@ -11,6 +12,8 @@ use errsep_models::number::{measured, percent, plain};
 
 /// Digits of a gap.
 const DIGITS: usize = 3;
+/// Readings behind each, in the mean, up to which most stand alone.
+const ABOUT_ONE: f64 = 1.5;
 
 /// A value with its standard uncertainty in the unit it is shown in.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,10 +96,38 @@ impl Size {
 }
 
 impl Gap {
-    /// The noise of one reading, without a unit.
+    /// Its noise, without a unit.
     #[must_use]
     pub fn noise_figure(&self) -> String {
         plain(self.noise, DIGITS)
+    }
+
+    /// Of what it is the noise: one reading, or a mean of several.
+    #[must_use]
+    pub fn of_what(&self) -> String {
+        of_what(self.readings_in_each)
+    }
+
+    /// Whether it is that of means.
+    #[must_use]
+    pub fn is_of_means(&self) -> bool {
+        self.readings_in_each > ABOUT_ONE
+    }
+}
+
+impl JoinedGap {
+    /// The same.
+    #[must_use]
+    pub fn of_what(&self) -> String {
+        of_what(self.readings_in_each)
+    }
+}
+
+fn of_what(readings: f64) -> String {
+    if readings > ABOUT_ONE {
+        format!("a mean of {} readings", plain(readings, 2))
+    } else {
+        "one reading".to_owned()
     }
 }
 

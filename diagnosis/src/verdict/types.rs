@@ -115,8 +115,10 @@ pub struct Nearest {
 pub struct Gap {
     /// Unit of the readings.
     pub unit: &'static str,
-    /// Standard deviation of one reading.
+    /// Standard deviation of one reading, or of the mean of those that each is gathered from.
     pub noise: f64,
+    /// How many those are.
+    pub readings_in_each: f64,
     /// What the model misses.
     pub before: Size,
     /// What it still misses with the effects.

@@ -77,6 +77,7 @@ trait Behind: Send + Sync {
     fn expected_scatter(&self) -> &[Column];
     fn rounding(&self) -> f64;
     fn stated_noise(&self) -> Option<f64>;
+    fn readings_in_each(&self) -> f64;
     fn noise_allowance(&self) -> f64;
     fn repeats_are_alike(&self) -> bool;
     fn refit(&self, observed: DVector<f64>) -> Box<dyn Behind>;
@@ -154,6 +155,9 @@ impl<M: FittedModel + 'static> Behind for M {
     }
     fn stated_noise(&self) -> Option<f64> {
         FittedModel::stated_noise(self)
+    }
+    fn readings_in_each(&self) -> f64 {
+        FittedModel::readings_in_each(self)
     }
     fn noise_allowance(&self) -> f64 {
         FittedModel::noise_allowance(self)
@@ -251,6 +255,9 @@ impl FittedModel for AnyModel {
     }
     fn stated_noise(&self) -> Option<f64> {
         self.0.stated_noise()
+    }
+    fn readings_in_each(&self) -> f64 {
+        self.0.readings_in_each()
     }
     fn noise_allowance(&self) -> f64 {
         self.0.noise_allowance()

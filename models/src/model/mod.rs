@@ -311,6 +311,11 @@ pub trait FittedModel: Clone + Send + Sync {
         None
     }
 
+    /// Readings of which each that is diagnosed is the mean.
+    fn readings_in_each(&self) -> f64 {
+        1.0
+    }
+
     /// By how much the white variance of what traces have in common exceeds what their differences show:
     /// more than one where readings are not each of their own.
     fn noise_allowance(&self) -> f64 {

@@ -237,10 +237,11 @@ fn in_words(fit: &Joined, statement: &str) -> String {
     let mut text = format!("{statement}\n\n");
     let _ = writeln!(
         text,
-        "Gap, {} RMS           {} -> {}   noise of one reading {}",
+        "Gap, {} RMS           {} -> {}   noise of {} {}",
         for_people(gap.unit),
         gap.before.figures(),
         gap.after.figures(),
+        gap.of_what(),
         number(gap.noise)
     );
     if let Some(held) = gap.held_out {

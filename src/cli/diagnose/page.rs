@@ -27,6 +27,7 @@ pub fn view(data: String, model: &AnyModel, along: &str, diagnosis: &Diagnosis) 
         gap: sheet::Gap {
             unit: for_people(gap.unit).to_owned(),
             noise: gap.noise,
+            of_what: gap.of_what(),
             before: size(gap.before),
             after: size(gap.after),
             shrink: gap.shrink,
@@ -71,6 +72,7 @@ pub(super) fn of_fit(data: String, model: &AnyModel, along: &str, fit: &Joined) 
         gap: sheet::Gap {
             unit: for_people(gap.unit).to_owned(),
             noise: gap.noise,
+            of_what: gap.of_what(),
             before: size(gap.before),
             after: size(gap.after),
             shrink: gap.shrink,

@@ -38,9 +38,10 @@ pub fn in_words(diagnosis: &Diagnosis) -> String {
     };
     let _ = writeln!(
         text,
-        "Gap, {} RMS           {}{after}   noise of one reading {}",
+        "Gap, {} RMS           {}{after}   noise of {} {}",
         for_people(gap.unit),
         gap.before.figures(),
+        gap.of_what(),
         gap.noise_figure()
     );
     if let Some(held) = gap.held_out.filter(|_| taken_out) {

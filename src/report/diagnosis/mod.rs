@@ -82,7 +82,7 @@ fn gap(view: &View) -> Section {
     let mut figures = vec![
         size("Gap before", &gap.before),
         size("Gap after", &gap.after),
-        KeyFigure::new("Noise of one reading", gap.noise, unit()).digits(3),
+        KeyFigure::new(format!("Noise of {}", gap.of_what), gap.noise, unit()).digits(3),
     ];
     if view.taken_out.is_empty() {
         figures.remove(1);
@@ -114,7 +114,7 @@ fn gap(view: &View) -> Section {
         "How far the gap shrinks",
         "What the model misses with the noise of the readings taken out, without and with the \
          effects found. Held-out repeats took no part in finding or fitting them.",
-        bars.rule(gap.noise, "noise of one reading"),
+        bars.rule(gap.noise, format!("noise of {}", gap.of_what)),
     ))
 }
 

@@ -78,8 +78,10 @@ pub struct Size {
 pub struct Gap {
     /// Unit of the readings, as people write it.
     pub unit: String,
-    /// Standard deviation of one reading.
+    /// The noise.
     pub noise: f64,
+    /// Of what: `one reading`, or a mean of several.
+    pub of_what: String,
     /// Without the effects.
     pub before: Size,
     /// With them.

@@ -157,9 +157,12 @@ impl FittedModel for Linearised {
     }
 
     fn stated_noise(&self) -> Option<f64> {
-        // That of one reading: what is gathered is a mean of so many.
-        let readings = self.gathered.as_ref().map_or(1.0, |g| g.readings_per_cell);
-        self.assumptions.noise.map(|noise| noise / readings.sqrt())
+        let of_one = self.assumptions.noise;
+        of_one.map(|noise| noise / self.readings_in_each().sqrt())
+    }
+
+    fn readings_in_each(&self) -> f64 {
+        self.gathered.as_ref().map_or(1.0, |g| g.readings_per_cell)
     }
 
     /// Of n readings of a mean a part f was put in: (1 − f)n tell it, and those put in add a remainder each,

@@ -24,7 +24,7 @@ use crate::noise::dependence::Dependence;
 use crate::noise::spikes::calmed;
 use crate::options::Options;
 use crate::search::Reach;
-use crate::verdict::told::no_noise;
+use crate::verdict::told::{no_noise, of_what};
 use crate::verdict::types::NoiseOut;
 
 /// Fits of noise and state without the effects: the second begins with sizes that are nearly right.
@@ -98,6 +98,14 @@ pub struct JoinedGap {
     pub held_out: Option<HeldOut>,
     /// Probability that as much would stand out of what remains with nothing else there.
     pub remains_p: f64,
+}
+
+impl JoinedGap {
+    /// Of what `noise` is: one reading, or a mean of several.
+    #[must_use]
+    pub fn of_what(&self) -> String {
+        of_what(self.readings_in_each)
+    }
 }
 
 /// A profile of the answer.

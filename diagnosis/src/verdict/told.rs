@@ -4,7 +4,6 @@ use errsep_models::model::{AnyModel, FittedModel};
 
 use crate::attribution::reported::ParameterOut;
 use crate::attribution::shrink::Size;
-use crate::joined::JoinedGap;
 use crate::levels::DEPENDENT;
 use crate::noise::dependence::Dependence;
 use crate::verdict::types::Gap;
@@ -115,15 +114,7 @@ impl Gap {
     }
 }
 
-impl JoinedGap {
-    /// The same.
-    #[must_use]
-    pub fn of_what(&self) -> String {
-        of_what(self.readings_in_each)
-    }
-}
-
-fn of_what(readings: f64) -> String {
+pub(crate) fn of_what(readings: f64) -> String {
     if readings > ABOUT_ONE {
         format!("a mean of {} readings", plain(readings, 2))
     } else {

@@ -15,6 +15,7 @@ mod four_sensor;
 mod fourier;
 mod joined;
 mod machine;
+mod moments;
 mod positioning;
 mod reversal;
 mod staged;
@@ -48,6 +49,7 @@ const ROOMS: &[Room] = &[
     ("anova", 2000, anova::rows),
     ("calibration-line", 2000, calibration_line::rows),
     ("diagnosis", 60, diagnosis::rows),
+    ("moments", 400, moments::rows),
 ];
 
 fn main() -> ExitCode {

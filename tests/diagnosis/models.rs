@@ -7,6 +7,8 @@ use errsep_models::calibration_line::simulate::{CalibrationSimulation, Disturban
 use errsep_models::calibration_line::{CalibrationLine, CalibrationReading};
 use errsep_models::circle::{self, CirclePoints, CircleSimulation, Point};
 use errsep_models::model::FittedModel;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 fn options(without: &[&str]) -> Options {
     Options {
@@ -424,8 +426,40 @@ fn a_part_that_slips_within_a_pass_is_told_with_its_moment() {
     }
 }
 
+/// *k·u*, two: of a part that slips at a moment and in a direction at random the moment lies within twice its printed
+/// uncertainty. Of thirty at 95 % fewer than 26 do in one case of a hundred; the spacing of the points alone held 19 of 28.
+#[test]
+fn the_moment_of_a_slip_is_as_sure_as_it_is_told() {
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let mut told = Vec::new();
+    for seed in 0..30 {
+        let mut points = circle_points_of(4, 1000 * (seed + 1));
+        let first = random.random_range(60..228);
+        let along = random.random_range(0.0..std::f64::consts::TAU);
+        for (point, _) in points.iter_mut().skip(first) {
+            point.x += 5e-3 * along.cos();
+            point.y += 5e-3 * along.sin();
+        }
+        let found = diagnose(&CirclePoints::new(&points, None).unwrap(), &options(&[]));
+        if found.verdict.effects != ["part-moved"] {
+            continue;
+        }
+        let own = found.candidates.iter().find(|c| c.effect == "part-moved");
+        let moment = own.and_then(|c| c.parameters.iter().find(|p| p.name == "time"));
+        told.extend(moment.map(|m| (m.value - (first as f64 - 0.5)).abs() <= 2.0 * m.std));
+    }
+    let within = told.iter().filter(|within| **within).count();
+    assert!(told.len() >= 24, "{} of 30 named", told.len());
+    assert!(within + 4 >= told.len(), "{within} of {}", told.len());
+}
+
 /// Passes of 72 points with 1 µm of noise.
 fn circle_points(passes: usize) -> Vec<(Point, u32)> {
+    circle_points_of(passes, 0)
+}
+
+/// The same of another seed.
+fn circle_points_of(passes: usize, seed: u64) -> Vec<(Point, u32)> {
     let what = |pass| CircleSimulation {
         count: 72,
         noise_um: 1.0,
@@ -434,7 +468,7 @@ fn circle_points(passes: usize) -> Vec<(Point, u32)> {
     };
     (0..passes)
         .flat_map(|pass| {
-            let points = circle::simulate_disturbed(&what(pass), &[], pass as u64).unwrap();
+            let points = circle::simulate_disturbed(&what(pass), &[], seed + pass as u64).unwrap();
             points.into_iter().map(move |p| (p, pass as u32 + 1))
         })
         .collect()

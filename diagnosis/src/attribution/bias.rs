@@ -210,7 +210,7 @@ impl Taken {
                 let used = sizes.amplitudes.rows(first, cause.columns.len());
                 let effect = &context.catalogue[cause.effect];
                 let mut slope = DVector::zeros(readings.len());
-                if let Some((low, high, apart)) = beside(cause, j) {
+                if let Some((low, high, apart)) = beside(context, cause, j) {
                     for (shape, sign) in [(low, -1.0), (high, 1.0)] {
                         let columns = effect.columns(context.model, &shape);
                         for (column, amplitude) in columns.iter().zip(used.iter()) {

@@ -103,7 +103,7 @@ fn fitted_alone(
     causes: &[Cause],
     which: usize,
 ) -> Option<Vec<Estimate>> {
-    let sizes = Sizes::fitted(context, readings, causes)?;
+    let sizes = Sizes::fitted(context, readings, causes)?.with_moments(context, readings, causes);
     Some(sizes.of(context, causes, which))
 }
 

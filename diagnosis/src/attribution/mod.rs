@@ -14,6 +14,7 @@ pub(super) mod examined;
 mod fewer;
 pub(super) mod limits;
 pub(super) mod mixing;
+mod moments;
 mod other_shapes;
 pub(super) mod outweighed;
 pub(super) mod refine;

@@ -19,6 +19,7 @@ use rayon::prelude::*;
 
 use crate::attribution::context::{Cause, Context};
 use crate::attribution::doubt::{ROUNDS, StateDraws};
+use crate::attribution::moments::Moment;
 
 /// What the noise of the state may take away of a variance, at most: it is known from draws.
 const LEAST: f64 = -0.5;
@@ -29,6 +30,9 @@ const AT_REST: f64 = 1e-3;
 /// Part of a shape's step over which a derivative is taken, either way: where a signature jumps between two readings
 /// a longer one would count the jump as known to less than their distance.
 const SLOPE: f64 = 1e-3;
+
+/// Part of the time between two readings that is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Amplitudes and shapes of causes fitted together.
 pub(crate) struct Sizes {
@@ -42,6 +46,8 @@ pub(crate) struct Sizes {
     pub parameters: Vec<Unknown>,
     /// Draws of the state, where signatures depend on it.
     pub draws: Option<Arc<StateDraws>>,
+    /// The moment of each cause that begins at one and its standard uncertainty, once they are worked out.
+    moments: Vec<Option<(f64, f64)>>,
 }
 
 /// One parameter of several causes.
@@ -74,6 +80,7 @@ impl Sizes {
             covariance,
             parameters,
             draws: None,
+            moments: vec![None; causes.len()],
         })
     }
 
@@ -148,7 +155,37 @@ impl Sizes {
                 DVector::from_iterator(sizes.parameters.len(), sizes.parameters.iter().map(spread));
             sizes.covariance.ger(1.0, &spread, &spread, 1.0);
         }
-        Some(sizes)
+        Some(sizes.with_moments(context, readings, causes))
+    }
+
+    /// The same with how well the moments are known at which causes begin, and what that leaves open of their sizes.
+    pub fn with_moments(
+        mut self,
+        context: &Context<'_>,
+        readings: &DVector<f64>,
+        causes: &[Cause],
+    ) -> Self {
+        for which in 0..causes.len() {
+            let of = |unknown: Unknown| self.parameters.iter().position(|p| *p == unknown);
+            let within =
+                of(Unknown::Shape(which, 0)).map(|at| self.covariance[(at, at)].max(0.0).sqrt());
+            let Some(moment) = Moment::of(context, readings, (causes, which), within) else {
+                continue;
+            };
+            let count = causes[which].projected.ncols();
+            let places: Vec<Option<usize>> = (0..count)
+                .map(|k| of(Unknown::Amplitude(which, k)))
+                .collect();
+            for (i, row) in places.iter().enumerate() {
+                for (j, column) in places.iter().enumerate() {
+                    if let (Some(row), Some(column)) = (row, column) {
+                        self.covariance[(*row, *column)] += moment.added[(i, j)];
+                    }
+                }
+            }
+            self.moments[which] = Some((moment.value, moment.std));
+        }
+        self
     }
 
     /// What is reported of one of the causes.
@@ -175,17 +212,9 @@ impl Sizes {
             &self.amplitudes.as_slice()[first..first + count],
             &covariance,
         );
-        // Shape parameters follow the amplitudes. A step between two readings has no derivative.
-        for (estimate, own) in estimates
-            .iter_mut()
-            .skip(count)
-            .zip(effect.resolution(context.model, shape))
-        {
-            estimate.std = if estimate.std.is_nan() {
-                own
-            } else {
-                estimate.std.hypot(own)
-            };
+        // Shape parameters follow the amplitudes; a moment is the only one of its cause.
+        if let (Some(moment), Some(estimate)) = (self.moments[which], estimates.get_mut(count)) {
+            (estimate.value, estimate.std) = moment;
         }
         estimates
     }
@@ -214,7 +243,7 @@ fn instruments(
             columns.push(column.clone_owned());
         }
         for j in 0..cause.shape.values.len() {
-            let Some((low, high, apart)) = beside(cause, j) else {
+            let Some((low, high, apart)) = beside(context, cause, j) else {
                 continue;
             };
             let at =
@@ -232,18 +261,34 @@ fn instruments(
     (DMatrix::from_columns(&columns), parameters)
 }
 
-/// The shapes on either side of a cause's along one of its free parameters, and how far apart.
-pub(crate) fn beside(cause: &Cause, parameter: usize) -> Option<(Shape, Shape, f64)> {
+/// The shapes on either side of a cause's along one of its free parameters, and how far apart: where it begins at a
+/// moment between the readings about it, as at a reading the signature steps.
+pub(crate) fn beside(
+    context: &Context<'_>,
+    cause: &Cause,
+    parameter: usize,
+) -> Option<(Shape, Shape, f64)> {
     let step = *cause.shape.steps.get(parameter)?;
     if step == 0.0 {
         return None;
     }
-    let moved = |sign: f64| {
+    let here = cause.shape.values[parameter];
+    let (mut low, mut high) = (here - SLOPE * step, here + SLOPE * step);
+    let moments = context.catalogue[cause.effect].moments(context.model, &cause.shape);
+    let after = moments.partition_point(|m| *m <= here);
+    if let (Some(from), Some(until)) = (
+        after.checked_sub(1).map(|before| moments[before]),
+        moments.get(after),
+    ) {
+        low = low.max(from);
+        high = high.min(until - ROUNDING * (until - from));
+    }
+    let at = |value: f64| {
         let mut shape = cause.shape.clone();
-        shape.values[parameter] += sign * SLOPE * step;
+        shape.values[parameter] = value;
         shape
     };
-    Some((moved(-1.0), moved(1.0), 2.0 * SLOPE * step))
+    (high > low).then(|| (at(low), at(high), high - low))
 }
 
 /// The whitened, projected change by causes of given amplitudes, at the state that is left without

@@ -94,7 +94,7 @@ pub(super) fn derivatives(
             let cause = &causes[which];
             let used = amplitudes.rows(first_amplitude(causes, which), cause.columns.len());
             let mut slope = DVector::zeros(readings);
-            if let Some((low, high, apart)) = beside(cause, j) {
+            if let Some((low, high, apart)) = beside(context, cause, j) {
                 for (shape, sign) in [(low, -1.0), (high, 1.0)] {
                     let columns = context.catalogue[cause.effect].columns(context.model, &shape);
                     for (column, amplitude) in columns.iter().zip(used.iter()) {

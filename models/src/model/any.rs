@@ -390,8 +390,8 @@ impl<M: FittedModel + 'static> Effect<AnyModel> for AnyEffect<M> {
     ) -> Option<DVector<f64>> {
         self.0.restored(model.known(), shape, readings, clean)
     }
-    fn resolution(&self, model: &AnyModel, shape: &Shape) -> Vec<f64> {
-        self.0.resolution(model.known(), shape)
+    fn moments(&self, model: &AnyModel, shape: &Shape) -> Vec<f64> {
+        self.0.moments(model.known(), shape)
     }
     fn variant_name(&self, model: &AnyModel, shape: &Shape) -> Option<String> {
         self.0.variant_name(model.known(), shape)

@@ -263,9 +263,9 @@ pub trait Effect<M>: Send + Sync {
         None
     }
 
-    /// The standard uncertainty that the spacing of the readings leaves in each shape parameter,
-    /// where the signature changes by steps.
-    fn resolution(&self, _model: &M, _shape: &Shape) -> Vec<f64> {
+    /// Of an effect that begins at a moment, its only shape parameter, and lasts: the moments of the readings, ascending,
+    /// between which it may begin. Its signature is the same from one of them to the next.
+    fn moments(&self, _model: &M, _shape: &Shape) -> Vec<f64> {
         Vec::new()
     }
 

@@ -30,12 +30,8 @@ impl Moments {
             .collect()
     }
 
-    /// Standard uncertainty that the spacing of the readings leaves in a moment.
-    pub fn resolution(&self, moment: f64) -> f64 {
-        let right = self.0.partition_point(|m| *m <= moment);
-        match (right.checked_sub(1), self.0.get(right)) {
-            (Some(left), Some(after)) => (after - self.0[left]) / 12f64.sqrt(),
-            _ => f64::NAN,
-        }
+    /// The moments themselves.
+    pub fn all(self) -> Vec<f64> {
+        self.0
     }
 }

@@ -61,10 +61,9 @@ impl Effect<CirclePoints> for PartMoved {
         })
     }
 
-    fn resolution(&self, model: &CirclePoints, shape: &Shape) -> Vec<f64> {
-        let moments = Moments::of(model.places().iter());
-        let of = |moment: &f64| moments.resolution(*moment);
-        shape.values.iter().map(of).collect()
+    fn moments(&self, model: &CirclePoints, shape: &Shape) -> Vec<f64> {
+        let of = |_: &f64| Moments::of(model.places().iter()).all();
+        shape.values.first().map_or_else(Vec::new, of)
     }
 
     fn variant_name(&self, model: &CirclePoints, shape: &Shape) -> Option<String> {

@@ -35,10 +35,8 @@ impl Effect<CirclePoints> for ZeroJump {
         Moments::of(model.places().iter()).grid(0, MOST)
     }
 
-    fn resolution(&self, model: &CirclePoints, shape: &Shape) -> Vec<f64> {
-        let moments = Moments::of(model.places().iter());
-        let of = |moment: &f64| moments.resolution(*moment);
-        shape.values.iter().map(of).collect()
+    fn moments(&self, model: &CirclePoints, _shape: &Shape) -> Vec<f64> {
+        Moments::of(model.places().iter()).all()
     }
 
     fn columns(&self, model: &CirclePoints, shape: &Shape) -> Vec<Column> {

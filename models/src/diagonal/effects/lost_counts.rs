@@ -43,10 +43,8 @@ impl Effect<DiagonalRuns> for LostCounts {
             .collect()
     }
 
-    fn resolution(&self, model: &DiagonalRuns, shape: &Shape) -> Vec<f64> {
-        let moments = Moments::of(of_run(model, shape.variant));
-        let of = |moment: &f64| moments.resolution(*moment);
-        shape.values.iter().map(of).collect()
+    fn moments(&self, model: &DiagonalRuns, shape: &Shape) -> Vec<f64> {
+        Moments::of(of_run(model, shape.variant)).all()
     }
 
     fn columns(&self, model: &DiagonalRuns, shape: &Shape) -> Vec<Column> {

@@ -43,10 +43,8 @@ impl Effect<FourSensors> for ZeroJump {
         all.flat_map(of).collect()
     }
 
-    fn resolution(&self, model: &FourSensors, shape: &Shape) -> Vec<f64> {
-        let moments = Moments::of(model.places().iter());
-        let of = |moment: &f64| moments.resolution(*moment);
-        shape.values.iter().map(of).collect()
+    fn moments(&self, model: &FourSensors, _shape: &Shape) -> Vec<f64> {
+        Moments::of(model.places().iter()).all()
     }
 
     fn columns(&self, model: &FourSensors, shape: &Shape) -> Vec<Column> {

@@ -44,10 +44,8 @@ impl Effect<FourierScans> for ZeroJump {
             .collect()
     }
 
-    fn resolution(&self, model: &FourierScans, shape: &Shape) -> Vec<f64> {
-        let moments = Moments::of(of_scan(model, shape.variant));
-        let of = |moment: &f64| moments.resolution(*moment);
-        shape.values.iter().map(of).collect()
+    fn moments(&self, model: &FourierScans, shape: &Shape) -> Vec<f64> {
+        Moments::of(of_scan(model, shape.variant)).all()
     }
 
     fn columns(&self, model: &FourierScans, shape: &Shape) -> Vec<Column> {

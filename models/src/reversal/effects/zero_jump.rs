@@ -97,21 +97,8 @@ impl Effect<Linearised> for ZeroJump {
         vec![column]
     }
 
-    /// The jump lies anywhere between two readings: a rectangle of that width.
-    fn resolution(&self, model: &Linearised, shape: &Shape) -> Vec<f64> {
-        let times = times_of(model, shape.variant);
-        let right = shape
-            .values
-            .first()
-            .map_or(0, |t| times.partition_point(|v| v <= t));
-        let gap = match (
-            right.checked_sub(1).and_then(|k| times.get(k)),
-            times.get(right),
-        ) {
-            (Some(before), Some(after)) => after - before,
-            _ => f64::NAN,
-        };
-        vec![gap / 12f64.sqrt()]
+    fn moments(&self, model: &Linearised, shape: &Shape) -> Vec<f64> {
+        times_of(model, shape.variant)
     }
 
     fn variant_name(&self, model: &Linearised, shape: &Shape) -> Option<String> {

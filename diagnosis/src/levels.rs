@@ -104,6 +104,8 @@ pub(crate) const HOPELESS_PART: f64 = 0.1;
 /// *Limit.* The same part where no cause is adequate: an effect that bends the state may explain half of what
 /// another seems to, until the state is fitted without it.
 pub(crate) const BENT: f64 = 0.5;
+/// *Limit.* So many causes are tried again by [`BENT`].
+pub(crate) const MOST_BENT: usize = 2;
 /// *Quantile*: odds at which one explanation outweighs another. Of two that are d standard deviations apart the
 /// right one is outweighed with the probability Φ(−d/2 − ln(odds)/d), at most 0.12 %.
 pub(crate) const ODDS: f64 = 100.0;

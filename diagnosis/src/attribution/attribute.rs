@@ -146,25 +146,43 @@ impl Search<'_> {
             })
     }
 
-    /// The answer of one cause alone, where two leave nothing and the other is not needed: beside it one may have
-    /// been found that alone was hidden by what it does to the state.
+    /// The answer of one cause less, where several leave nothing and that one is not needed: beside it another may have been
+    /// found that was hidden by what it does to the state. Of three and more each may be such a one, once the state is
+    /// fitted without it.
     fn spared(&self, answer: &Answer) -> Option<Answer> {
         let (context, readings) = (self.context, self.readings);
-        if answer.causes.len() != 2 || !context.adequate(&answer.causes, &answer.remainder) {
+        let count = answer.causes.len();
+        if count < 2 || !context.adequate(&answer.causes, &answer.remainder) {
             return None;
         }
         let judged = self.partial.as_ref();
         let most = answer.remainder.residual.norm_squared() + HOPELESS;
-        (0..answer.causes.len())
-            .map(|k| (k, without(&answer.causes, k)))
-            .filter(|(k, fewer)| {
-                let beside = context.remainder(readings, fewer);
-                context.p_value(&beside, answer.causes[*k].effect) > EARNED
+        let mut fewer: Vec<(f64, Vec<Cause>)> = (0..count)
+            .map(|k| {
+                let fewer = without(&answer.causes, k);
+                let beside = context.remainder(readings, &fewer);
+                (context.p_value(&beside, answer.causes[k].effect), fewer)
             })
-            .map(|(_, fewer)| fewer)
-            .filter(|fewer| !judged.is_some_and(|judged| same(&judged.causes, fewer)))
-            .map(|fewer| confidence_set(context, readings, &fewer))
-            .find(|fewer| fewer.complete && fewer.remainder.residual.norm_squared() < most)
+            .filter(|(p_value, _)| *p_value > EARNED || count > 2)
+            .filter(|(_, fewer)| !judged.is_some_and(|judged| same(&judged.causes, fewer)))
+            .collect();
+        fewer.sort_by(|a, b| b.0.total_cmp(&a.0));
+        fewer.into_iter().find_map(|(p_value, fewer)| {
+            let needed = p_value <= EARNED;
+            let hopeless = if needed { most } else { f64::INFINITY };
+            let fitted = context.relinearised(readings, &fewer, hopeless);
+            if needed && context.misfit(readings, &fitted) > most {
+                return None;
+            }
+            let found = confidence_set(context, readings, &fewer);
+            if found.complete && found.remainder.residual.norm_squared() < most {
+                return Some(found);
+            }
+            if needed || fewer.len() < 2 {
+                return None;
+            }
+            self.spared(&found)
+        })
     }
 }
 
@@ -378,5 +396,69 @@ fn polish(context: &Context<'_>, readings: &DVector<f64>, causes: &mut [Cause], 
         if !changed {
             break;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use errsep_models::model::{AnyModel, FittedModel};
+    use errsep_models::reversal::Channel;
+    use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
+    use errsep_models::reversal::exact_readings::{Injection, Scene, SceneNoise};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::{Search, confidence_set};
+    use crate::attribution::context::Context;
+    use crate::detection::estimate::estimate;
+
+    /// *Simulated truth*, of one seed: of three causes that leave nothing, one of them not needed, the two that are there
+    /// are the answer.
+    #[test]
+    fn what_is_not_needed_of_three_is_left_out() {
+        let noise = SceneNoise {
+            white: 0.1,
+            ..SceneNoise::default()
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let mut scene = Scene::random(60, 4, 1e-5, 2.0, noise, &mut random);
+        scene.effects = vec![
+            Injection::ZeroJump {
+                jump: 1.0,
+                channel: Channel::C1A,
+                time: 20.0,
+            },
+            Injection::ReversalShift(2.0),
+        ];
+        let fitted = Linearised::new(&scene.measured(5), Assumptions::default()).unwrap();
+        let model = AnyModel::new(&fitted);
+        let catalogue = model.effects();
+        let readings = model.linearised();
+        let context = Context::new(&model, &catalogue, estimate(&model, &readings), 100, 1);
+        let first = context.remainder(&readings, &[]);
+        let of = |name: &str| {
+            let effect = catalogue.iter().position(|e| e.name() == name).unwrap();
+            let start = context.start(&first, effect).unwrap().clone();
+            context.cause(&model, effect, start)
+        };
+        let causes = ["zero-jump", "reversal-shift", "local-contamination"].map(of);
+        let all = confidence_set(&context, &readings, &causes);
+        assert!(!all.complete && all.causes.len() == 3);
+        let search = Search {
+            context: &context,
+            readings: &readings,
+            first: &first,
+            begun: &[],
+            partial: None,
+            stalled: false,
+        };
+        let fewer = search.spared(&all).expect("two that pass");
+        let mut names: Vec<&str> = fewer
+            .causes
+            .iter()
+            .map(|c| catalogue[c.effect].name())
+            .collect();
+        names.sort_unstable();
+        assert_eq!(names, ["reversal-shift", "zero-jump"]);
     }
 }

@@ -12,7 +12,7 @@ use crate::attribution::alternatives::{Alternative, alternatives, evidence, grou
 use crate::attribution::context::{Cause, Context};
 use crate::attribution::remainder::Remainder;
 use crate::attribution::standing::stand_together;
-use crate::levels::{BENT, EQUAL_EVIDENCE, FREELY, HOPELESS_PART};
+use crate::levels::{BENT, EQUAL_EVIDENCE, FREELY, HOPELESS_PART, MOST_BENT};
 
 /// Causes that together explain the gap, and those that do it as well.
 pub(crate) struct Answer {
@@ -45,7 +45,7 @@ pub(crate) fn confidence_set(
         } else {
             Vec::new()
         };
-        if members.is_empty() && causes.len() == 1 {
+        if members.is_empty() && causes.len() <= MOST_BENT {
             // What bends the state most is seen least at that state.
             let least = context.misfit(readings, &best);
             members = alternatives(context, readings, (&best, &remainder), k, BENT);

@@ -40,7 +40,8 @@ struct Interval {
 
 impl Moment {
     /// The moment of one of several causes; nothing where it has none. `within` is the standard uncertainty where the
-    /// signature changes within the interval too, as of readings that are means of several.
+    /// signature changes within the interval too, as of readings that are means of several: the interval counts as
+    /// well, as the one mean that says where in it the moment is may be taken for a wrong reading.
     pub fn of(
         context: &Context<'_>,
         readings: &DVector<f64>,
@@ -63,7 +64,6 @@ impl Moment {
             middle(bounds[own])
         };
         here.middle = named;
-        here.length = within.map_or(here.length, |s| here.length.min(s * 12f64.sqrt()));
         let sizes = here.amplitudes.clone();
         let all = beside_best(&seen, cause, &bounds, (own, here));
         let best = all
@@ -72,7 +72,7 @@ impl Moment {
             .fold(f64::NEG_INFINITY, f64::max);
         let weight = |i: &Interval| i.length * (0.5 * (i.statistic - best)).exp();
         let whole: f64 = all.iter().map(weight).sum();
-        let mut square = 0.0;
+        let mut square = within.map_or(0.0, |std| std * std);
         let mut added = DMatrix::zeros(sizes.len(), sizes.len());
         for interval in &all {
             let part = weight(interval) / whole;

@@ -169,10 +169,11 @@ impl Search<'_> {
         fewer.sort_by(|a, b| b.0.total_cmp(&a.0));
         fewer.into_iter().find_map(|(p_value, fewer)| {
             let needed = p_value <= EARNED;
-            let hopeless = if needed { most } else { f64::INFINITY };
-            let fitted = context.relinearised(readings, &fewer, hopeless);
-            if needed && context.misfit(readings, &fitted) > most {
-                return None;
+            if needed {
+                let fitted = context.relinearised(readings, &fewer, most);
+                if context.misfit(readings, &fitted) > most {
+                    return None;
+                }
             }
             let found = confidence_set(context, readings, &fewer);
             if found.complete && found.remainder.residual.norm_squared() < most {

@@ -13,8 +13,8 @@ use crate::attribution::context::{Cause, Context};
 use crate::attribution::refine::Seen;
 use crate::detection::dictionary::inverse;
 
-/// How far below the best a statistic may lie for its moment to count: its likelihood is e⁻⁵ of the best one's. What
-/// lies further off would count by its distance, which no share of a probability that small tells.
+/// How far below the best a statistic may lie for its moment to count: its likelihood is e⁻⁵ of the best one's at least.
+/// Moments of less are as many as there are readings, and chance alone would let them count by their distance.
 const AS_WELL: f64 = 10.0;
 
 /// Moments in a row that do not count, after which no further ones are tried: the statistic falls unevenly.

@@ -152,7 +152,11 @@ impl Effect<Linearised> for CyclicError {
             let wave = |function: fn(f64) -> f64| {
                 Column::from_places(model.places(), |_, place| {
                     let seen = model.seat(place).position == position % self.positions.len();
-                    f64::from(seen) * function(per_mm * (place.x - first))
+                    if seen {
+                        function(per_mm * (place.x - first))
+                    } else {
+                        0.0
+                    }
                 })
             };
             let mut columns = vec![wave(f64::cos), wave(f64::sin)];

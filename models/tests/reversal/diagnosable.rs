@@ -1,8 +1,9 @@
 //! The linearised reversal that the diagnosis judges, against readings in exact geometry.
 
-use errsep_models::model::FittedModel;
+use errsep_models::model::{FittedModel, Shape};
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::simulate::{Plan, TrueForm, Wave, simulate};
+use errsep_models::reversal::{Channel, Direction, Observations, Reading};
 
 /// A wave of a form.
 fn wave(amplitude: f64, wavelength: f64, phase_rad: f64) -> TrueForm {
@@ -77,4 +78,72 @@ fn the_exact_geometry_leaves_the_tilts() {
             quantity.name
         );
     }
+}
+
+/// Eight traces of each channel, forward and backward, each on a grid of 2 mm of its own; a chip of 1 µm lies in the
+/// third repeat of 1A.
+fn on_grids_of_their_own(chip: f64) -> Linearised {
+    let mut readings = Vec::new();
+    for (c, channel) in Channel::ALL.into_iter().enumerate() {
+        for trace in 0..8_u32 {
+            let repeat = 1 + trace / 2;
+            // Anywhere within a spacing, by the golden ratio.
+            let shift = 2.0 * (0.618 * f64::from(8 * c as u32 + trace)).fract();
+            readings.extend((0..100).map(|k| {
+                let x = 2.0 * f64::from(k) + shift;
+                let away = (x - CHIP[0]) / CHIP[1];
+                let lies = channel == Channel::C1A && repeat == 3;
+                let height = if lies { chip } else { 0.0 };
+                Reading {
+                    channel,
+                    repeat,
+                    direction: if trace % 2 == 0 {
+                        Direction::Forward
+                    } else {
+                        Direction::Backward
+                    },
+                    time: None,
+                    x,
+                    value: 0.5 * (0.07 * x + c as f64).sin() + height * (-0.5 * away * away).exp(),
+                }
+            }));
+        }
+    }
+    let assumptions = Assumptions {
+        noise: Some(0.05),
+        ..Assumptions::default()
+    };
+    Linearised::new(&Observations { readings }, assumptions).unwrap()
+}
+
+/// Place and width of the chip, mm.
+const CHIP: [f64; 2] = [90.3, 1.2];
+
+/// *Simulated truth*: where traces have grids of their own a chip in one repeat is in the readings that are made of them
+/// as the effect has it. Tolerance: 10⁻⁵ of the chip's square, far above what the fit that carries the readings takes up of it
+/// here (1.5·10⁻⁷); at the centres of the cells, up to 1 mm beside where the readings were taken, it leaves 0.08.
+#[test]
+fn a_chip_in_one_repeat_lies_where_it_was_read() {
+    let [clean, chipped] = [0.0, 1.0].map(on_grids_of_their_own);
+    assert!(chipped.gathered.is_some());
+    let effects = chipped.effects();
+    let chip = effects.iter().find(|e| e.name() == "local-contamination");
+    let chip = chip.unwrap();
+    let told = |shape: &Shape| chip.variant_name(&chipped, shape).unwrap();
+    let mut shape = (chip.grid(&chipped).into_iter())
+        .flat_map(|shape| [chip.relatives(&chipped, &shape), vec![shape]].concat())
+        .find(|shape| told(shape) == "Gaussian, channel 1A, repeat 3")
+        .unwrap();
+    shape.values = vec![CHIP[0], CHIP[1].ln()];
+    let change = chipped.linearised() - clean.linearised();
+    let [column] = &chip.columns(&chipped, &shape)[..] else {
+        panic!("one amplitude")
+    };
+    let own = column.rows.iter().zip(&column.values);
+    let (along, own_square) = own.fold((0.0, 0.0), |(along, square), (row, value)| {
+        (along + value * change[*row], square + value * value)
+    });
+    let square: f64 = column.rows.iter().map(|row| change[*row].powi(2)).sum();
+    let left = (square - along * along / own_square) / square;
+    assert!(left < 1e-5, "{left}");
 }

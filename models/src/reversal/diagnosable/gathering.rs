@@ -3,7 +3,9 @@
 //! The diagnosis compares traces position by position. Where traces have positions of their own, or
 //! more of them than can be told apart, the mean of what the simultaneous fit leaves of the readings
 //! in a cell, beside what that fit makes of the cell's centre, stands for one reading there: the fit
-//! carries readings over the distance from where they were taken, whatever the slope. Where most traces have most
+//! carries readings over the distance from where they were taken, whatever the slope. With them goes what it takes up
+//! of an effect, most of what all traces of a channel hold; what a single repeat holds stays where it was seen
+//! ([`Linearised::taken_at`](super::Linearised::taken_at)). Where most traces have most
 //! positions in common, the readings that single traces lack are put in (`filling.rs`) and every position stays.
 //! Cost is linear in readings.
 
@@ -52,6 +54,8 @@ pub struct Gathered {
     pub(super) ends: [f64; 2],
     /// Whether each channel's traces were read at the same places.
     pub(super) repeated: bool,
+    /// How far beyond its cell's centre each reading made was taken, in the mean, mm, in their order.
+    pub(super) offsets: Vec<f64>,
 }
 
 impl Gathered {
@@ -71,6 +75,7 @@ impl Gathered {
         Self {
             spans: Vec::new(),
             lacking: Vec::new(),
+            offsets: Vec::new(),
             ..self
         }
     }
@@ -200,6 +205,8 @@ pub(super) fn gather(
             values: own.iter().map(|reading| reading.value).collect(),
         })
         .collect();
+    let offsets = lanes.iter().flat_map(|lane| &lane.offsets);
+    let offsets = offsets.map(|parts| parts * width).collect();
     let closures: Vec<Vec<f64>> = arrangement.closures().map(|own| own.weights).collect();
     let gathered = Gathered {
         cells,
@@ -210,6 +217,7 @@ pub(super) fn gather(
         scatter: between_grids::variance(&lanes, &closures),
         ends: ends.map(|spread| spread.min(width)),
         repeated: are_repeated(&members, readings, width),
+        offsets,
     };
     let made = DesignObservations {
         design: observations.design.clone(),

@@ -299,6 +299,12 @@ impl Linearised {
         self.smooth[self.record.places[reading].cell]
     }
 
+    /// Where a reading was taken, mm: at its place, or where the readings were that were gathered into it.
+    pub(super) fn taken_at(&self, reading: usize) -> f64 {
+        let offsets = self.gathered.as_ref().map_or(&[][..], |g| &g.offsets);
+        self.record.places[reading].x + offsets.get(reading).copied().unwrap_or(0.0)
+    }
+
     /// The share of a reading that was taken after a moment, s: none or all of it, or of the readings
     /// that were gathered into it.
     pub(super) fn share_after(&self, reading: usize, time: f64) -> f64 {

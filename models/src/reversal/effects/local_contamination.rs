@@ -265,8 +265,12 @@ impl Effect<Linearised> for LocalContamination {
             let partly = comes.filter(|_| scope.first() == Some(order));
             for k in trace.filter(|_| met) {
                 let place = &model.places()[k];
-                let away = (place.x - position) / width;
-                let there = partly.is_none_or(|comes| place.direction * (place.x - comes) >= 0.0);
+                let x = match scope {
+                    Scope::Repeat(_) => model.taken_at(k),
+                    Scope::All | Scope::From(_) => place.x,
+                };
+                let away = (x - position) / width;
+                let there = partly.is_none_or(|comes| place.direction * (x - comes) >= 0.0);
                 if there && away.abs() < 5.0 {
                     column.rows.push(k);
                     column.values.push(section(away));

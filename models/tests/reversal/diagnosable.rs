@@ -119,9 +119,9 @@ fn on_grids_of_their_own(chip: f64) -> Linearised {
 /// Place and width of the chip, mm.
 const CHIP: [f64; 2] = [90.3, 1.2];
 
-/// *Simulated truth*: where traces have grids of their own a chip in one repeat is in the readings that are made of them
-/// as the effect has it. Tolerance: 10⁻⁵ of the chip's square, far above what the fit that carries the readings takes up of it
-/// here (1.5·10⁻⁷); at the centres of the cells, up to 1 mm beside where the readings were taken, it leaves 0.08.
+/// *Simulated truth*: the column of a chip in one repeat is what the chip changes in readings that were gathered from grids of
+/// each trace's own. Tolerance: 10⁻⁵ of the chip's square; 1.5·10⁻⁷ is left, which the fit that carries the readings takes
+/// up of it, and 0.08 where the column is taken at the centres of the cells, up to 1 mm from where the readings were taken.
 #[test]
 fn a_chip_in_one_repeat_lies_where_it_was_read() {
     let [clean, chipped] = [0.0, 1.0].map(on_grids_of_their_own);

@@ -4,8 +4,8 @@
 //! more of them than can be told apart, the mean of what the simultaneous fit leaves of the readings
 //! in a cell, beside what that fit makes of the cell's centre, stands for one reading there: the fit
 //! carries readings over the distance from where they were taken, whatever the slope. With them goes what it takes up
-//! of an effect, most of what all traces of a channel hold; what a single repeat holds stays where it was seen
-//! ([`Linearised::taken_at`](super::Linearised::taken_at)). Where most traces have most
+//! of an effect: most of what is in all repeats of a channel, the lesser part of what is in one of several, which therefore
+//! acts where it was read ([`Linearised::taken_at`](super::Linearised::taken_at)). Where most traces have most
 //! positions in common, the readings that single traces lack are put in (`filling.rs`) and every position stays.
 //! Cost is linear in readings.
 

@@ -152,11 +152,7 @@ impl Effect<Linearised> for CyclicError {
             let wave = |function: fn(f64) -> f64| {
                 Column::from_places(model.places(), |_, place| {
                     let seen = model.seat(place).position == position % self.positions.len();
-                    if seen {
-                        function(per_mm * (place.x - first))
-                    } else {
-                        0.0
-                    }
+                    f64::from(seen) * function(per_mm * (place.x - first))
                 })
             };
             let mut columns = vec![wave(f64::cos), wave(f64::sin)];

@@ -71,6 +71,9 @@ static STARTED_IN: OnceLock<u32> = OnceLock::new();
 
 type Work<T> = Box<dyn FnOnce() -> T + Send>;
 
+/// Threads that a core is given at most: more wait for each other and do nothing sooner, thousands hold up the machine.
+const A_CORE: usize = 16;
+
 /// The work, dividing itself into so many threads.
 fn divided<T: Send + 'static>(
     threads: Option<usize>,
@@ -81,7 +84,10 @@ fn divided<T: Send + 'static>(
         None if !forked => return Ok(Box::new(work)),
         None => 0,
         Some(0) => return Err(PyValueError::new_err("threads is 0: give 1 or more")),
-        Some(threads) => threads,
+        Some(threads) => {
+            let cores = std::thread::available_parallelism().map_or(1, usize::from);
+            threads.min(A_CORE * cores)
+        }
     };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)

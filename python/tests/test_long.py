@@ -271,6 +271,26 @@ def test_one_thread_gives_the_same_answer_as_all() -> None:
         errsep.straightness(PROFILE, threads=0)
 
 
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="no list of threads")
+def test_a_limit_that_limits_nothing_starts_no_more_threads_than_the_cores_can_use() -> None:
+    script = """
+        import os, threading, time, errsep
+        most = 0
+        def watch():
+            global most
+            while True:
+                most = max(most, len(os.listdir("/proc/self/task")))
+                time.sleep(0.001)
+        threading.Thread(target=watch, daemon=True).start()
+        data = errsep.simulate("reversal", seed=1, positions=31)["data"]
+        errsep.reversal(data, simultaneous=True, threads=30000)
+        print(most <= 40 + 17 * os.cpu_count(), most)
+    """
+    process = python(script)
+    told = process.communicate(timeout=60)[0]
+    assert told.startswith("True"), told
+
+
 def diagnosed(seed: int) -> str:
     data = errsep.simulate("reversal", seed=seed, noise=0.05)["data"]
     return errsep.diagnose(data)["verdict"]["statement"]

@@ -18,44 +18,58 @@ use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// The part of vectors that the fit of a model cannot absorb.
-fn visible<M: FittedModel + 'static>(model: &M, vectors: &DMatrix<f64>) -> DMatrix<f64> {
-    let columns = model.freedom().columns;
-    if columns.ncols() == 0 {
-        return vectors.clone();
-    }
-    let factor = columns.svd(true, false);
-    let u = factor.u.unwrap();
-    let greatest = factor.singular_values.amax();
-    let kept: Vec<DVector<f64>> = u
-        .column_iter()
-        .zip(factor.singular_values.iter())
-        .filter(|(_, s)| **s > 1e-10 * greatest)
-        .map(|(c, _)| c.clone_owned())
-        .collect();
-    let basis = DMatrix::from_columns(&kept);
-    vectors - &basis * basis.tr_mul(vectors)
+/// What the fit of a model without an effect can absorb, as an orthonormal basis (one decomposition for all effects).
+struct Bare<M> {
+    model: M,
+    absorbed: Option<DMatrix<f64>>,
 }
 
-/// How much of the exact change the signature at a shape leaves unexplained, as a part of it.
-fn left<M: FittedModel + 'static>(bare: &M, with: &M, effect: &str, shape: &Shape) -> f64 {
-    let effects = bare.effects();
-    let effect = effects.iter().find(|e| e.name() == effect).unwrap();
-    let n = bare.observed().len();
-    let columns: Vec<DVector<f64>> = effect
-        .columns(bare, shape)
-        .iter()
-        .map(|c| c.dense(n))
-        .collect();
-    let change = with.linearised() - bare.linearised();
-    let change = visible(bare, &DMatrix::from_columns(&[change]));
-    let columns = visible(bare, &DMatrix::from_columns(&columns));
-    let svd = columns.clone().svd(true, true);
-    let amplitudes = svd
-        .solve(&change, 1e-9 * svd.singular_values.amax())
-        .unwrap();
-    assert!(change.norm() > 0.0);
-    (&change - columns * amplitudes).norm() / change.norm()
+impl<M: FittedModel + 'static> Bare<M> {
+    fn of(model: M) -> Self {
+        let columns = model.freedom().columns;
+        let absorbed = (columns.ncols() > 0).then(|| {
+            let factor = columns.svd(true, false);
+            let u = factor.u.unwrap();
+            let greatest = factor.singular_values.amax();
+            let kept: Vec<DVector<f64>> = u
+                .column_iter()
+                .zip(factor.singular_values.iter())
+                .filter(|(_, s)| **s > 1e-10 * greatest)
+                .map(|(c, _)| c.clone_owned())
+                .collect();
+            DMatrix::from_columns(&kept)
+        });
+        Self { model, absorbed }
+    }
+
+    /// The part of vectors that the fit cannot absorb.
+    fn visible(&self, vectors: &[DVector<f64>]) -> DMatrix<f64> {
+        let vectors = DMatrix::from_columns(vectors);
+        match &self.absorbed {
+            Some(basis) => &vectors - basis * basis.tr_mul(&vectors),
+            None => vectors,
+        }
+    }
+
+    /// How much of the exact change the signature at a shape leaves unexplained, as a part of it.
+    fn left(&self, with: &M, effect: &str, shape: &Shape) -> f64 {
+        let effects = self.model.effects();
+        let effect = effects.iter().find(|e| e.name() == effect).unwrap();
+        let n = self.model.observed().len();
+        let columns: Vec<DVector<f64>> = effect
+            .columns(&self.model, shape)
+            .iter()
+            .map(|c| c.dense(n))
+            .collect();
+        let change = self.visible(&[with.linearised() - self.model.linearised()]);
+        let columns = self.visible(&columns);
+        let svd = columns.clone().svd(true, true);
+        let amplitudes = svd
+            .solve(&change, 1e-9 * svd.singular_values.amax())
+            .unwrap();
+        assert!(change.norm() > 0.0);
+        (&change - columns * amplitudes).norm() / change.norm()
+    }
 }
 
 fn at(variant: usize, values: &[f64]) -> Shape {
@@ -80,7 +94,7 @@ fn calibration_line() {
         };
         CalibrationLine::new(&line::simulate(&what, 1).unwrap(), None).unwrap()
     };
-    let bare = made(Vec::new());
+    let bare = Bare::of(made(Vec::new()));
     for (name, shape) in [
         ("quadratic", at(0, &[])),
         ("cubic", at(0, &[])),
@@ -97,7 +111,7 @@ fn calibration_line() {
     ] {
         let with = made(vec![line::Disturbance::named(name, 0.1, 3).unwrap()]);
         // Epsilons: these effects are linear; readings of 100 carry 10⁻¹⁴, the change is 10⁻³.
-        let rest = left(&bare, &with, name, &shape);
+        let rest = bare.left(&with, name, &shape);
         assert!(rest < 1e-9, "{name}: {rest:e}");
     }
 }
@@ -126,7 +140,7 @@ fn circle() {
         }
         CirclePoints::new(&numbered, None).unwrap()
     };
-    let bare = made(&[]);
+    let bare = Bare::of(made(&[]));
     for (name, size, shape) in [
         ("ovality", 1.0, at(0, &[])),
         ("lobes", 1.0, at(0, &[3.0])),
@@ -143,7 +157,7 @@ fn circle() {
     ] {
         let with = made(&[circle::Disturbance::named(name, size, 48).unwrap()]);
         // Truncation: angles move by the effect over the radius, 1 µm on 50 mm.
-        let rest = left(&bare, &with, name, &shape);
+        let rest = bare.left(&with, name, &shape);
         assert!(rest < 1e-4, "{name}: {rest:e}");
     }
 }
@@ -160,7 +174,7 @@ fn four_sensor() {
         let outputs = simulate(&geometry, &truth, &disturbances, 1).unwrap();
         FourSensors::new(&[outputs], Some(0.01)).unwrap()
     };
-    let bare = made(None);
+    let bare = Bare::of(made(None));
     for (name, size, variant, most) in [
         // Epsilons.
         ("drift", 1.0, 2, 1e-9),
@@ -179,7 +193,7 @@ fn four_sensor() {
             "zero-jump" => &[0.55 * 119.0],
             _ => &[],
         };
-        let rest = left(&bare, &with, name, &at(variant, values));
+        let rest = bare.left(&with, name, &at(variant, values));
         assert!(rest < most, "{name}: {rest:e}");
     }
 }
@@ -201,7 +215,7 @@ fn fourier() {
         let (scans, _) = fourier::simulate_disturbed(&what, disturbances, 3).unwrap();
         FourierScans::new(&scans, section, None).unwrap()
     };
-    let bare = made(&[]);
+    let bare = Bare::of(made(&[]));
     for (name, size, variant, most) in [
         // Epsilons.
         ("height-difference", 1.0, 2, 1e-9),
@@ -222,7 +236,7 @@ fn fourier() {
             "zero-jump" => &[1100.5],
             _ => &[],
         };
-        let rest = left(&bare, &with, name, &at(variant, values));
+        let rest = bare.left(&with, name, &at(variant, values));
         assert!(rest < most, "{name}: {rest:e}");
     }
 }
@@ -241,8 +255,8 @@ fn step_diagonal() {
         let (readings, _, _) = diagonal::simulate_disturbed(&what, disturbances, 2);
         DiagonalRuns::new(&what.zone, &readings, &rotations, None).unwrap()
     };
-    let bare = made(&[]);
-    let of_mirror = bare.channels().len() - 1;
+    let bare = Bare::of(made(&[]));
+    let of_mirror = bare.model.channels().len() - 1;
     let of_rotation = rotations.iter().position(|c| c.name() == "ECZ").unwrap();
     for (name, size, shape) in [
         ("mirror-misalignment", 1e-6, at(of_mirror, &[])),
@@ -250,7 +264,11 @@ fn step_diagonal() {
         ("drift", 1.0, at(0, &[0.1f64.ln()])),
         ("thermal-expansion", 1e-6, at(0, &[])),
         ("axis-growth", 1.0, at(0, &[])),
-        ("mirror-creep", 1e-6, at(bare.channels().len() / 6 - 1, &[])),
+        (
+            "mirror-creep",
+            1e-6,
+            at(bare.model.channels().len() / 6 - 1, &[]),
+        ),
     ] {
         let disturbance = diagonal::Disturbance::named(name, size, &what).unwrap();
         let shape = if name == "mirror-misalignment" {
@@ -263,13 +281,13 @@ fn step_diagonal() {
             let of = |c: &(diagonal::Diagonal, diagonal::Target, diagonal::Sequence)| {
                 c.0 == diagonal && c.2 == sequence
             };
-            at(bare.channels().iter().position(of).unwrap(), &[])
+            at(bare.model.channels().iter().position(of).unwrap(), &[])
         } else {
             shape
         };
         let with = made(&[disturbance]);
         // Truncation: products of the angle with errors of 1 µm and angles of 10⁻⁶.
-        let rest = left(&bare, &with, name, &shape);
+        let rest = bare.left(&with, name, &shape);
         assert!(rest < 1e-3, "{name}: {rest:e}");
     }
 }
@@ -288,7 +306,7 @@ fn machine() {
             simulate_parts_disturbed(&machine, &points, 4, 2, 0.0, disturbances, 1).unwrap();
         MeasuredParts::new(&machine, readings).unwrap()
     };
-    let bare = made(&[]);
+    let bare = Bare::of(made(&[]));
     for name in PartDisturbance::NAMES {
         let size = match name {
             "part-zero" | "datum-offset" | "bad-part" => 10.0,
@@ -298,7 +316,7 @@ fn machine() {
         let variant = if name == "bad-part" { 2 } else { 0 };
         let with = made(&[PartDisturbance::named(name, size).unwrap()]);
         // Truncation: finite rotations and shears of 10⁻⁶, and rounding of coordinates of 150 mm.
-        let rest = left(&bare, &with, name, &at(variant, &[]));
+        let rest = bare.left(&with, name, &at(variant, &[]));
         assert!(rest < 1e-5, "{name}: {rest:e}");
     }
 }

@@ -2,3 +2,4 @@
 
 pub mod bspline;
 pub(crate) mod few_waves;
+pub(crate) mod interpolant;

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::curves::Curves;
 use super::effects;
 use super::{
     Choice, FourSensorError, Geometry, Line, Outputs, Penalised, Separation, Separator, Settings,
@@ -25,6 +26,7 @@ pub struct FourSensors {
     settings: Settings,
     record: Record,
     state: Separation,
+    curves: Curves,
     noise: Option<f64>,
 }
 
@@ -79,6 +81,7 @@ impl FourSensors {
             separator: Arc::new(separator),
             settings,
             record: Record::new(places, traces, observed),
+            curves: Curves::of(&state, &geometry),
             state,
             noise,
         })
@@ -94,6 +97,11 @@ impl FourSensors {
         place.cell % self.geometry.output_count()
     }
 
+    /// Index of the point of the surface under a sensor.
+    pub(super) fn under(&self, place: &Place) -> usize {
+        self.at(place) + self.geometry.offsets()[place.channel]
+    }
+
     /// Part of the travel at a place, 0 to 1.
     pub(super) fn share(&self, place: &Place) -> f64 {
         self.at(place) as f64 / (self.geometry.output_count() - 1) as f64
@@ -105,23 +113,14 @@ impl FourSensors {
         place.time / (readings.max(2) - 1) as f64
     }
 
-    /// Slope of what the fitted state says a sensor reads, along the travel, µm/mm.
-    pub(super) fn reading_slope(&self, place: &Place) -> f64 {
-        let (n, step) = (self.at(place), self.geometry.step());
-        self.surface_slope(place)
-            + slope(&self.state.straightness.values, n, step)
-            + UM_PER_MM * self.arm(place.channel) * slope(&self.state.tilt.values, n, step)
-    }
-
     /// Place of a sensor from sensor 1, mm.
     pub(super) fn arm(&self, sensor: usize) -> f64 {
         self.geometry.positions()[sensor]
     }
 
-    /// Slope of the fitted surface under a sensor, µm/mm, by the difference of its neighbours.
-    pub(super) fn surface_slope(&self, place: &Place) -> f64 {
-        let n = self.at(place) + self.geometry.offsets()[place.channel];
-        slope(&self.state.surface.values, n, self.geometry.step())
+    /// The fitted surface, straightness and tilt between the positions too.
+    pub(super) fn curves(&self) -> &Curves {
+        &self.curves
     }
 
     /// Fitted tilt at a place, rad.
@@ -132,17 +131,11 @@ impl FourSensors {
     /// What the fitted state says a sensor reads, µm.
     pub(super) fn fitted(&self, place: &Place) -> f64 {
         let n = self.at(place);
-        self.state.surface.values[n + self.geometry.offsets()[place.channel]]
+        self.state.surface.values[self.under(place)]
             + self.state.straightness.values[n]
             + UM_PER_MM * self.arm(place.channel) * self.state.tilt.values[n]
             + self.state.zero_adjustment[place.channel]
     }
-}
-
-/// Central difference, one-sided at the ends.
-fn slope(values: &DVector<f64>, at: usize, step: f64) -> f64 {
-    let (low, high) = (at.saturating_sub(1), (at + 1).min(values.len() - 1));
-    (values[high] - values[low]) / ((high - low) as f64 * step)
 }
 
 fn state_of(
@@ -188,7 +181,7 @@ impl FittedModel for FourSensors {
         let mut columns = DMatrix::zeros(self.record.places.len(), points + 2 * count + 4);
         for (row, place) in self.record.places.iter().enumerate() {
             let n = self.at(place);
-            columns[(row, n + self.geometry.offsets()[place.channel])] = 1.0;
+            columns[(row, self.under(place))] = 1.0;
             columns[(row, points + n)] = 1.0;
             columns[(row, points + count + n)] = self.arm(place.channel) / longest;
             columns[(row, points + 2 * count + place.channel)] = 1.0;
@@ -251,6 +244,7 @@ impl FittedModel for FourSensors {
         );
         // Where the penalty finds no corner the state before is the better one to take slopes from.
         if let Ok(state) = state {
+            fitted.curves = Curves::of(&state, &self.geometry);
             fitted.state = state;
         }
         fitted.record.observed = observed;

@@ -13,6 +13,7 @@
 //! can find the parabola of f: see [`Parabola`].
 
 mod choice;
+mod curves;
 mod diagnosable;
 pub mod direct;
 mod effects;

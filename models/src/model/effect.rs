@@ -87,6 +87,15 @@ impl Shape {
         }
     }
 
+    /// The shape of an effect whose signature depends on its own size alone, at the size that was found.
+    pub(crate) fn settled_at(&self, amplitudes: &[f64]) -> Option<Self> {
+        amplitudes.first().map(|&size| Self {
+            values: vec![size],
+            steps: vec![0.0],
+            ..self.clone()
+        })
+    }
+
     /// Number of parameters that the search may change.
     pub fn free(&self) -> usize {
         self.steps.iter().filter(|step| **step != 0.0).count()

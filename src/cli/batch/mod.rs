@@ -42,7 +42,7 @@ pub struct Args {
     /// Folder of the answers.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Campaigns at the same time; by default as many as there are cores.
+    /// Campaigns at the same time; by default as many as there are cores, at most sixteen a core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
     /// Only every n-th campaign, from the i-th on: for n machines that share DIR.
@@ -95,7 +95,7 @@ pub fn run(args: &Args) -> Result<Status, Message> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let how = How {
         out: args.out.clone(),
-        jobs: args.jobs.map_or(cores, usize::from),
+        jobs: args.jobs.map_or(cores, |n| usize::from(n).min(16 * cores)),
         retry_failed: args.retry_failed,
         verify: args.verify,
         parquet: args.parquet,

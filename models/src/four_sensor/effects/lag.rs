@@ -34,7 +34,7 @@ impl Effect<FourSensors> for Lag {
     fn columns(&self, model: &FourSensors, shape: &Shape) -> Vec<Column> {
         vec![Column::from_places(model.places(), |_, place| {
             if place.channel == shape.variant {
-                -model.reading_slope(place)
+                -model.curves().reading_slope(model, place)
             } else {
                 0.0
             }

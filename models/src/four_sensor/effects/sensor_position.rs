@@ -33,12 +33,17 @@ impl Effect<FourSensors> for SensorPosition {
     }
 
     fn columns(&self, model: &FourSensors, shape: &Shape) -> Vec<Column> {
+        let way = shape.values.first().copied().unwrap_or(0.0);
         vec![Column::from_places(model.places(), |_, place| {
             if place.channel == shape.variant {
-                model.surface_slope(place) + UM_PER_MM * model.tilt(place)
+                model.curves().surface_chord(model, place, way) + UM_PER_MM * model.tilt(place)
             } else {
                 0.0
             }
         })]
+    }
+
+    fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
+        shape.settled_at(amplitudes)
     }
 }

@@ -39,7 +39,7 @@ impl Effect<FourSensors> for SlidePosition {
         FEW_WAVES
             .map(|wave| {
                 Column::from_places(model.places(), |_, place| {
-                    wave(model.share(place)) * model.surface_slope(place)
+                    wave(model.share(place)) * model.curves().surface_slope(model, place)
                 })
             })
             .into()

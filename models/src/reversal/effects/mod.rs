@@ -115,15 +115,6 @@ const SETTLING: Shape = Shape {
     steps: Vec::new(),
 };
 
-/// A settling shape at the size that was found.
-fn settled_at(shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
-    amplitudes.first().map(|&size| Shape {
-        values: vec![size],
-        steps: vec![0.0],
-        ..shape.clone()
-    })
-}
-
 /// A position as a part of the travel, −1 to 1.
 fn part_of_travel(model: &Linearised, x: f64) -> f64 {
     let first = model.positions().first().copied().unwrap_or(0.0);

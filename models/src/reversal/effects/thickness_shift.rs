@@ -1,6 +1,6 @@
 //! The probed point lies half a thickness from the tilted axis.
 
-use super::{Linearised, SETTLING, settled_at};
+use super::{Linearised, SETTLING};
 use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Place, Shape};
 
 /// See the head of the file.
@@ -54,6 +54,6 @@ impl Effect<Linearised> for ThicknessShift {
     }
 
     fn settled(&self, shape: &Shape, amplitudes: &[f64]) -> Option<Shape> {
-        settled_at(shape, amplitudes)
+        shape.settled_at(amplitudes)
     }
 }

@@ -14,7 +14,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::message::{Message, nearest};
-use super::setup::SetupFile;
+use super::setup::{Numbers, SetupFile};
 use super::table::{Column, TableReader};
 
 #[derive(Debug, Deserialize)]
@@ -26,7 +26,7 @@ struct MachineFile {
     #[serde(default)]
     coordinates: Coordinates,
     #[serde(default)]
-    tool_offset: Option<Spanned<[f64; 3]>>,
+    tool_offset: Option<Spanned<Numbers<3>>>,
     #[serde(default)]
     part: PartTable,
     #[serde(default)]
@@ -216,7 +216,7 @@ fn chain(file: &SetupFile, content: &MachineFile) -> Result<Chain, Message> {
     }
     if let Some(offset) = &content.tool_offset {
         chain = chain
-            .with_tool_offset(Vector3::from(*offset.get_ref()))
+            .with_tool_offset(Vector3::from(offset.get_ref().0))
             .map_err(|error| {
                 file.bad(
                     offset.span(),

@@ -26,5 +26,5 @@ pub use columns::ColumnMap;
 pub use folder::{OutFile, OutFolder};
 pub use message::{Message, Status, Trouble};
 pub use output::CsvTable;
-pub use setup::SetupFile;
+pub use setup::{Numbers, SetupFile};
 pub use table::{Column, Row, TableReader};

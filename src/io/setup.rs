@@ -8,6 +8,7 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::message::{Message, Place, list, nearest, nearest_first};
@@ -15,6 +16,23 @@ use super::source::Source;
 
 /// A longer file is no set-up, bytes.
 const LONGEST: u64 = 1 << 24;
+
+/// A list of so many numbers, no fewer and no more.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(try_from = "Vec<f64>")]
+pub struct Numbers<const N: usize>(pub [f64; N]);
+
+impl<const N: usize> TryFrom<Vec<f64>> for Numbers<N> {
+    type Error = String;
+
+    fn try_from(list: Vec<f64>) -> Result<Self, String> {
+        let found = list.len();
+        let numbers = list.try_into();
+        numbers
+            .map(Self)
+            .map_err(|_| format!("{N} numbers are wanted, and the list has {found}"))
+    }
+}
 
 /// A set-up file as read.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -130,21 +130,42 @@ fn no_law_is_told_with_its_power() {
     assert!(!folder.path().join("l.toml").exists());
 }
 
-/// Only after `unknown`, and with repeats: else refused in words with exit 1.
+/// Only after `unknown`: else the diagnosis says why none is sought, with exit 1 where a file was to be written. Without
+/// repeats it is refused.
 #[test]
-fn what_has_no_law_to_seek_is_refused() {
+fn what_has_no_law_to_seek_says_so() {
     let folder = Folder::with(&[]);
     campaign(&folder, "none.csv", "4", "4", |_| 0.0);
     campaign(&folder, "bend.csv", "5", "4", |x| 1e-3 * (x - 5.0).powi(2));
     campaign(&folder, "once.csv", "6", "1", swing);
-    for (data, what) in [
-        ("none.csv", "there is no gap to find a law in"),
-        ("bend.csv", "--without quadratic"),
-        ("once.csv", "there are no repeats to hold out"),
+    for (data, what, verdict) in [
+        ("none.csv", "nothing stands out of the noise", "none"),
+        ("bend.csv", "--without quadratic", "effect"),
     ] {
         let out = run(&folder, &[&LINE[..], &[data, "--law", "l.toml"]].concat());
         assert_eq!(out.status, 1, "{data}: {}{}", out.stdout, out.stderr);
-        assert!(out.stderr.contains(what), "{data}: {}", out.stderr);
+        assert!(out.stdout.contains(what), "{data}: {}", out.stdout);
+        assert!(
+            out.stdout.contains("l.toml is not written"),
+            "{}",
+            out.stdout
+        );
         assert!(!folder.path().join("l.toml").exists());
+        let json = [&LINE[..], &["--format", "json", data, "--law"]].concat();
+        let out = run(&folder, &json);
+        assert_eq!(out.status, 0, "{data}: {}{}", out.stdout, out.stderr);
+        let answer: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
+        assert_eq!(answer["verdict"]["kind"], verdict);
+        assert_eq!(answer["law"]["found"], false);
     }
+    let out = run(
+        &folder,
+        &[&LINE[..], &["once.csv", "--law", "l.toml"]].concat(),
+    );
+    assert_eq!(out.status, 1, "{}{}", out.stdout, out.stderr);
+    assert!(
+        out.stderr.contains("there are no repeats to hold out"),
+        "{}",
+        out.stderr
+    );
 }

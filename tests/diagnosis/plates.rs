@@ -2,7 +2,7 @@
 
 use errsep::diagnosis::{Kind, Options, diagnose};
 
-use crate::plate::{Wrong, line, plate};
+use crate::plate::{Wrong, line, plate, plate_turned};
 
 fn options() -> Options {
     Options {
@@ -52,6 +52,27 @@ fn scales_squareness_and_a_bend_are_named_together() {
 fn a_pose_alone_is_no_gap() {
     let found = diagnose(&plate(Wrong::default(), 0.3, 5), &options());
     assert_eq!(found.verdict.kind, Kind::None);
+}
+
+/// *Exact limit*: of a turn of 8 mrad to first order 13 µm would be left, as a scale of 3·10⁻⁵; a scale beside it is named
+/// alone.
+#[test]
+fn a_turned_plate_is_no_gap_and_hides_none() {
+    for turn in [2e-3, -8e-3] {
+        let bare = plate_turned(Wrong::default(), 0.3, 5, turn);
+        let found = diagnose(&bare, &options());
+        assert_eq!(found.verdict.kind, Kind::None, "{turn}");
+        let (told, _) = bare.alignments();
+        let told = told.iter().find(|a| a.name == "turn about z").unwrap();
+        // k·u.
+        assert!((told.value - turn).abs() < 4.0 * told.std, "{told:?}");
+        let scaled = Wrong {
+            scale_x: 8e-6,
+            ..Wrong::default()
+        };
+        let found = diagnose(&plate_turned(scaled, 0.3, 5, turn), &options());
+        assert_eq!(found.verdict.effects, ["scale-by-axis"], "{turn}");
+    }
 }
 
 #[test]

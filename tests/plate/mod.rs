@@ -53,13 +53,21 @@ fn turned((x, y): (f64, f64), turn: f64, shift: (f64, f64)) -> (f64, f64) {
 
 fn aligned(readings: Vec<PartReading>) -> MeasuredParts {
     let machine = Machine::new(Chain::parse("FXYZ").unwrap(), Sense::Tool, Vec::new()).unwrap();
-    MeasuredParts::new(&machine, readings).unwrap().aligned()
+    MeasuredParts::new(&machine, readings)
+        .unwrap()
+        .aligned()
+        .unwrap()
 }
 
 /// A plate of 6 × 6 points, measured four times in one clamping.
 pub fn plate(wrong: Wrong, noise_um: f64, seed: u64) -> MeasuredParts {
+    plate_turned(wrong, noise_um, seed, pose(seed).turn)
+}
+
+/// The same that lies turned by so many rad.
+pub fn plate_turned(wrong: Wrong, noise_um: f64, seed: u64, turn: f64) -> MeasuredParts {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let Pose { turn, shift, .. } = pose(seed);
+    let Pose { shift, .. } = pose(seed);
     let noise = Normal::new(0.0, noise_um * 1e-3).unwrap();
     let mut readings = Vec::new();
     for replicate in 1..=4 {

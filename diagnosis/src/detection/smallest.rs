@@ -35,7 +35,8 @@ const ALIKE: f64 = 1.2;
 pub struct SizesByShape {
     /// Of the shape that shows best.
     pub from: f64,
-    /// Of the shape that shows worst; none where that shows at no plausible size.
+    /// Of the shape that shows worst, its amplitudes in those proportions that show worst (two indicators that drift
+    /// against each other); none where that shows at no plausible size.
     pub to: Option<f64>,
 }
 
@@ -49,10 +50,17 @@ impl SizesByShape {
         most: f64,
     ) -> Option<Self> {
         let shapes = by_length(dictionary, family);
-        let size = |entry: &&Entry| least_size(entry.gram[(0, 0)].sqrt(), statistic(entry.order()));
+        let size = |square: f64, entry: &Entry| {
+            let length = square.max(0.0).sqrt().max(f64::MIN_POSITIVE);
+            least_size(length, statistic(entry.order()))
+        };
         let (best, worst) = ends(shapes.len(), family.unseen);
-        let from = shapes.get(best).map(size)?;
-        let to = worst.and_then(|worst| shapes.get(worst)).map(size);
+        let from = (shapes.get(best)).map(|entry| size(entry.gram[(0, 0)], entry))?;
+        let mut least: Vec<f64> = (shapes.iter())
+            .map(|entry| size(entry.gram.symmetric_eigenvalues().min(), entry))
+            .collect();
+        least.sort_by(|a, b| b.total_cmp(a));
+        let to = worst.and_then(|worst| least.get(worst)).copied();
         let alike = to.is_some_and(|to| to <= ALIKE * from);
         (!alike).then(|| Self {
             from,

@@ -221,7 +221,7 @@ const WIDER: f64 = 1.1;
 
 /// Where a pass is cut open, degrees: in the middle of the widest gap between its points, so that noise moves none of
 /// them to the other end; of gaps that are nearly even in that where it began. `angles` in the order of time, `sense` of
-/// travel.
+/// travel. Between −180° and 180°, so that a pass from just below 0° on does not count its angles from 360°.
 fn seam(angles: Vec<f64>, sense: f64) -> f64 {
     let Some(first) = angles.first().map(|a| a.rem_euclid(360.0)) else {
         return 0.0;
@@ -241,10 +241,10 @@ fn seam(angles: Vec<f64>, sense: f64) -> f64 {
     let own = sorted.partition_point(|a| *a < first);
     let began = gap(if sense < 0.0 { (own + 1) % count } else { own });
     let widest = (0..count).map(gap).max_by(|a, b| a.0.total_cmp(&b.0));
-    widest
+    let (_, middle) = widest
         .filter(|(width, _)| *width > WIDER * began.0)
-        .unwrap_or(began)
-        .1
+        .unwrap_or(began);
+    (middle + 180.0).rem_euclid(360.0) - 180.0
 }
 
 impl FittedModel for CirclePoints {
@@ -393,5 +393,21 @@ impl FittedModel for CirclePoints {
             _ => angles[row].sin(),
         });
         vec![DMatrix::from_element(rows, 1, 1.0), centre]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::seam;
+
+    /// *Limit*: a pass that begins a hair below 0° is told by the angles of one that begins a hair above.
+    #[test]
+    fn a_pass_from_just_below_zero_is_told_by_the_same_angles() {
+        let from = |begin: f64| (0..72).map(|k| begin + 5.0 * f64::from(k)).collect();
+        for begin in [-0.01, 0.0, 0.01] {
+            // Rounding.
+            let expected = begin - 2.5;
+            assert!((seam(from(begin), 1.0) - expected).abs() < 1e-9, "{begin}");
+        }
     }
 }

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::{Axis, MeasuredParts, PartReading, Position};
+use super::turn::turn_of;
+use super::{Axis, MachineError, MeasuredParts, PartReading, Position};
 use crate::units::um_from_mm;
 
 /// A zero or a turn of one part, fitted to its readings.
@@ -68,11 +69,19 @@ impl Motion {
 /// Singular values below this share of the greatest are of turns and zeros that the points do not tell.
 const RANK: f64 = 1e-9;
 
+/// Greatest turn of a part, rad: its errors are looked for where its nominal points would lie unturned, off by 2 % of
+/// their distances then.
+const MOST: f64 = 0.02;
+
 impl MeasuredParts {
-    /// The same parts with the zero and the turn of each as unknowns of the model: small rotations about the
-    /// middle of the part's points and shifts along each axis that was measured.
-    #[must_use]
-    pub fn aligned(mut self) -> Self {
+    /// The same parts with the zero and the turn of each as unknowns of the model: the turn is taken off the readings
+    /// exactly where they tell it, and what is left are small rotations about the middle of the part's points and shifts
+    /// along each axis that was measured.
+    ///
+    /// # Errors
+    /// A part that lies turned by more than 0.02 rad.
+    pub fn aligned(mut self) -> Result<Self, MachineError> {
+        self.turn_back()?;
         let mut columns: Vec<DVector<f64>> = Vec::new();
         for part in self.parts() {
             let middle = self.middle(part);
@@ -95,7 +104,24 @@ impl MeasuredParts {
             true => DMatrix::zeros(self.readings().len(), 0),
             false => DMatrix::from_columns(&columns),
         });
-        self
+        Ok(self)
+    }
+
+    /// Takes the turns of the parts off their readings.
+    fn turn_back(&mut self) -> Result<(), MachineError> {
+        for part in self.parts().to_vec() {
+            let of_part = |r: &&PartReading| r.part == part;
+            let Some((turn, middle)) = turn_of(self.readings().iter().filter(of_part)) else {
+                continue;
+            };
+            if turn.angle() > MOST {
+                let angle = turn.angle();
+                return Err(MachineError::Turned { part, angle });
+            }
+            self.turned_back(&part, |p| turn * (p - middle) - (p - middle));
+            self.turns.insert(part, turn.scaled_axis());
+        }
+        Ok(())
     }
 
     /// Whether zero and turn of each part are unknowns of the model.
@@ -166,13 +192,21 @@ impl MeasuredParts {
                 found.push(Alignment {
                     part: part.clone(),
                     name: motion.name(),
-                    value: fitted[k] / sizes[k],
+                    value: fitted[k] / sizes[k] + self.turned(part, *motion),
                     std: (variance * inverse.row(k).norm_squared()).sqrt() / sizes[k],
                     unit: motion.unit(),
                 });
             }
         }
         (found, open)
+    }
+
+    /// What was taken off the readings of a part already, rad.
+    fn turned(&self, part: &str, motion: Motion) -> f64 {
+        match (motion, self.turns.get(part)) {
+            (Motion::Turn(axis), Some(turn)) => turn[axis.index()],
+            _ => 0.0,
+        }
     }
 
     /// The middle of the points of a part.

@@ -6,13 +6,16 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use errsep_solvers::linear::limited::symmetric_eigen;
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::model::coordinate;
-use super::{Axis, ComponentError, Machine, MachineError, PartReading, effects, part_residuals};
+use super::{
+    Axis, ComponentError, Machine, MachineError, PartReading, Position, effects, part_residuals,
+};
 use crate::model::{
     Column, Course, Covariate, Effect, FittedModel, Freedom, Place, Quantity, Record,
 };
+use crate::units::um_from_mm;
 
 /// Parts measured at points whose deviations a machine model predicts.
 #[derive(Debug, Clone)]
@@ -24,6 +27,8 @@ pub struct MeasuredParts {
     expected: Arc<[Column]>,
     /// Columns of the zeros and turns of the parts, where these belong to the model.
     pub(super) alignment: Option<DMatrix<f64>>,
+    /// The turn of each part that was taken off its readings, rad about each axis.
+    pub(super) turns: BTreeMap<String, Vector3<f64>>,
 }
 
 impl MeasuredParts {
@@ -81,6 +86,7 @@ impl MeasuredParts {
             },
             expected,
             alignment: None,
+            turns: BTreeMap::new(),
             readings,
         })
     }
@@ -100,6 +106,16 @@ impl MeasuredParts {
     /// What the machine's model leaves of the readings, µm.
     pub(super) fn left(&self) -> DVector<f64> {
         &self.record.observed - &self.predicted
+    }
+
+    /// Takes a motion of the nominal points, mm, off the readings of a part.
+    pub(super) fn turned_back(&mut self, part: &str, motion: impl Fn(&Position) -> Position) {
+        for r in self.readings.iter_mut().filter(|r| r.part == part) {
+            r.value -= um_from_mm(motion(&r.position)[r.axis.index()]);
+        }
+        let values = self.readings.iter().map(|r| r.value);
+        let observed = DVector::from_iterator(self.readings.len(), values);
+        self.record = self.record.with(observed);
     }
 
     /// The signature with a value for each reading of some parts.

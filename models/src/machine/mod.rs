@@ -23,6 +23,7 @@ mod parts;
 mod propagation;
 mod regression;
 mod simulate;
+mod turn;
 
 pub use alignment::Alignment;
 pub use chain::{Chain, Sense, Side, Slide};
@@ -46,6 +47,16 @@ use crate::uncertainty::UncertaintyError;
 /// What the model cannot answer, and why.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MachineError {
+    /// A part that lies turned by too much.
+    #[error(
+        "part {part} lies turned by {angle:.4} rad against its nominal coordinates: beyond 0.02 rad it cannot be told along which axis of the machine an error acts"
+    )]
+    Turned {
+        /// The part.
+        part: String,
+        /// Its turn, rad.
+        angle: f64,
+    },
     /// A chain that cannot be read.
     #[error(
         "the chain `{chain}` {why}: write X, Y, Z and F once each, from the workpiece to the tool, such as XYFZ"

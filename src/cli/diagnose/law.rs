@@ -7,11 +7,11 @@ use errsep_models::model::{AnyModel, FittedModel};
 use serde_json::{Value, json};
 
 use super::Args;
-use super::learnt::{named, only_unknown, seen};
+use super::learnt::{explained, named, seen, without_causes};
 use super::words::number;
 use crate::cli::progress;
 use crate::diagnosis::{
-    Diagnosis, Law, LawFound, LawTerm, NoLaw, Options, Power, for_people, law, written,
+    Diagnosis, Kind, Law, LawFound, LawTerm, NoLaw, Options, Power, for_people, law, written,
 };
 use crate::io::{Message, OutFile};
 use crate::report::number::{measured, percent, plain, probability};
@@ -34,7 +34,7 @@ pub(super) struct Sought {
 /// Seeks a law in what is left, and writes it where a file is named.
 ///
 /// # Errors
-/// The verdict is not `unknown`, or there are no repeats to hold out; the file cannot be written.
+/// There are no repeats to hold out; the file cannot be written.
 pub(super) fn sought(
     model: &AnyModel,
     args: &Args,
@@ -42,7 +42,15 @@ pub(super) fn sought(
     diagnosis: &Diagnosis,
     options: &Options,
 ) -> Result<Sought, Message> {
-    only_unknown(args, diagnosis, "--law")?;
+    if let Some(why) = not_sought(diagnosis) {
+        return Ok(Sought {
+            is_missing: file.is_some(),
+            said: (
+                format!("\nNo law is sought: {why}.{}\n", not_written(file.as_ref())),
+                json!({"found": false, "why": why, "nearest": null, "tried": null, "power": null}),
+            ),
+        });
+    }
     let name = match &file {
         Some((place, _)) => named(place, model)?,
         None => NAME.to_owned(),
@@ -58,7 +66,10 @@ pub(super) fn sought(
     match found {
         LawFound::None(none) => Ok(Sought {
             is_missing: file.is_some(),
-            said: (without_law(&none), no_law(&none)),
+            said: (
+                format!("{}{}\n", without_law(&none), not_written(file.as_ref())),
+                no_law(&none),
+            ),
         }),
         LawFound::Law(mut law) => {
             law.effect.name.clone_from(&name);
@@ -83,6 +94,19 @@ pub(super) fn sought(
                 said: (format!("\n{text}\n"), answer),
             })
         }
+    }
+}
+
+/// Why no law is sought: it would be one of noise, or of what an effect explains.
+fn not_sought(diagnosis: &Diagnosis) -> Option<String> {
+    match diagnosis.verdict.kind {
+        Kind::Unknown => None,
+        Kind::None => Some("nothing stands out of the noise".to_owned()),
+        Kind::Effect => Some(format!(
+            "{}; to seek one all the same: {}",
+            explained(diagnosis),
+            without_causes(diagnosis)
+        )),
     }
 }
 
@@ -207,7 +231,14 @@ fn without_law(none: &NoLaw) -> String {
     if let Some(power) = &none.power {
         let _ = write!(text, "\n{}", power_in_words(power));
     }
-    text + "\n"
+    text
+}
+
+/// That the file which was asked for is not there.
+fn not_written(file: Option<&(&Path, OutFile)>) -> String {
+    file.map_or(String::new(), |(place, _)| {
+        format!(" {} is not written.", place.display())
+    })
 }
 
 fn power_in_words(power: &Power) -> String {

@@ -31,7 +31,7 @@ pub(super) fn learnt(
     diagnosis: &Diagnosis,
     options: &Options,
 ) -> Result<(String, Value), Message> {
-    only_unknown(args, diagnosis, "--learn")?;
+    only_unknown(args, diagnosis)?;
     let name = named(place, model)?;
     let bar = progress("learning", None);
     let found = learn(model, options);
@@ -61,12 +61,8 @@ pub(super) fn learnt(
     Ok((text, json))
 }
 
-/// Refuses what is only for a gap that no effect explains.
-pub(super) fn only_unknown(
-    args: &Args,
-    diagnosis: &Diagnosis,
-    option: &str,
-) -> Result<(), Message> {
+/// Why there is nothing to learn, and what to do: nothing is to be learnt but what no effect explains.
+fn only_unknown(args: &Args, diagnosis: &Diagnosis) -> Result<(), Message> {
     let refused = |what: String, remedy: String| {
         Err(Message::not_determined(what)
             .in_file(&args.data)
@@ -75,39 +71,37 @@ pub(super) fn only_unknown(
     match diagnosis.verdict.kind {
         Kind::Unknown => Ok(()),
         Kind::None => refused(
-            match option {
-                "--learn" => "there is no gap to learn: nothing stands out of the noise".to_owned(),
-                _ => "there is no gap to find a law in: nothing stands out of the noise".to_owned(),
-            },
-            format!("leave {option} out; more repeats show smaller gaps"),
+            "there is no gap to learn: nothing stands out of the noise".to_owned(),
+            "leave --learn out; more repeats show smaller gaps".to_owned(),
         ),
-        Kind::Effect => {
-            let names = diagnosis.verdict.effects.join(" and ");
-            let without: Vec<String> = diagnosis
-                .verdict
-                .causes()
-                .concat()
-                .iter()
-                .map(|effect| format!("--without {effect}"))
-                .collect();
-            refused(
-                match option {
-                    "--learn" => format!("{names} explains the gap, so there is nothing to learn"),
-                    _ => format!("{names} explains the gap, so no law is sought in it"),
-                },
-                match option {
-                    "--learn" => format!(
-                        "leave --learn out, or learn it nevertheless with {}",
-                        without.join(" ")
-                    ),
-                    _ => format!(
-                        "leave {option} out, or seek one nevertheless with {}",
-                        without.join(" ")
-                    ),
-                },
-            )
-        }
+        Kind::Effect => refused(
+            format!("{}, so there is nothing to learn", explained(diagnosis)),
+            format!(
+                "leave --learn out, or learn it nevertheless with {}",
+                without_causes(diagnosis)
+            ),
+        ),
     }
+}
+
+/// What explains the gap, in words.
+pub(super) fn explained(diagnosis: &Diagnosis) -> String {
+    let names = &diagnosis.verdict.effects;
+    let verb = if names.len() == 1 {
+        "explains"
+    } else {
+        "explain"
+    };
+    format!("{} {verb} the gap", names.join(" and "))
+}
+
+/// The options that withhold what was named.
+pub(super) fn without_causes(diagnosis: &Diagnosis) -> String {
+    let causes = diagnosis.verdict.causes().concat();
+    let options: Vec<String> = (causes.iter())
+        .map(|effect| format!("--without {effect}"))
+        .collect();
+    options.join(" ")
 }
 
 /// The effect's name: that of its file.

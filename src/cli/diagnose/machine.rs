@@ -27,7 +27,11 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         .map_err(|e| filed.wrong(&e, "keep the points within the tables of the machine"))?;
     let model = match filed.align {
         Align::Fixed => model,
-        Align::Free => model.aligned(),
+        Align::Free => model.aligned().map_err(|e| {
+            Message::bad_input(e.to_string())
+                .in_file(&args.data)
+                .remedy("give the nominal coordinates along the machine's axes, as the part lay")
+        })?,
     };
     let mut notes = vec![
         "The machine is not fitted to the parts. The noise is that of measuring a part again; what differs between parts is gap.".to_owned(),

@@ -249,7 +249,7 @@ fn cells(
 
 fn multiples(setup: &Setup, step: f64) -> Result<[usize; 3], Message> {
     let mut multiples = [0; 3];
-    for (multiple, spacing) in multiples.iter_mut().zip(setup.spacing.get_ref()) {
+    for (multiple, spacing) in multiples.iter_mut().zip(&setup.spacing.get_ref().0) {
         let steps = spacing / step;
         // A millionth of the largest index is room enough for any real file.
         if (steps - steps.round()).abs() > 0.01 || !(0.5..1e6).contains(&steps) {

@@ -4,7 +4,7 @@ use errsep_models::four_sensor::{Choice, Line, Parabola, Penalised, Settings};
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::io::{Message, SetupFile};
+use crate::io::{Message, Numbers, SetupFile};
 
 /// What the set-up file says.
 #[derive(Debug, Deserialize)]
@@ -19,7 +19,7 @@ struct File {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Sensors {
-    spacing: Spanned<[f64; 3]>,
+    spacing: Spanned<Numbers<3>>,
     noise: Option<Spanned<f64>>,
 }
 
@@ -49,7 +49,7 @@ enum Rule {
 #[serde(deny_unknown_fields)]
 struct ParabolaTable {
     surface_curvature: Option<f64>,
-    zero_adjustment: Option<[f64; 3]>,
+    zero_adjustment: Option<Numbers<3>>,
     tilt_slope: Option<f64>,
 }
 
@@ -58,7 +58,7 @@ struct ParabolaTable {
 pub(in crate::cli) struct Setup {
     pub file: SetupFile,
     /// D2, D3, D4, mm, and where they stand in the file.
-    pub spacing: Spanned<[f64; 3]>,
+    pub spacing: Spanned<Numbers<3>>,
     pub penalised: Penalised,
     pub line: Line,
     pub settings: Settings,
@@ -74,6 +74,7 @@ impl Setup {
         if sensors
             .spacing
             .get_ref()
+            .0
             .iter()
             .any(|d| !(d.is_finite() && *d > 0.0))
         {
@@ -135,7 +136,7 @@ fn stated(file: &SetupFile, table: &Spanned<ParabolaTable>) -> Result<Parabola, 
     let ways = table.get_ref();
     let found: Vec<Parabola> = [
         ways.surface_curvature.map(Parabola::SurfaceCurvature),
-        ways.zero_adjustment.map(Parabola::ZeroAdjustment),
+        ways.zero_adjustment.map(|z| Parabola::ZeroAdjustment(z.0)),
         ways.tilt_slope.map(Parabola::TiltSlope),
     ]
     .into_iter()
@@ -147,7 +148,7 @@ fn stated(file: &SetupFile, table: &Spanned<ParabolaTable>) -> Result<Parabola, 
         || ways.tilt_slope.is_some_and(|s| beyond(s, 1.0))
         || ways
             .zero_adjustment
-            .is_some_and(|z| z.iter().any(|z| beyond(*z, 1e6)));
+            .is_some_and(|z| z.0.iter().any(|z| beyond(*z, 1e6)));
     match found.as_slice() {
         [one] if !too_great => Ok(*one),
         [_] => Err(file.bad(

@@ -190,7 +190,9 @@ fn effects(
     };
     let model = Linearised::of_design(observations, plan.zero, None, assumptions)
         .map_err(|why| why.to_string())?;
-    let law = NoiseLaw::white(plan.noise, f64::INFINITY, NoiseSource::Stated);
+    // Of a reading of the model, which may stand for several.
+    let noise = model.stated_noise().unwrap_or(plan.noise);
+    let law = NoiseLaw::white(noise, f64::INFINITY, NoiseSource::Stated);
     let options = Options {
         draws: DRAWS,
         seed: plan.seed,

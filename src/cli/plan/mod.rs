@@ -19,7 +19,7 @@ use toml::Spanned;
 
 use super::{Answer, CommonArgs};
 use crate::diagnosis::{Diagnosability, NoiseLaw, NoiseSource, Options, certificate, for_people};
-use crate::io::{Message, SetupFile, Status};
+use crate::io::{Message, Numbers, SetupFile, Status};
 use crate::report::number::plain;
 use crate::report::plot::{Axis, Bar, Bars};
 use crate::report::{Cell, Figure, Page, Section, Standing, Table};
@@ -70,8 +70,8 @@ struct File {
     repeats: Option<Spanned<u32>>,
     #[serde(default)]
     both_directions: bool,
-    tilts: Option<Spanned<[f64; 3]>>,
-    forms: Option<Spanned<[f64; 2]>>,
+    tilts: Option<Spanned<Numbers<3>>>,
+    forms: Option<Spanned<Numbers<2>>>,
     #[serde(default)]
     convention: Convention,
 }
@@ -130,7 +130,11 @@ impl Planned {
         let limits = |least: f64| least..=LARGEST;
         let (tilts, forms) = (file.tilts, file.forms);
         if let Some(tilts) = &tilts
-            && !tilts.get_ref().iter().all(|t| limits(-LARGEST).contains(t))
+            && !tilts
+                .get_ref()
+                .0
+                .iter()
+                .all(|t| limits(-LARGEST).contains(t))
         {
             return Err(setup.bad(
                 tilts.span(),
@@ -139,7 +143,7 @@ impl Planned {
             ));
         }
         if let Some(forms) = &forms
-            && !forms.get_ref().iter().all(|f| limits(0.0).contains(f))
+            && !forms.get_ref().0.iter().all(|f| limits(0.0).contains(f))
         {
             return Err(setup.bad(
                 forms.span(),
@@ -153,8 +157,8 @@ impl Planned {
             positions,
             repeats,
             both_directions: file.both_directions,
-            tilts: tilts.map_or(TILTS, Spanned::into_inner),
-            forms: forms.map_or(FORMS, Spanned::into_inner),
+            tilts: tilts.map_or(TILTS, |t| t.into_inner().0),
+            forms: forms.map_or(FORMS, |f| f.into_inner().0),
             convention: file.convention,
         })
     }
@@ -212,7 +216,9 @@ fn certified(planned: &Planned, seed: u64) -> Result<Vec<Diagnosability>, Messag
     };
     let model = Linearised::new(&observations, assumptions)
         .map_err(|e| Message::bad_input(e.to_string()).remedy("plan more positions or repeats"))?;
-    let law = NoiseLaw::white(planned.noise, f64::INFINITY, NoiseSource::Stated);
+    // Of a reading of the model, which may stand for several.
+    let noise = model.stated_noise().unwrap_or(planned.noise);
+    let law = NoiseLaw::white(noise, f64::INFINITY, NoiseSource::Stated);
     let options = Options {
         draws: DRAWS,
         seed,

@@ -278,18 +278,22 @@ fn expected_closure(fit: &Simultaneous, points: usize) -> f64 {
 
 fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
     let cells = fit.knots.cells();
-    let how = match setup.knots {
-        Some(_) => "as the set-up says",
-        None => {
+    let how = match (setup.knots, fit.knots.refuted()) {
+        (Some(_), _) => "as the set-up says".to_owned(),
+        (None, None) => {
             "chosen by the corrected information criterion (the forms' bands leave that choice out)"
+                .to_owned()
         }
+        (None, Some(fewer)) => format!(
+            "the fewest that leave no more than the finest do but for noise: with {fewer}, which the corrected \
+             information criterion would have of so few positions, the forms would be told as noise"
+        ),
     };
     let verdict = match fit.knots.verdict {
         KnotVerdict::Enough => "neighbouring residuals are not correlated",
         KnotVerdict::TooFew => {
             "too few: neighbouring residuals go together, the forms have detail that the knots cannot follow"
         }
-        KnotVerdict::TooMany => "too many: fewer describe the data as well",
     };
     report::reversal::Knots {
         criterion: "corrected Akaike criterion".to_owned(),

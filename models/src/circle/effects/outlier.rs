@@ -29,7 +29,8 @@ impl Effect<CirclePoints> for Outlier {
 
     fn variant_name(&self, model: &CirclePoints, shape: &Shape) -> Option<String> {
         let place = model.places().get(shape.variant)?;
-        Some(format!("at {:.1} deg, repeat {}", place.x, place.repeat))
+        let angle = place.x.rem_euclid(360.0);
+        Some(format!("at {angle:.1} deg, repeat {}", place.repeat))
     }
 
     fn columns(&self, _model: &CirclePoints, shape: &Shape) -> Vec<Column> {

@@ -10,7 +10,6 @@ use crate::model::{
 };
 use crate::reversal::designs::{Determined, SLOPES, Zero};
 use crate::reversal::effects;
-use crate::reversal::straight_line::StraightLine;
 
 impl FittedModel for Linearised {
     fn name(&self) -> &'static str {
@@ -52,7 +51,7 @@ impl FittedModel for Linearised {
                 columns[(k, offsets)] = self.seat(place).theta[0] * (place.x - mean_x);
             }
         }
-        let line = StraightLine::of(&self.positions).slope;
+        let line = &self.gauge.slope;
         let withheld = withheld.into_iter().map(|k| (k, line.clone())).collect();
         Freedom {
             columns,
@@ -116,12 +115,11 @@ impl FittedModel for Linearised {
         let closing: Vec<f64> = (self.positions.iter())
             .map(|x| (x - mean_x) / sxx)
             .collect();
-        let gauge = StraightLine::of(&self.positions);
         let of_slope = |name: &str, sign: fn(&Seat) -> f64, slope: &[f64]| {
             self.slope_quantity(name, slope, |c| sign(&self.present()[c]) / 4.0)
         };
         let contrast =
-            |name: &str, sign: fn(&Seat) -> f64| of_slope(name, sign, gauge.slope.as_slice());
+            |name: &str, sign: fn(&Seat) -> f64| of_slope(name, sign, self.gauge.slope.as_slice());
         if self.arrangement.has_beta() {
             vec![
                 contrast("alpha", |s| s.phi[0]),
@@ -286,7 +284,6 @@ impl Linearised {
     fn slopes_of_design(&self) -> Vec<Quantity> {
         let slopes = &self.arrangement.determined().slopes;
         let weights = slopes.weights();
-        let gauge = StraightLine::of(&self.positions);
         let mut names: Vec<(usize, String)> =
             Determined::names(slopes).into_iter().enumerate().collect();
         // Those of the slide first.
@@ -298,7 +295,7 @@ impl Linearised {
         names
             .into_iter()
             .map(|(p, name)| {
-                self.slope_quantity(&name, gauge.slope.as_slice(), |c| weights[(p, c)])
+                self.slope_quantity(&name, self.gauge.slope.as_slice(), |c| weights[(p, c)])
             })
             .collect()
     }

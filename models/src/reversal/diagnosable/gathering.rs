@@ -19,7 +19,9 @@ use super::filling::{self, Lane};
 use super::sorting::{TraceKey, trace_key};
 use super::{Assumptions, NotDiagnosable};
 use crate::reversal::Direction;
+use crate::reversal::cells::Union;
 use crate::reversal::designs::{DesignChannel, DesignObservations, DesignReading};
+use crate::reversal::straight_line::StraightLine;
 
 /// Gathered readings of all traces, about: what a diagnosis takes a second for.
 const MOST_READINGS: usize = 5000;
@@ -54,6 +56,8 @@ pub struct Gathered {
     pub(super) ends: [f64; 2],
     /// Whether each channel's traces were read at the same places.
     pub(super) repeated: bool,
+    /// The line of a profile over all positions that were read, from its values at the cells' centres.
+    pub(super) gauge: StraightLine,
     /// How far beyond its cell's centre each reading made was taken, in the mean, mm, in their order.
     pub(super) offsets: Vec<f64>,
 }
@@ -217,6 +221,7 @@ pub(super) fn gather(
         scatter: between_grids::variance(&lanes, &closures),
         ends: ends.map(|spread| spread.min(width)),
         repeated: are_repeated(&members, readings, width),
+        gauge: StraightLine::carried(&positions_of(&members, readings), centres),
         offsets,
     };
     let made = DesignObservations {
@@ -224,6 +229,16 @@ pub(super) fn gather(
         readings: made,
     };
     Ok((made, gathered))
+}
+
+/// All positions that were read in the cells, growing, each once.
+fn positions_of(members: &[(TraceKey, Vec<&[usize]>)], readings: &[DesignReading]) -> Vec<f64> {
+    let of = |inside: &Vec<&[usize]>| -> Vec<f64> {
+        let rows = inside.iter().copied().flatten();
+        rows.map(|k| readings[*k].x).collect()
+    };
+    let by_trace: Vec<Vec<f64>> = members.iter().map(|(_, inside)| of(inside)).collect();
+    Union::of(by_trace.iter().map(Vec::as_slice)).collect()
 }
 
 /// Whether the traces of each channel were read at the same places in every cell where they were read, but for a

@@ -33,6 +33,7 @@ use thiserror::Error;
 use super::designs::{DesignFit, DesignObservations, DesignReading, Zero};
 use super::simultaneous::Simultaneous;
 use super::smooth_profile::{SmoothProfile, Smoother};
+use super::straight_line::StraightLine;
 use super::{Convention, Observations};
 use crate::model::{Column, FittedModel, Place, Record};
 pub use arrangement::{Arrangement, Seat, indicator_name};
@@ -82,6 +83,8 @@ pub struct Linearised {
     arrangement: Arrangement,
     trace_channels: Vec<usize>,
     positions: Vec<f64>,
+    /// The line that forms have none of.
+    gauge: StraightLine,
     smoother: Smoother,
     /// By channel.
     lines: Vec<ChannelLine>,
@@ -232,6 +235,10 @@ impl Linearised {
             between_grids::scatter(&sorted, &arrangement, gathered)
         });
         let last = sorted.places.iter().map(|p| p.time).fold(0.0, f64::max);
+        let gauge = (gathered.as_ref()).map_or_else(
+            || StraightLine::of(&sorted.positions),
+            |gathered| gathered.gauge.clone(),
+        );
         Ok(Self {
             span: 1.0,
             reach: 1.0,
@@ -243,6 +250,7 @@ impl Linearised {
             record: Record::new(sorted.places, sorted.traces, DVector::zeros(0)),
             trace_channels: sorted.trace_channels,
             positions: sorted.positions,
+            gauge,
             smoother,
             lines: vec![flat; channels],
             forms: vec![nothing; arrangement.form_names().len()],

@@ -3,7 +3,6 @@
 use nalgebra::DVector;
 
 use super::super::smooth_profile::{SmoothProfile, Spot};
-use super::super::straight_line::StraightLine;
 use super::Linearised;
 
 /// How the forms of a fitted state are smoothed.
@@ -29,7 +28,7 @@ impl Linearised {
     pub(super) fn fit(&mut self, smoothing: Smoothing) {
         let means = self.channel_means(&self.record.observed, None);
         let n = self.positions.len();
-        let gauge = StraightLine::of(&self.positions);
+        let gauge = &self.gauge;
         let mut residual: Vec<Option<DVector<f64>>> = vec![None; means.len()];
         for (k, mean) in means.iter().enumerate() {
             let Some(mean) = mean else { continue };

@@ -12,8 +12,6 @@ pub enum KnotVerdict {
     /// Neighbouring residuals go together: forms have detail that the knots cannot follow (or the
     /// noise itself is correlated).
     TooFew,
-    /// The ladder did better with fewer.
-    TooMany,
 }
 
 /// The knots of the fit.
@@ -61,12 +59,8 @@ impl FittedKnots {
         };
         // A fit with p unknowns leaves neighbours a correlation of about −p/m on average.
         let z = correlation * pairs.sqrt();
-        let cells = breaks.len() - 1;
-        let best = table.iter().min_by(|a, b| a.aicc.total_cmp(&b.aicc));
         let verdict = if z > SUSPICIOUS_Z {
             KnotVerdict::TooFew
-        } else if best.is_some_and(|b| b.cells < cells) {
-            KnotVerdict::TooMany
         } else {
             KnotVerdict::Enough
         };
@@ -77,6 +71,12 @@ impl FittedKnots {
             neighbour_z: z,
             verdict,
         }
+    }
+
+    /// The number of cells that the criterion alone would have, where it was refuted: of few positions it counts forms as noise.
+    pub fn refuted(&self) -> Option<usize> {
+        let best = self.table.iter().min_by(|a, b| a.aicc.total_cmp(&b.aicc))?;
+        (best.cells < self.cells()).then_some(best.cells)
     }
 
     /// Number of cells.

@@ -3,7 +3,10 @@
 //! At the seed's tilts the cost of the linear fit with K cells is that of one linear problem. The choice
 //! is the least corrected Akaike criterion (Hurvich and Tsai, Biometrika 76, 1989),
 //! m ln(RSS/m) + 2pm/(m − p − 1); Schwarz's criterion and generalised cross-validation stand beside
-//! it in the table.
+//! it in the table. With few positions the criterion's correction outweighs forms that stand far out of the
+//! noise; there what the finest rung leaves is the measure (`sparse.rs`).
+
+mod sparse;
 
 use errsep_solvers::linear::bordered::{Bordered, Solved};
 use errsep_solvers::problem::NoValue;
@@ -238,17 +241,15 @@ impl Choice<'_> {
         let most = positions(self.channels) / POSITIONS_A_CELL;
         let mut climbed = Climbed::default();
         for cells in std::iter::once(1).chain(ladder(most)) {
-            let breaks = self.breaks(&unknowns_of(cells + 3), cells)?;
-            let unknowns = unknowns_of(breaks.len() + 2);
+            let (unknowns, bases) = self.rung(unknowns_of, cells)?;
             let count = unknowns.free_count();
-            let cells = breaks.len() - 1;
+            let cells = bases[0].cell_count();
             if climbed.table.last().is_some_and(|t| t.cells == cells) {
                 continue;
             }
             if readings < count + FEWEST_FREE {
                 break;
             }
-            let bases = self.bases(&unknowns, &breaks)?;
             let Some((squares, found)) = squares(unknowns, bases)? else {
                 break;
             };
@@ -258,7 +259,22 @@ impl Choice<'_> {
                 break;
             }
         }
+        if most < sparse::CELLS {
+            self.climb_to_the_finest(unknowns_of, squares, &mut climbed)?;
+        }
         Ok(climbed)
+    }
+
+    /// The unknowns and bases with so many cells.
+    fn rung(
+        &self,
+        unknowns_of: &impl Fn(usize) -> Unknowns,
+        cells: usize,
+    ) -> Result<(Unknowns, Vec<CubicBSpline>), ReversalError> {
+        let breaks = self.breaks(&unknowns_of(cells + 3), cells)?;
+        let unknowns = unknowns_of(breaks.len() + 2);
+        let bases = self.bases(&unknowns, &breaks)?;
+        Ok((unknowns, bases))
     }
 
     /// Where the fit begins: at the tilts that come nearest to the lines.

@@ -8,8 +8,9 @@
 use super::fit::TurningFit;
 use super::spread::Spread;
 
-/// Steps, of which each adds to χ², end where one adds no more than this share of it.
-const SETTLED: f64 = 1e-19;
+/// Steps, of which each adds to χ², end where two in a row add no more than this share of it: what rounding has left of a
+/// residual lies where C is zero, and steps from there would grow without bounds.
+const SETTLED: f64 = 1e-9;
 
 impl TurningFit<'_> {
     /// χ² of what the turn's spline holds beside a line, and its degrees of freedom: how surely the turn
@@ -59,6 +60,7 @@ fn generalised_square(
     let mut direction = near(&rest);
     let mut size = dot(&rest, &direction);
     let mut square = 0.0;
+    let mut settled = 0;
     // Without rounding there are no more steps than the rank.
     for _ in 0..3 * rank {
         let image = times(&direction);
@@ -68,7 +70,12 @@ fn generalised_square(
         }
         let step = size / curved;
         square += step * size;
-        if step * size <= SETTLED * square {
+        settled = if step * size <= SETTLED * square {
+            settled + 1
+        } else {
+            0
+        };
+        if settled == 2 {
             break;
         }
         for (rest, image) in rest.iter_mut().zip(&image) {

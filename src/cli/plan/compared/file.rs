@@ -10,7 +10,7 @@ use super::super::designs::{Common, Costs};
 use super::super::{FORMS, LARGEST, LONGEST_TRAVEL};
 use crate::io::message::{list, nearest};
 use crate::io::reversal::{Angles, channels};
-use crate::io::{Message, SetupFile};
+use crate::io::{Message, Numbers, SetupFile};
 
 /// More designs than this have no place beside each other.
 const MOST_DESIGNS: usize = 8;
@@ -43,8 +43,8 @@ pub(super) struct File {
     repeats: Option<Spanned<u32>>,
     #[serde(default)]
     both_directions: bool,
-    slopes: Option<Spanned<[f64; 5]>>,
-    forms: Option<Spanned<[f64; 2]>>,
+    slopes: Option<Spanned<Numbers<5>>>,
+    forms: Option<Spanned<Numbers<2>>>,
     thickness: Option<Spanned<f64>>,
     #[serde(default)]
     zero: Zeros,
@@ -130,13 +130,13 @@ pub(super) fn common(setup: &SetupFile, file: &File, seed: u64) -> Result<Common
     }
     let within = |values: &[f64], least: f64| values.iter().all(|v| (least..=LARGEST).contains(v));
     if let Some(slopes) = &file.slopes
-        && !within(slopes.get_ref(), -LARGEST)
+        && !within(&slopes.get_ref().0, -LARGEST)
     {
         let remedy = "give alpha_h, alpha_v, gamma_1, gamma_2, cone in urad, finite and below 1e6";
         return Err(setup.bad(slopes.span(), "the expected slopes cannot be", remedy));
     }
     if let Some(forms) = &file.forms
-        && !within(forms.get_ref(), 0.0)
+        && !within(&forms.get_ref().0, 0.0)
     {
         let remedy =
             "give root mean squares of slide and sides in um, zero or greater and below 1e6";
@@ -151,8 +151,8 @@ pub(super) fn common(setup: &SetupFile, file: &File, seed: u64) -> Result<Common
         slopes: file
             .slopes
             .as_ref()
-            .map_or(SLOPES_EXPECTED, |s| *s.get_ref()),
-        forms: file.forms.as_ref().map_or(FORMS, |f| *f.get_ref()),
+            .map_or(SLOPES_EXPECTED, |s| s.get_ref().0),
+        forms: file.forms.as_ref().map_or(FORMS, |f| f.get_ref().0),
         thickness: match &file.thickness {
             Some(d) => above(d, "thickness", LARGEST, "mm")?,
             None => 0.0,

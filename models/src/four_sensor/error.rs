@@ -66,7 +66,9 @@ pub enum FourSensorError {
     /// Neither the L-curve nor cross-validation has an answer inside the range of λ.
     #[error(
         "no rule finds a regularization parameter: the surface does not stand out of the noise over \
-         the reach of the sensors; space them wider against its waves, or state lambda, or the noise and choice = \"discrepancy\""
+         the reach of the sensors, or a sensor reads so much else, bent, stretched or out of its place, that no surface \
+         fits; space them wider against its waves, compare the sensors on one step, or state lambda, or the noise and \
+         choice = \"discrepancy\""
     )]
     NoChoice,
     /// The residuals leave no degree of freedom and no noise was stated.

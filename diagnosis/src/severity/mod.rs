@@ -160,6 +160,7 @@ impl Severity {
 /// Rivals drawn and rivals named alike.
 #[derive(Debug, Clone, Copy, Default)]
 struct Count {
+    asked: usize,
     drawn: usize,
     alike: usize,
 }
@@ -189,7 +190,12 @@ impl Count {
 
     /// Whether more draws can hardly change on which side of the limit it is.
     fn settled(self) -> bool {
-        self.upper() <= 1.0 - STRONG || self.lower() > 1.0 - STRONG
+        self.upper() <= 1.0 - STRONG || self.is_beyond()
+    }
+
+    /// Whether it is surely beyond the limit.
+    fn is_beyond(self) -> bool {
+        self.lower() > 1.0 - STRONG
     }
 }
 
@@ -228,6 +234,13 @@ struct Beside {
     jump: bool,
 }
 
+impl Beside {
+    /// Whether it makes a name weak, whatever the rivals.
+    fn is_weak(self) -> bool {
+        self.left <= SUSPECT || self.several || self.dependent_noise || self.jump
+    }
+}
+
 /// The severity of one name.
 fn severity(
     context: &Context<'_>,
@@ -235,15 +248,7 @@ fn severity(
     name: &Name,
     options: &Options,
 ) -> Severity {
-    let families = Family::beside(context, grounds, &name.members);
-    let mut counts: Vec<(Family, Count)> = families
-        .into_par_iter()
-        .map(|family| {
-            let count = drawn(context, name, (family, grounds), options);
-            (family, count)
-        })
-        .filter(|(_, count)| count.drawn > 0)
-        .collect();
+    let mut counts = drawn(context, name, (grounds, beside), options);
     counts.sort_by(|a, b| b.1.probability().total_cmp(&a.1.probability()));
     let upper = counts.iter().map(|(_, c)| c.upper()).fold(0.0, f64::max);
     let most = counts.first().map_or(0.0, |(_, c)| c.probability());
@@ -256,12 +261,7 @@ fn severity(
         beside_others: beside.several,
         dependent_noise: beside.dependent_noise,
         jump_beside: beside.jump,
-        confidence: if lower >= STRONG
-            && beside.left > SUSPECT
-            && !beside.several
-            && !beside.dependent_noise
-            && !beside.jump
-        {
+        confidence: if lower >= STRONG && !beside.is_weak() {
             Confidence::Strong
         } else {
             Confidence::Weak
@@ -276,32 +276,47 @@ fn severity(
     }
 }
 
-/// Draws rivals of a family until it is settled on which side of the limit they are. A family that can
-/// hardly make a gap of this size is no rival: none are counted.
+/// Draws rivals of every family, a batch of each at a time, until it is settled on which side of the limit they are, or
+/// until the name is weak in any case: then the families that are left are known as well as a batch tells. A family that
+/// can hardly make a gap of this size is no rival: none are counted.
 fn drawn(
     context: &Context<'_>,
     name: &Name,
-    family: (Family, &Grounds),
+    (grounds, beside): (&Grounds, Beside),
     options: &Options,
-) -> Count {
-    let mut count = Count::default();
-    let mut asked = 0;
+) -> Vec<(Family, Count)> {
+    let families = Family::beside(context, grounds, &name.members);
+    let mut drawn: Vec<(Family, Count)> = families
+        .into_iter()
+        .map(|family| (family, Count::default()))
+        .collect();
     for batch in 0..options.severity.div_ceil(BATCH) {
-        let most = BATCH.min(options.severity - count.drawn);
-        asked += most;
-        let rivals = Drawn::of(context, name, family, (options.seed, batch), most);
-        if FEWEST * (count.drawn + rivals.count) < asked {
-            return Count::default();
-        }
-        let alike = name.given(context, &rivals);
-        count.drawn += rivals.count;
-        count.alike += alike.iter().filter(|alike| **alike).count();
-        if count.settled() || count.drawn >= options.severity {
-            return count;
+        drawn = drawn
+            .into_par_iter()
+            .filter_map(|(family, mut count)| {
+                let open = !count.settled() && count.drawn < options.severity;
+                if batch == 0 || open {
+                    let most = BATCH.min(options.severity - count.drawn);
+                    count.asked += most;
+                    let draw = (options.seed, batch);
+                    let rivals = Drawn::of(context, name, (family, grounds), draw, most);
+                    if FEWEST * (count.drawn + rivals.count) < count.asked {
+                        return None;
+                    }
+                    let alike = name.given(context, &rivals);
+                    count.drawn += rivals.count;
+                    count.alike += alike.iter().filter(|alike| **alike).count();
+                }
+                Some((family, count))
+            })
+            .collect();
+        if beside.is_weak() || drawn.iter().any(|(_, count)| count.is_beyond()) {
+            drawn.retain(|(_, count)| count.drawn > 0);
+            return drawn;
         }
     }
-    let told = count.drawn >= BATCH.min(options.severity);
-    if told { count } else { Count::default() }
+    drawn.retain(|(_, count)| count.drawn >= BATCH.min(options.severity));
+    drawn
 }
 
 #[cfg(test)]
@@ -310,7 +325,11 @@ mod tests {
 
     #[test]
     fn a_limit_is_that_of_clopper_and_pearson() {
-        let count = |alike, drawn| Count { drawn, alike };
+        let count = |alike, drawn| Count {
+            asked: drawn,
+            drawn,
+            alike,
+        };
         // Closed forms: none of n, 1 − 0.05^(1/n); all of n, 0.05^(1/n). Rounding of the search for a
         // quantile: 1e-6.
         assert!((count(0, 64).upper() - (1.0 - 0.05f64.powf(1.0 / 64.0))).abs() < 1e-6);

@@ -57,6 +57,8 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         })
         .collect();
     Outcome {
+        channels: s.lines.iter().map(|l| l.channel).collect(),
+        still: false,
         method: s.removal.name(),
         covariances: None,
         convention: s.convention,

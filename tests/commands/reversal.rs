@@ -582,3 +582,69 @@ fn what_passes_for_alpha_with_fewer_channels_is_told() {
     let four = json(folder.path(), &["reversal", "data.csv"]);
     assert_eq!(four["not_determined"], serde_json::json!([]));
 }
+
+/// Whole traces that moved between their repeats are no noise of a reading: the answer says so and names
+/// the diagnosis. Independent noise raises no alarm, whatever the channels' own noise.
+#[test]
+fn traces_that_moved_between_repeats_are_told() {
+    let folder = TempDir::new().unwrap();
+    let methods = [
+        &["reversal", "data.csv"][..],
+        &["reversal", "data.csv", "--simultaneous"],
+    ];
+    let both = ["--repeats", "3", "--both-directions"];
+    simulated(
+        folder.path(),
+        &[&both[..], &["--effect", "zero-jump=0.4"]].concat(),
+    );
+    for args in methods {
+        let (_, text, _) = run(folder.path(), args);
+        for said in ["model and readings disagree", "errsep diagnose data.csv"] {
+            assert!(text.contains(said), "{said:?} is not in:\n{text}");
+        }
+        assert_eq!(json(folder.path(), args)["agreement"]["disagree"], true);
+    }
+    for (seed, repeats) in [("1", "2"), ("2", "2"), ("3", "3"), ("4", "5"), ("5", "3")] {
+        simulated(folder.path(), &["--seed", seed, "--repeats", repeats]);
+        for args in methods {
+            let (_, text, _) = run(folder.path(), args);
+            assert!(!text.contains("disagree"), "{seed}: {text}");
+        }
+    }
+}
+
+/// By chance the closure of a few positions is half as large again as the noise explains: no alarm.
+#[test]
+fn a_closure_of_few_positions_raises_no_alarm() {
+    let folder = TempDir::new().unwrap();
+    for seed in 1..=40 {
+        let seed = seed.to_string();
+        let few = ["--positions", "7", "--repeats", "3", "--seed", &seed];
+        let (_, data, _) = run(
+            folder.path(),
+            &[&["simulate", "reversal"][..], &few].concat(),
+        );
+        fs::write(folder.path().join("data.csv"), data).unwrap();
+        let (_, text, _) = run(folder.path(), &["reversal", "data.csv"]);
+        assert!(
+            !text.contains("disagree") && !text.contains("explains"),
+            "{seed}: {text}"
+        );
+    }
+}
+
+/// Without repeats the closure is told from the noise by neighbouring readings, which bound it.
+#[test]
+fn a_jump_without_repeats_is_told_by_the_closure() {
+    let folder = TempDir::new().unwrap();
+    simulated(folder.path(), &["--effect", "zero-jump=2"]);
+    let (_, text, _) = run(folder.path(), &["reversal", "data.csv"]);
+    for said in ["model and readings disagree", "errsep diagnose data.csv"] {
+        assert!(text.contains(said), "{said:?} is not in:\n{text}");
+    }
+    for seed in ["1", "2", "3", "4", "5"] {
+        simulated(folder.path(), &["--seed", seed]);
+        let (_, text, _) = run(folder.path(), &["reversal", "data.csv"]);
+        assert!(!text.contains("disagree"), "{seed}: {text}");
+    }
+}

@@ -126,6 +126,10 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let equal = still(&data);
     outcome.still = equal.len() == outcome.channels.len() && setup.noise.is_none();
     outcome.warnings.extend(still_in_words(&equal));
+    if let Some(moved) = staged::moved_traces(&data) {
+        outcome.disagree = Some(true);
+        outcome.warnings.push(moved);
+    }
     let diagnosed = match fit.filter(|_| args.diagnose) {
         Some(fit) => Some(Diagnosed::of(
             &args.data,

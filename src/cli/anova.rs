@@ -72,6 +72,27 @@ struct Analysed {
     summary: Option<Summary>,
 }
 
+impl Analysed {
+    /// Repeats that agree to the last digit, which hides their scatter.
+    fn remark(&self) -> Option<&'static str> {
+        let groups = self.groups.groups();
+        let first = groups.first()?.readings.first()?;
+        let equal = |of: &Group, value: &f64| of.readings.iter().all(|r| r == value);
+        if groups.iter().all(|g| equal(g, first)) {
+            return Some(
+                "all readings are equal, which tells nothing of their scatter: the resolution is too coarse, or \
+                 the column is not the reading",
+            );
+        }
+        let repeated = self.result.readings > self.result.groups;
+        let alike = |g: &Group| g.readings.first().is_some_and(|value| equal(g, value));
+        (repeated && groups.iter().all(alike)).then_some(
+            "the readings of each part are equal, which tells nothing of the scatter of a measurement: the \
+             resolution is too coarse, or the repeats are copies",
+        )
+    }
+}
+
 /// Analyses every feature of the table.
 ///
 /// # Errors
@@ -113,6 +134,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             groups: &a.groups,
             result: &a.result,
             summary: a.summary.as_ref(),
+            remark: a.remark(),
         })
         .collect();
     Ok(Answer {
@@ -176,6 +198,17 @@ fn describe(text: &mut String, one: &Analysed) -> Result<(), Message> {
         "\n{} ({} parts, {} readings)",
         one.feature.name, r.groups, r.readings
     );
+    if let Some(remark) = one.remark() {
+        let _ = writeln!(text, "  warning           {remark}");
+        if r.mean.standard_uncertainty == 0.0 {
+            let mean = number::measured(r.mean.value, None);
+            let _ = writeln!(
+                text,
+                "  mean              {mean} {unit}, uncertainty not known"
+            );
+            return Ok(());
+        }
+    }
     let mean = number::measured(r.mean.value, Some(r.mean.standard_uncertainty));
     let _ = writeln!(
         text,
@@ -265,6 +298,7 @@ fn as_json(one: &Analysed) -> Result<Value, Message> {
         "keys": keys,
         "unit": one.feature.unit,
         "analysis": analysis,
+        "remarks": one.remark().into_iter().collect::<Vec<_>>(),
         "parts": parts,
     });
     if let (Value::Object(object), Some(summary)) = (&mut value, &one.summary) {

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::diagnose::joined::{self, Given};
 use super::quantity::{measured_words, quantity_json, unexpandable};
-use super::{Answer, ColumnArgs, CommonArgs};
+use super::{Answer, ColumnArgs, CommonArgs, disagreement};
 use crate::io::circle::{not_converged, read_points};
 use crate::io::{CsvTable, Message, Status};
 use crate::report::circle::{CircleView, page, zones};
@@ -65,6 +65,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let alike = fit.neighbours_alike(&points);
     let arc = fit.covered_arc(&points);
     let form = form_in_words(alike, arc, points.len());
+    let refuted = fit
+        .disagreement()
+        .map(|d| disagreement::in_words(d, "The points deviate", "--noise states", fit.noise_um));
+    let on_any = (fit.degrees_of_freedom == 0)
+        .then(|| "Three points always lie on a circle: this says nothing of the form.".to_owned());
+    let remarks: Vec<String> = refuted.into_iter().chain(on_any).collect();
     let mut others: Vec<(String, Circle)> = AlgebraicFit::ALL
         .into_iter()
         .filter_map(|kind| Some((kind.name().to_owned(), algebraic(&points, kind).ok()?)))
@@ -78,6 +84,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         None
     };
     let mut json = as_json(&points, &fit, (alike, arc), &zones_found, &others)?;
+    json["remarks"] = json!(remarks);
     if let (Some(own), Value::Object(object)) = (nistir, &mut json) {
         object.insert(
             "nistir".to_owned(),
@@ -91,7 +98,14 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         );
     }
     let answer = Answer {
-        text: in_words(args, &points, &fit, form.as_deref(), &zones_found, &others)?,
+        text: in_words(
+            args,
+            &points,
+            &fit,
+            (form.as_deref(), &remarks),
+            &zones_found,
+            &others,
+        )?,
         json,
         page: args.common.page(|| {
             page(&CircleView {
@@ -102,6 +116,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
                 residuals_um: &fit.residuals_um,
                 noise: (fit.noise_um, fit.noise_given),
                 form: form.as_deref(),
+                remarks: &remarks,
                 circularity: &zones_found,
                 others: &others,
             })
@@ -200,7 +215,7 @@ fn in_words(
     args: &Args,
     points: &[Point],
     fit: &CircleFit,
-    form: Option<&str>,
+    (form, remarks): (Option<&str>, &[String]),
     circularity: &Circularity,
     others: &[(String, Circle)],
 ) -> Result<String, Message> {
@@ -225,7 +240,7 @@ fn in_words(
         },
         fit.degrees_of_freedom
     );
-    if let Some(sentence) = form {
+    for sentence in form.into_iter().chain(remarks.iter().map(String::as_str)) {
         let _ = writeln!(text, "  {sentence}");
     }
     let _ = writeln!(text, "\nCircularity");
@@ -292,6 +307,7 @@ fn as_json(
             }),
             Err(reason) => json!({"reference": reference.name(), "reason": reason}),
         }).collect::<Vec<_>>(),
+        "disagreement": disagreement::as_json(fit.disagreement()),
         "residuals": {"value": fit.residuals_um, "unit": "um"},
         "convergence": {"converged": true, "reason": fit.ending, "iterations": fit.iterations},
     }))

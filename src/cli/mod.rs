@@ -9,6 +9,7 @@ pub mod circle;
 mod common;
 pub mod completions;
 pub mod diagnose;
+mod disagreement;
 pub mod export;
 pub mod four_sensor;
 pub mod fourier;

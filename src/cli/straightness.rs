@@ -73,6 +73,10 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     for s in &results {
         let _ = writeln!(text, "  {}", in_words(s));
     }
+    let remark = nothing_shown(&x, &y);
+    if let Some(remark) = remark {
+        let _ = writeln!(text, "  {remark}");
+    }
     let table = results.iter().fold(
         CsvTable::new("deviations.csv").numbers("x_mm", x.clone()),
         |table, s| {
@@ -89,10 +93,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             "schema": "errsep.straightness/1",
             "points": x.len(),
             "reference_lines": results.iter().map(as_json).collect::<Vec<_>>(),
+            "remarks": remark.into_iter().collect::<Vec<_>>(),
             "profile": profile(&x, &y, &results),
         }),
         page: args.common.page(|| {
-            report::straightness::page(&args.profile.display().to_string(), &x, &y, &results)
+            let name = args.profile.display().to_string();
+            report::straightness::page(&name, &x, &y, &results, remark)
         }),
         tables: vec![table],
         inputs: vec![args.profile.clone()],
@@ -100,6 +106,23 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         seed: None,
         status: Status::Done,
     })
+}
+
+/// A profile that is straight whatever was measured.
+fn nothing_shown(x: &[f64], y: &[f64]) -> Option<&'static str> {
+    let others = |values: &[f64], known: &[f64]| values.iter().any(|v| !known.contains(v));
+    let ends = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |e, v| {
+        (e.0.min(*v), e.1.max(*v))
+    });
+    if !others(x, &[ends.0, ends.1]) {
+        return Some(
+            "Two positions always lie on a line: this says nothing of the straightness. Read more positions.",
+        );
+    }
+    (!others(y, &y[..1])).then_some(
+        "All deviations are equal, which says nothing of the straightness: the resolution is too coarse, or \
+         the column is not the reading.",
+    )
 }
 
 fn read(path: &Path, map: &ColumnMap, of: Option<&str>) -> Result<(Vec<f64>, Vec<f64>), Message> {

@@ -21,6 +21,8 @@ pub struct FeatureView<'a> {
     pub result: &'a OneWay,
     /// The figures of NISTIR 6868, where they were asked for.
     pub summary: Option<&'a Summary>,
+    /// Why its readings say less than they seem to.
+    pub remark: Option<&'a str>,
 }
 
 /// The page of all features; `open` names those whose components are not determined.
@@ -60,6 +62,11 @@ fn verdict(features: &[FeatureView], open: &[&str]) -> (Standing, String) {
             open.join(", ")
         );
         return (Standing::Bad, sentence);
+    }
+    let doubtful = |f: &FeatureView| f.remark.map(|remark| format!("{}: {remark}", f.name));
+    let doubts: Vec<String> = features.iter().filter_map(doubtful).collect();
+    if !doubts.is_empty() {
+        return (Standing::Caution, format!("{}.", doubts.join("; ")));
     }
     let differ = features
         .iter()

@@ -22,6 +22,8 @@ pub struct CircleView<'a> {
     pub noise: (f64, bool),
     /// What the answer says of form, where it does.
     pub form: Option<&'a str>,
+    /// What the reader has to weigh.
+    pub remarks: &'a [String],
     /// The circularities.
     pub circularity: &'a Circularity,
     /// Other fits by name, mm.
@@ -33,12 +35,12 @@ pub struct CircleView<'a> {
 pub fn page(view: &CircleView) -> Page {
     let sentence = match &view.circularity.minimum_zone {
         Ok(zone) => format!(
-            "The points lie within {} µm of a circle (minimum zone).",
+            "The points lie between two concentric circles {} µm apart (minimum zone).",
             number::plain(zone.width_um, 4)
         ),
         Err(reason) => format!("No minimum zone: {reason}."),
     };
-    let standing = if view.circularity.minimum_zone.is_ok() {
+    let standing = if view.circularity.minimum_zone.is_ok() && view.remarks.is_empty() {
         Standing::Good
     } else {
         Standing::Caution
@@ -81,6 +83,10 @@ fn fit_section(view: &CircleView) -> Section {
         Some(sentence) => section.note(sentence),
         None => section,
     };
+    let section = view
+        .remarks
+        .iter()
+        .fold(section, |section, remark| section.warning(remark.as_str()));
     section.figure(Figure::new(
         "Radial deviations",
         "Each point against its angle about the fitted centre, positive outside.",

@@ -25,6 +25,8 @@ pub struct StepDiagonalView<'a> {
     pub totals: &'a DiagonalTotals,
     /// Sets of sequences, where they were asked for.
     pub choices: &'a [SequenceChoice],
+    /// What the reader has to weigh.
+    pub remarks: &'a [String],
 }
 
 /// The page of the tests.
@@ -40,7 +42,7 @@ pub fn page(view: &StepDiagonalView) -> Page {
         "The readings determine {} of {} unknowns: {whole} of 18 error functions wholly.",
         fit.rank, fit.parameters
     );
-    let standing = if fit.ambiguities.is_empty() {
+    let standing = if fit.ambiguities.is_empty() && view.remarks.is_empty() {
         Standing::Good
     } else {
         Standing::Caution
@@ -80,7 +82,14 @@ fn determined(view: &StepDiagonalView) -> Section {
             value,
         ]);
     }
-    let mut section = Section::new("What the readings determine").table(table);
+    let mut section = view
+        .remarks
+        .iter()
+        .fold(
+            Section::new("What the readings determine"),
+            |section, remark| section.warning(remark.as_str()),
+        )
+        .table(table);
     if !view.fit.ambiguities.is_empty() {
         section = section
             .warning(

@@ -5,9 +5,15 @@ use errsep_models::straightness::{ReferenceLine, Straightness};
 use super::plot::{Axis, Chart, Series};
 use super::{Cell, Figure, KeyFigure, Page, Section, Standing, Table, number};
 
-/// The page: `x` in mm, `y` in µm, one result a reference line.
+/// The page: `x` in mm, `y` in µm, one result a reference line; `remark` where these say nothing.
 #[must_use]
-pub fn page(name: &str, x: &[f64], y: &[f64], results: &[Straightness]) -> Page {
+pub fn page(
+    name: &str,
+    x: &[f64],
+    y: &[f64],
+    results: &[Straightness],
+    remark: Option<&str>,
+) -> Page {
     let ends = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |e, v| {
         (e.0.min(*v), e.1.max(*v))
     });
@@ -51,7 +57,10 @@ pub fn page(name: &str, x: &[f64], y: &[f64], results: &[Straightness]) -> Page 
         None => section,
     };
     Page::new("Straightness", name)
-        .summary(Standing::Neutral, sentence)
+        .summary(
+            remark.map_or(Standing::Neutral, |_| Standing::Bad),
+            remark.map_or(sentence, str::to_owned),
+        )
         .section(section.table(Table::new("By reference line", columns).rows(rows)))
 }
 

@@ -227,3 +227,35 @@ fn one_thing_wrong_at_a_time() {
     );
     refused("part,value\n\u{0}\n", &[], &["not text"]);
 }
+
+/// Equal readings are no knowledge of a scatter of zero.
+#[test]
+fn equal_readings_tell_no_scatter() {
+    for (data, said) in [
+        ("part,value\nA,1\nA,1\nB,1\nB,1\n", "all readings are equal"),
+        (
+            "part,value\nA,1\nA,1\nB,2\nB,2\n",
+            "the readings of each part are equal",
+        ),
+    ] {
+        let folder = Folder::with(&[("data.csv", data)]);
+        let output = run(&folder, &["anova", "data.csv", "--out", "out"]);
+        assert_eq!(output.status, 0, "{}", output.stderr);
+        let page = folder.read("out/report.html");
+        for text in [&output.stdout, &page] {
+            assert!(text.contains(said), "{said:?} is not in:\n{text}");
+        }
+        assert!(page.contains("summary caution"));
+        assert!(
+            !output.stdout.contains("± 0 µm, U = 0"),
+            "{}",
+            output.stdout
+        );
+        let answer: Value = serde_json::from_str(&folder.read("out/result.json")).unwrap();
+        assert!(answer["features"][0]["remarks"].to_string().contains(said));
+    }
+    let folder = Folder::with(&[("data.csv", "part,value\nA,1\nA,1.1\nB,1\nB,1\n")]);
+    let answer = run(&folder, &["anova", "data.csv", "--format", "json"]).stdout;
+    let answer: Value = serde_json::from_str(&answer).unwrap();
+    assert_eq!(answer["features"][0]["remarks"], serde_json::json!([]));
+}

@@ -27,6 +27,44 @@ fn a_message_points_into_what_is_in_memory() {
     assert_eq!(message.trouble(), Trouble::BadInput);
 }
 
+/// Two points, and deviations that are all equal, lie on a line whatever was measured.
+#[test]
+fn a_profile_that_can_only_be_straight_says_so() {
+    for (data, said) in [
+        (
+            "x,deviation\n0,1\n1,2\n",
+            Some("Two positions always lie on a line"),
+        ),
+        (
+            "x,deviation\n0,1\n1,2\n0,1\n",
+            Some("Two positions always lie on a line"),
+        ),
+        (
+            "x,deviation\n0,1\n1,1\n2,1\n",
+            Some("All deviations are equal"),
+        ),
+        ("x,deviation\n0,1\n1,2\n2,1\n", None),
+    ] {
+        let answer = call(&["straightness", "<data>"], profile(data))
+            .unwrap()
+            .answer;
+        let page = answer.page.render();
+        match said {
+            Some(said) => {
+                assert!(answer.text.contains(said), "{}", answer.text);
+                assert!(
+                    answer.json["remarks"][0]
+                        .as_str()
+                        .unwrap()
+                        .starts_with(said)
+                );
+                assert!(page.contains(said) && !page.contains("The profile is straight"));
+            }
+            None => assert_eq!(answer.json["remarks"], serde_json::json!([])),
+        }
+    }
+}
+
 #[test]
 fn an_unknown_option_is_told_with_its_hint() {
     let message = call(&["reversal", "<data>", "--simultaneus"], profile(""))

@@ -225,3 +225,55 @@ fn points_exactly_on_a_circle_are_a_circle() {
     let answer = json(&folder, &["circle", "exact.csv", "--format", "json"]);
     assert!((number(&answer, "/fit/radius/value") - 50.0).abs() < 1e-12);
 }
+
+/// A noise that the points refute is told, in the words of the answer, to programs and on the page; the
+/// right one is not.
+#[test]
+fn a_given_noise_is_held_against_the_deviations() {
+    let folder = Folder::with(&[]);
+    for seed in 1..=20 {
+        let seed = seed.to_string();
+        let made = run(
+            &folder,
+            &["simulate", "circle", "--noise", "1", "--seed", &seed],
+        );
+        folder.write("points.csv", &made.stdout);
+        let args = ["circle", "points.csv", "--noise", "1", "--format", "json"];
+        let answer = json(&folder, &args);
+        assert!(
+            answer["disagreement"].is_null(),
+            "{seed}: {}",
+            answer["disagreement"]
+        );
+        assert_eq!(answer["remarks"], serde_json::json!([]));
+    }
+    let args = ["circle", "points.csv", "--noise", "0.1", "--out", "out"];
+    let told = run(&folder, &args).stdout;
+    let page = folder.read("out/report.html");
+    for said in [&told, &page] {
+        assert!(
+            said.contains("--noise states 0.100 µm: the uncertainties are too small"),
+            "{said}"
+        );
+        assert!(said.contains("errsep diagnose"), "{said}");
+    }
+    assert!(page.contains("summary caution"));
+    let answer: Value = serde_json::from_str(&folder.read("out/result.json")).unwrap();
+    crate::command::documented(&answer, "docs/json/circle.md");
+    // k·u: 33 degrees of freedom tell the noise to 12 %.
+    assert!((number(&answer, "/disagreement/observed") - 1.0).abs() < 0.4);
+    assert!(number(&answer, "/disagreement/p_value") < 1e-3);
+}
+
+#[test]
+fn the_zone_is_the_distance_of_two_circles_and_three_points_show_none() {
+    let folder = Folder::with(&[("six.csv", SIX), ("three.csv", "x,y\n1,0\n0,1\n-1,0\n")]);
+    run(&folder, &["circle", "six.csv", "--out", "six"]);
+    let page = folder.read("six/report.html");
+    assert!(page.contains("between two concentric circles"), "{page}");
+    let told = run(&folder, &["circle", "three.csv", "--noise", "1"]).stdout;
+    assert!(
+        told.contains("Three points always lie on a circle"),
+        "{told}"
+    );
+}

@@ -494,3 +494,51 @@ fn a_simulation_writes_its_set_up() {
     assert_eq!(answer["residual"]["noise"], 0.25);
     assert_eq!(answer["residual"]["noise_estimated"], false);
 }
+
+/// A stated noise is held against what the outputs leave: told where it is too small and where one output
+/// lies off, not where it is right.
+#[test]
+fn a_stated_noise_is_held_against_the_residuals() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let stated = |noise: f64| format!("[sensors]\nspacing = [5.0, 5.0, 25.0]\nnoise = {noise}\n");
+    for seed in 1..=5 {
+        let (data, setup) = simulated(folder.path(), &["--seed", &seed.to_string()], &stated(0.1));
+        let answer = answered(&data, &setup);
+        assert_eq!(answer["disagreement"], Value::Null, "{seed}");
+    }
+    let (data, setup) = simulated(folder.path(), &["--seed", "3"], &stated(0.01));
+    let answer = answered(&data, &setup);
+    let observed = answer["disagreement"]["observed"].as_f64().expect("told");
+    // k·u: some 56 degrees of freedom tell the noise to 10 %.
+    assert!((observed - 0.1).abs() < 0.03, "{observed}");
+    std::fs::write(&setup, stated(0.1)).expect("written");
+    let whole = std::fs::read_to_string(&data).expect("the data");
+    let mut lines: Vec<String> = whole.lines().map(str::to_owned).collect();
+    let middle = lines.len() / 2;
+    let mut fields: Vec<String> = lines[middle].split(',').map(str::to_owned).collect();
+    let value: f64 = fields[2].parse().expect("an output");
+    fields[2] = (value + 5.0).to_string();
+    lines[middle] = fields.join(",");
+    std::fs::write(&data, lines.join("\n")).expect("written");
+    let report = folder.path().join("off");
+    let args = [
+        "four-sensor",
+        text(&data),
+        "--setup",
+        text(&setup),
+        "--out",
+        text(&report),
+    ];
+    let told = String::from_utf8_lossy(&errsep(&args).stdout).into_owned();
+    let page = std::fs::read_to_string(report.join("report.html")).expect("a report");
+    for said in [&told, &page] {
+        assert!(
+            said.contains("the set-up states 0.100 µm: the uncertainties are too small"),
+            "{said}"
+        );
+        assert!(said.contains("errsep diagnose"), "{said}");
+    }
+    let json = std::fs::read_to_string(report.join("result.json")).expect("JSON");
+    let json: Value = serde_json::from_str(&json).expect("JSON");
+    crate::command::documented(&json, "docs/json/four-sensor.md");
+}

@@ -506,5 +506,145 @@ fn an_indicator_that_stands_still_is_told() {
             "{text}"
         );
         assert!(!text.contains("Noise of one reading: 1"), "{text}");
+        // In place of a tilt of 0 ± 0.
+        assert!(
+            text.contains("All readings are equal, which tells neither tilt nor form"),
+            "{text}"
+        );
+        assert!(
+            !text.contains("The slide is") && !text.contains("the slide runs"),
+            "{text}"
+        );
+    }
+}
+
+/// With fewer than four channels the untapered convention counts the cone of the artefact as alpha; the
+/// answer says so in its first sentence, to programs and on the page, and four channels say nothing of it.
+#[test]
+fn what_passes_for_alpha_with_fewer_channels_is_told() {
+    let folder = TempDir::new().unwrap();
+    simulated(folder.path(), &["--effect", "taper=20e-6"]);
+    let all = fs::read_to_string(folder.path().join("data.csv")).unwrap();
+    let keep = |channels: &[&str]| {
+        let kept: Vec<&str> = all
+            .lines()
+            .filter(|line| {
+                channels.iter().any(|c| line.starts_with(c)) || line.starts_with("channel")
+            })
+            .collect();
+        fs::write(folder.path().join("part.csv"), kept.join("\n")).unwrap();
+    };
+    fs::write(
+        folder.path().join("rigid.toml"),
+        "[model]\nconvention = \"rigid\"\n",
+    )
+    .unwrap();
+    for (channels, remedy) in [
+        (&["1A", "2B"][..], "read 1A, 1B, 2A and 2B"),
+        (&["1B", "2A"], "read 1A, 1B, 2A and 2B"),
+        (
+            &["1A", "1B", "2B"],
+            "with which these channels tell them apart",
+        ),
+    ] {
+        keep(channels);
+        for method in [&[][..], &["--simultaneous"]] {
+            let args = [&["reversal", "part.csv", "--out", "out"], method].concat();
+            let (code, text, err) = run(folder.path(), &args);
+            assert_eq!(code, Some(0), "{err}");
+            let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+            for said in ["if the two sides of the artefact are parallel", remedy] {
+                assert!(text.contains(said), "{said:?} is not in:\n{text}");
+                assert!(page.contains(said), "{said:?} is not on the page");
+            }
+            let result = fs::read_to_string(folder.path().join("out/result.json")).unwrap();
+            let result: Value = serde_json::from_str(&result).unwrap();
+            let open = &result["not_determined"][0];
+            assert!(
+                open["combination"].as_str().unwrap().contains("cone"),
+                "{open}"
+            );
+            // What is told is so: the cone of 20 µrad lies in alpha, which is 40 µrad.
+            let alpha = result["tilts"]["alpha"]["value"].as_f64().unwrap();
+            assert!(((alpha - 40e-6).abs() - 20e-6).abs() < 1e-6, "{alpha}");
+            fs::remove_dir_all(folder.path().join("out")).unwrap();
+        }
+    }
+    // Three channels with the rigid convention do tell them apart.
+    let args = ["reversal", "part.csv", "--setup", "rigid.toml"];
+    let apart = json(folder.path(), &args);
+    assert_eq!(apart["not_determined"], serde_json::json!([]));
+    let alpha = apart["tilts"]["alpha"]["value"].as_f64().unwrap();
+    assert!((alpha - 40e-6).abs() < 1e-6, "{alpha}");
+    keep(&["1A", "2B"]);
+    let together = json(folder.path(), &args);
+    assert!(together["not_determined"][0]["remedy"].is_string());
+    let four = json(folder.path(), &["reversal", "data.csv"]);
+    assert_eq!(four["not_determined"], serde_json::json!([]));
+}
+
+/// Whole traces that moved between their repeats are no noise of a reading: the answer says so and names
+/// the diagnosis. Independent noise raises no alarm, whatever the channels' own noise.
+#[test]
+fn traces_that_moved_between_repeats_are_told() {
+    let folder = TempDir::new().unwrap();
+    let methods = [
+        &["reversal", "data.csv"][..],
+        &["reversal", "data.csv", "--simultaneous"],
+    ];
+    let both = ["--repeats", "3", "--both-directions"];
+    simulated(
+        folder.path(),
+        &[&both[..], &["--effect", "zero-jump=0.4"]].concat(),
+    );
+    for args in methods {
+        let (_, text, _) = run(folder.path(), args);
+        for said in ["model and readings disagree", "errsep diagnose data.csv"] {
+            assert!(text.contains(said), "{said:?} is not in:\n{text}");
+        }
+        assert_eq!(json(folder.path(), args)["agreement"]["disagree"], true);
+    }
+    for (seed, repeats) in [("1", "2"), ("2", "2"), ("3", "3"), ("4", "5"), ("5", "3")] {
+        simulated(folder.path(), &["--seed", seed, "--repeats", repeats]);
+        for args in methods {
+            let (_, text, _) = run(folder.path(), args);
+            assert!(!text.contains("disagree"), "{seed}: {text}");
+        }
+    }
+}
+
+/// By chance the closure of a few positions is half as large again as the noise explains: no alarm.
+#[test]
+fn a_closure_of_few_positions_raises_no_alarm() {
+    let folder = TempDir::new().unwrap();
+    for seed in 1..=40 {
+        let seed = seed.to_string();
+        let few = ["--positions", "7", "--repeats", "3", "--seed", &seed];
+        let (_, data, _) = run(
+            folder.path(),
+            &[&["simulate", "reversal"][..], &few].concat(),
+        );
+        fs::write(folder.path().join("data.csv"), data).unwrap();
+        let (_, text, _) = run(folder.path(), &["reversal", "data.csv"]);
+        assert!(
+            !text.contains("disagree") && !text.contains("explains"),
+            "{seed}: {text}"
+        );
+    }
+}
+
+/// Without repeats the closure is told from the noise by neighbouring readings, which bound it.
+#[test]
+fn a_jump_without_repeats_is_told_by_the_closure() {
+    let folder = TempDir::new().unwrap();
+    simulated(folder.path(), &["--effect", "zero-jump=2"]);
+    let (_, text, _) = run(folder.path(), &["reversal", "data.csv"]);
+    for said in ["model and readings disagree", "errsep diagnose data.csv"] {
+        assert!(text.contains(said), "{said:?} is not in:\n{text}");
+    }
+    for seed in ["1", "2", "3", "4", "5"] {
+        simulated(folder.path(), &["--seed", seed]);
+        let (_, text, _) = run(folder.path(), &["reversal", "data.csv"]);
+        assert!(!text.contains("disagree"), "{seed}: {text}");
     }
 }

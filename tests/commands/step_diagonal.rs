@@ -447,3 +447,50 @@ fn bad_readings_are_refused() {
         &["at least one step"],
     );
 }
+
+#[test]
+fn a_stated_noise_is_held_against_the_residuals() {
+    let folder = Folder::with(&[
+        ("right.toml", "[test]\nnoise = 0.1\n"),
+        ("small.toml", "[test]\nnoise = 0.01\n"),
+    ]);
+    for seed in 1..=20 {
+        let seed = seed.to_string();
+        let made = run(&folder, &[&PLANE[..], &["--seed", &seed]].concat());
+        folder.write("plane.csv", &made.stdout);
+        let args = [
+            "step-diagonal",
+            "plane.csv",
+            "--setup",
+            "right.toml",
+            "--format",
+            "json",
+        ];
+        let answer = json(&folder, &args);
+        assert!(
+            answer["disagreement"].is_null(),
+            "{seed}: {}",
+            answer["disagreement"]
+        );
+    }
+    let args = [
+        "step-diagonal",
+        "plane.csv",
+        "--setup",
+        "small.toml",
+        "--out",
+        "out",
+    ];
+    let told = run(&folder, &args).stdout;
+    let page = folder.read("out/report.html");
+    for said in [&told, &page] {
+        assert!(
+            said.contains("the set-up states 0.0100 µm: the uncertainties are too small"),
+            "{said}"
+        );
+    }
+    let answer: Value = serde_json::from_str(&folder.read("out/result.json")).unwrap();
+    crate::command::documented(&answer, "docs/json/step-diagonal.md");
+    let observed = answer["disagreement"]["observed"].as_f64().unwrap();
+    assert!((0.05..0.2).contains(&observed), "{observed}");
+}

@@ -2,7 +2,7 @@
 
 use super::algebraic::{AlgebraicFit, algebraic};
 use super::points::{Circle, CircleError, FLAT, Frame, Point, ReachedCircle, check_points};
-use crate::uncertainty::{DegreesOfFreedom, Quantity, UncertaintyError};
+use crate::uncertainty::{DegreesOfFreedom, Disagreement, Quantity, UncertaintyError};
 use errsep_solvers::{Fit, NoValue, Options, Problem};
 use nalgebra::{DMatrix, DVector, Matrix3};
 
@@ -87,6 +87,14 @@ impl CircleFit {
     /// Standard uncertainties of centre x, centre y and radius, mm.
     pub fn standard_uncertainties(&self) -> [f64; 3] {
         [0, 1, 2].map(|i| self.covariance[(i, i)].max(0.0).sqrt())
+    }
+
+    /// Where the deviations refute the noise that was given.
+    pub fn disagreement(&self) -> Option<Disagreement> {
+        let squares: f64 = self.residuals_um.iter().map(|r| r * r).sum();
+        let freedom = self.degrees_of_freedom as f64;
+        let test = || Disagreement::of(squares, freedom, self.noise_um, DegreesOfFreedom::Infinite);
+        self.noise_given.then(test).flatten()
     }
 
     /// Radius, centre x and centre y, mm. Degrees of freedom are those of the residuals, infinite for

@@ -4,7 +4,7 @@ use super::components::{Axis, Component, Location};
 use super::determination::{Ambiguity, Determined, Remedy};
 use super::diagonals::{Diagonal, Target};
 use super::prediction::Parameter;
-use crate::uncertainty::DegreesOfFreedom;
+use crate::uncertainty::{DegreesOfFreedom, Disagreement};
 use serde::{Deserialize, Serialize};
 
 /// A positioning slope measured by other means.
@@ -107,6 +107,8 @@ pub struct StepDiagonalFit {
     pub noise: Option<f64>,
     /// How well that is known: infinite where it was given.
     pub noise_degrees_of_freedom: Option<DegreesOfFreedom>,
+    /// Where the residuals refute a noise that was given.
+    pub disagreement: Option<Disagreement>,
     /// Readings and measured slopes less runs less rank.
     pub degrees_of_freedom: usize,
     /// Reading less model, µm, in the order of the readings.

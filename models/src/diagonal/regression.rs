@@ -16,7 +16,7 @@ use super::prediction::Parameter;
 use super::readings::{DiagonalError, DiagonalReading, check, check_noise};
 use super::solution::{SlopeRow, Solution};
 use super::undetermined::{NOTHING, Undetermined};
-use crate::uncertainty::{DegreesOfFreedom, welch_satterthwaite};
+use crate::uncertainty::{DegreesOfFreedom, Disagreement, welch_satterthwaite};
 use nalgebra::{DMatrix, DVector, DVectorView};
 
 /// Residuals of so many roundings of the readings are no noise.
@@ -74,6 +74,15 @@ pub fn regress(
             None => (None, None),
         },
     };
+    let disagreement = assumptions.noise.and_then(|given| {
+        let squares = residuals.norm_squared();
+        Disagreement::of(
+            squares,
+            readings_alone as f64,
+            given,
+            DegreesOfFreedom::Infinite,
+        )
+    });
     // Measured slopes join as further rows, weighted by the noise of a reading over their own. They are
     // of the ends of the axes, which the border holds.
     let extra = slope_rows(&design, &triangle, zone, assumptions, noise)?;
@@ -147,6 +156,7 @@ pub fn regress(
         remedies: remedies(&design.unknowns, &null),
         noise,
         noise_degrees_of_freedom,
+        disagreement,
         degrees_of_freedom: freedom,
         residuals: residuals.iter().copied().collect(),
         sensitivities: design.sensitivities(),

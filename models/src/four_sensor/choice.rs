@@ -7,6 +7,7 @@ use errsep_solvers::regularization::{
 use serde::{Deserialize, Serialize};
 
 use super::{FourSensorError, Line};
+use crate::uncertainty::{DegreesOfFreedom, Disagreement};
 
 /// What is kept small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -97,6 +98,22 @@ pub struct Chosen {
     pub gcv: f64,
     /// The discrepancy principle's answer where the noise is known.
     pub discrepancy: Option<Discrepancy>,
+}
+
+impl Chosen {
+    /// Where the residuals refute a noise that was found apart from them, known to `degrees`. Those of the
+    /// least penalty are taken: a penalty that pulls adds to its residuals what is no noise.
+    pub fn disagreement(
+        &self,
+        rows: usize,
+        noise: f64,
+        degrees: DegreesOfFreedom,
+    ) -> Option<Disagreement> {
+        let points = self.curve.points.iter();
+        let least = points.min_by(|a, b| a.lambda.total_cmp(&b.lambda))?;
+        let freedom = least.residual_degrees_of_freedom(rows);
+        Disagreement::of(least.residual_norm.powi(2), freedom, noise, degrees)
+    }
 }
 
 /// Follows a rule on a family, and asks the others for comparison.

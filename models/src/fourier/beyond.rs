@@ -1,13 +1,9 @@
 //! What the readings hold that the orders kept, or the noise, do not explain.
 
 use super::group::{Group, common, information};
-use super::noise::{NoiseSource, Scatter, finer_half};
-use crate::uncertainty::DegreesOfFreedom;
+use super::noise::{NoiseSource, finer_half};
+use crate::uncertainty::{DegreesOfFreedom, TOLD_BELOW, exceeding};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
-
-/// Probability under noise alone below which something is told.
-pub const TOLD_BELOW: f64 = 1e-3;
 
 /// Form of the workpiece that is finer than the orders kept.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -16,16 +12,6 @@ pub struct BeyondOrders {
     /// is what the orders beyond pass on average.
     pub rms: f64,
     /// Probability that noise alone shows as much.
-    pub p_value: f64,
-}
-
-/// Scatter that is not that of the noise.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Disagreement {
-    /// Standard deviation of a reading as the spacings (and, beside a given noise, the repeats)
-    /// disagree, µm.
-    pub observed: f64,
-    /// Probability that the noise alone makes them disagree as much.
     pub p_value: f64,
 }
 
@@ -73,35 +59,4 @@ pub(super) fn beyond_orders(
     let readings: f64 = groups.iter().map(Group::weight).sum();
     let rms = ((whole - freedom * variance).max(0.0) / readings).sqrt();
     (p_value < TOLD_BELOW).then_some(BeyondOrders { rms, p_value })
-}
-
-/// Tests a scatter against a noise that was found apart from it.
-pub(super) fn disagreement_of(
-    scatter: Scatter,
-    sigma: f64,
-    degrees: DegreesOfFreedom,
-) -> Option<Disagreement> {
-    let p_value = exceeding(scatter.squares / (sigma * sigma), scatter.freedom, degrees);
-    (p_value < TOLD_BELOW).then_some(Disagreement {
-        observed: scatter.sigma(),
-        p_value,
-    })
-}
-
-/// Probability that a sum of squares in units of an estimated variance exceeds a value.
-fn exceeding(value: f64, freedom: f64, degrees: DegreesOfFreedom) -> f64 {
-    // Without scatter and without noise nothing is to be compared; beyond the limit all tails are zero,
-    // and the laws' own arithmetic would overflow.
-    if value.is_nan() {
-        return 1.0;
-    }
-    let value = value.min(1e100);
-    let tail = match degrees {
-        DegreesOfFreedom::Infinite => ChiSquared::new(freedom).map(|law| law.sf(value)).ok(),
-        DegreesOfFreedom::Finite(below) => FisherSnedecor::new(freedom, below)
-            .map(|law| law.sf(value / freedom))
-            .ok(),
-    };
-    tail.filter(|p| p.is_finite())
-        .map_or(1.0, |p| p.clamp(0.0, 1.0))
 }

@@ -25,7 +25,7 @@ mod spread;
 mod steps;
 mod transfer;
 
-pub use beyond::{BeyondOrders, Disagreement, TOLD_BELOW};
+pub use beyond::BeyondOrders;
 pub use diagnosable::FourierScans;
 pub use effects::amplitude;
 pub use joint::{Compensation, Joint, ShiftTerm, join, step_terms};

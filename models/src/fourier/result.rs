@@ -1,9 +1,9 @@
 //! What a separation gives.
 
-use super::beyond::{BeyondOrders, Disagreement};
+use super::beyond::BeyondOrders;
 use super::joint::Compensation;
 use super::noise::NoiseSource;
-use crate::uncertainty::DegreesOfFreedom;
+use crate::uncertainty::{DegreesOfFreedom, Disagreement};
 use realfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 

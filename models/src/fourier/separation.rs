@@ -1,14 +1,14 @@
 //! The profile from the difference signals: one spacing, the best spacing of each order, or all
 //! spacings by least squares.
 
-use super::beyond::{beyond_orders, disagreement_of};
+use super::beyond::beyond_orders;
 use super::estimate::{Joined, Taken};
 use super::joint::{Compensation, Joint, ShiftTerm, step_terms};
 use super::noise::{Estimates, NoiseSource};
 use super::repeatability::repeatability;
 use super::result::{Combination, JointStep, OrderResidual, OrderResult, Separation};
 use super::scan::{FourierError, Scan, Section};
-use crate::uncertainty::DegreesOfFreedom;
+use crate::uncertainty::{DegreesOfFreedom, Disagreement};
 
 /// A form beyond the orders below this share of the difference signal is rounding.
 const EXACT: f64 = 1e-9;
@@ -111,9 +111,9 @@ pub fn separate(
         noise: (sigma, source),
         degrees_of_freedom,
         beyond_orders,
-        disagreement: found
-            .apart_from(source)
-            .and_then(|scatter| disagreement_of(scatter, sigma, degrees_of_freedom)),
+        disagreement: found.apart_from(source).and_then(|scatter| {
+            Disagreement::of(scatter.squares, scatter.freedom, sigma, degrees_of_freedom)
+        }),
     })
 }
 

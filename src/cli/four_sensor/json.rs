@@ -6,8 +6,9 @@ use serde_json::{Value, json};
 use super::Found;
 use super::words::{
     ENDS_OFF, ZONE_NOTE, averaged, counted_from_ends, discrepancy_key, ends, not_determined,
-    status_key,
+    refuted, status_key,
 };
+use crate::cli::disagreement;
 use crate::cli::quantity::{COVERAGE, coverage_json, unexpandable};
 use crate::io::Message;
 
@@ -99,6 +100,8 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
             "noise_estimated": s.noise_estimated,
             "degrees_of_freedom": s.chosen.point.residual_degrees_of_freedom(rows),
         },
+        "disagreement": disagreement::as_json(found.disagreement()),
+        "remarks": refuted(found).into_iter().collect::<Vec<_>>(),
         "uncertainty": coverage_json(found.degrees_of_freedom())?,
         "published": found.published.as_ref().map(|way| json!({
             "lambda": way.chosen.as_ref().map(|chosen| chosen.point.lambda),

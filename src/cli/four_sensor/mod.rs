@@ -12,7 +12,7 @@ use errsep_models::four_sensor::{
     Choice, Ends, FourSensorError, LongSeparator, MinimumZone, Parabola, Penalised,
     PublishedSeparation, PublishedSeparator, Separation, Separator,
 };
-use errsep_models::uncertainty::DegreesOfFreedom;
+use errsep_models::uncertainty::{DegreesOfFreedom, Disagreement};
 
 use super::diagnose::joined::{self, Given};
 use super::{Answer, ColumnArgs, CommonArgs};
@@ -93,6 +93,16 @@ impl Found {
     /// Whether the answer rests on the assumption that the surface has no parabola.
     fn parabola_is_open(&self) -> bool {
         self.setup.settings.parabola == Parabola::LeastNorm
+    }
+
+    /// Where the residuals refute a noise that was found apart from them.
+    fn disagreement(&self) -> Option<Disagreement> {
+        let found = &self.separation;
+        // Four outputs a slide position less its S and gamma.
+        let rows = 2 * self.measured.outputs.readings().len();
+        let degrees = self.degrees_of_freedom()?;
+        let test = || found.chosen.disagreement(rows, found.noise, degrees);
+        (!found.noise_estimated).then(test).flatten()
     }
 
     /// How well the noise is known.

@@ -10,8 +10,8 @@ use nalgebra::DVector;
 use super::Found;
 use super::json::residual_rms;
 use super::words::{
-    ENDS_OFF, ZONE_NOTE, counted_from_ends, ends, noise_source, not_determined, span, status,
-    straightness, uneven,
+    ENDS_OFF, ZONE_NOTE, counted_from_ends, ends, noise_source, not_determined, refuted, span,
+    status, straightness, uneven,
 };
 use crate::cli::quantity::COVERAGE;
 use crate::io::Message;
@@ -28,6 +28,7 @@ pub(super) fn page(found: &Found, data: &Path) -> Result<Page, Message> {
     );
     let doubtful = s.chosen.instead.is_some()
         || s.scatter.is_uneven()
+        || refuted(found).is_some()
         || (counted_from_ends(found).is_some()
             && found.ends.is_some_and(|e| e.contradict(ENDS_OFF)));
     let standing = if doubtful || found.parabola_is_open() {
@@ -79,7 +80,9 @@ fn result(found: &Found) -> Section {
             .collect();
         tilt = tilt.series(Series::line(name, slide.clone(), shown));
     }
-    Section::new("Result")
+    refuted(found)
+        .into_iter()
+        .fold(Section::new("Result"), Section::warning)
         .key_figures([
             KeyFigure::new("Straightness", found.straightness_error.value, "µm")
                 .meaning("minimum zone of S"),

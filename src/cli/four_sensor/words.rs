@@ -9,6 +9,7 @@ use errsep_solvers::regularization::{CornerStatus, Discrepancy};
 use nalgebra::DVector;
 
 use super::Found;
+use crate::cli::disagreement;
 use crate::cli::quantity::{COVERAGE, coverage_words, unexpandable};
 use crate::io::Message;
 use crate::io::units::{arcsec_from_rad, urad_from_rad};
@@ -93,6 +94,9 @@ pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
     }
     if let Some(warning) = uneven(found) {
         let _ = writeln!(text, "  warning          {warning}");
+    }
+    if let Some(remark) = refuted(found) {
+        let _ = writeln!(text, "  {remark}");
     }
     let _ = writeln!(text, "\nNot determined by these outputs:");
     for sentence in not_determined(found) {
@@ -184,6 +188,18 @@ pub(super) fn uneven(found: &Found) -> Option<String> {
             scatter.even
         )
     })
+}
+
+/// Outputs that the noise does not explain.
+pub(super) fn refuted(found: &Found) -> Option<String> {
+    let teller = match (found.noise_from_repeats(), found.measured.repeats) {
+        (true, _) => "the repeats tell, of their average,",
+        (false, 1) => "the set-up states",
+        (false, _) => "the set-up states, of the average of the repeats,",
+    };
+    let noise = found.separation.noise;
+    let words = |d| disagreement::in_words(d, "Outputs and model disagree", teller, noise);
+    found.disagreement().map(words)
 }
 
 /// What spacings with a common multiple do not show.

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use self::weighing::{methods, remarks};
 use super::diagnose::joined::{self, Given};
 use super::quantity::{COVERAGE, coverage_json, coverage_words, unexpandable};
-use super::{Answer, ColumnArgs, CommonArgs};
+use super::{Answer, ColumnArgs, CommonArgs, disagreement};
 use crate::io::fourier::{FourierSetup, read_scans, told};
 use crate::io::{CsvTable, Message, Status};
 use crate::report::fourier::{FourierView, Method, page, peak_to_valley};
@@ -318,11 +318,7 @@ fn as_json(
             "unit": "um",
             "p_value": b.p_value,
         })),
-        "disagreement": s.disagreement.map(|d| json!({
-            "observed": d.observed,
-            "unit": "um",
-            "p_value": d.p_value,
-        })),
+        "disagreement": disagreement::as_json(s.disagreement),
         "remarks": remarks,
         "height_difference": s.height_difference.map(|v| json!({"value": v, "unit": "um"})),
         "rise": s.rise.map(|v| json!({"value": v, "unit": "um"})),

@@ -4,6 +4,7 @@ use errsep_models::fourier::{
     Combination, Compensation, NoiseSource, Scan, Section, Separation, separate,
 };
 
+use crate::cli::disagreement;
 use crate::report::fourier::Method;
 use crate::report::number;
 
@@ -79,21 +80,11 @@ pub(super) fn remarks(s: &Separation, section: Section, asked: Compensation) -> 
         ));
     }
     if let Some(found) = s.disagreement {
-        let (observed, noise) = (
-            number::plain(found.observed, 3),
-            number::plain(s.noise.0, 3),
-        );
-        let told = match s.noise.1 {
-            NoiseSource::Given => format!(
-                "The scans disagree as if the noise of a reading were {observed} µm, the set-up states {noise} µm"
-            ),
-            _ => format!(
-                "The spacings disagree as if the noise of a reading were {observed} µm, the repeats tell {noise} µm"
-            ),
+        let (seen, teller) = match s.noise.1 {
+            NoiseSource::Given => ("The scans disagree", "the set-up states"),
+            _ => ("The spacings disagree", "the repeats tell"),
         };
-        remarks.push(format!(
-            "{told}: the uncertainties are too small. `errsep diagnose` looks for the cause."
-        ));
+        remarks.push(disagreement::in_words(found, seen, teller, s.noise.0));
     }
     if asked == Compensation::None {
         for step in s.steps.iter().filter(|j| j.value.abs() > 4.0 * j.std) {

@@ -24,6 +24,9 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
         "input": data.in_words(),
         "tilts": tilts(o)?,
         "tilt_combinations": combinations(o)?,
+        "not_determined": o.open().iter().map(|open| json!({
+            "combination": open.combination, "remedy": open.remedy,
+        })).collect::<Vec<_>>(),
         "contrasts": contrasts(o)?,
         "effects": effects::json(&o.effects),
         "covariance": o.covariances.as_ref().map(|c| {

@@ -123,7 +123,13 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     };
     progress.set_message("solving");
     let (mut outcome, fit) = solve(args, &data, &setup)?;
-    outcome.warnings.extend(still(&data));
+    let equal = still(&data);
+    outcome.still = equal.len() == outcome.channels.len() && setup.noise.is_none();
+    outcome.warnings.extend(still_in_words(&equal));
+    if let Some(moved) = staged::moved_traces(&data) {
+        outcome.disagree = Some(true);
+        outcome.warnings.push(moved);
+    }
     let diagnosed = match fit.filter(|_| args.diagnose) {
         Some(fit) => Some(Diagnosed::of(
             &args.data,
@@ -184,18 +190,18 @@ pub fn no_crest(setup: &ReversalSetup, file: Option<&Path>) -> Result<(), Messag
 }
 
 /// Channels whose readings are all equal.
-fn still(data: &ReversalData) -> Option<String> {
+fn still(data: &ReversalData) -> Vec<&'static str> {
     let stands = |channel: &Channel| {
         let mut readings = data.observations.of(*channel).map(|r| r.value);
         let first = readings.next();
         readings.all(|r| Some(r) == first)
     };
     let channels = data.observations.channels();
-    let names: Vec<&str> = channels
-        .iter()
-        .filter(|c| stands(c))
-        .map(|c| c.name())
-        .collect();
+    let still = channels.iter().filter(|c| stands(c));
+    still.map(|c| c.name()).collect()
+}
+
+fn still_in_words(names: &[&str]) -> Option<String> {
     (!names.is_empty()).then(|| {
         format!(
             "all readings of {} are equal: an indicator that does not move, or whose resolution hides \

@@ -59,7 +59,17 @@ pub struct Residual {
     pub residual: f64,
 }
 
+/// What the channels leave open.
+pub struct Open {
+    pub combination: &'static str,
+    pub remedy: &'static str,
+}
+
 pub struct Outcome {
+    /// Those that were read.
+    pub channels: Vec<Channel>,
+    /// Whether all readings of every channel are equal, and no noise is known otherwise.
+    pub still: bool,
     pub method: &'static str,
     pub convention: Convention,
     pub tilts: Vec<Angle>,
@@ -127,6 +137,31 @@ impl Outcome {
             Some(contrast) => contrast.meaning(self.convention).to_owned(),
             None => "these channels determine the tilts together only".to_owned(),
         }
+    }
+
+    /// What these channels leave open, with what to do. With fewer than four channels the untapered
+    /// convention reads a cone as alpha, and with two nothing tells them apart.
+    pub fn open(&self) -> Option<Open> {
+        let combination =
+            "alpha apart from the cone of the artefact (half the angle between its sides)";
+        let together = |t: &Angle| t.name.contains("alpha") && t.name.contains("cone");
+        let remedy = match (self.convention, self.channels.len()) {
+            (Convention::Seed, 3) if self.alpha().is_some() => {
+                "set [model] convention = \"rigid\" in the set-up, with which these channels tell them apart"
+            }
+            (Convention::Seed, 2) if self.alpha().is_some() => {
+                "read 1A, 1B, 2A and 2B with [model] convention = \"rigid\" in the set-up, or measure the \
+                 diameter of the artefact at both ends"
+            }
+            (Convention::Rigid, _) if self.tilts.iter().any(together) => {
+                "read 1A, 1B, 2A and 2B, or measure the diameter of the artefact at both ends"
+            }
+            _ => return None,
+        };
+        Some(Open {
+            combination,
+            remedy,
+        })
     }
 
     /// The tilt between slide and spindle, where it is determined by itself.

@@ -21,7 +21,7 @@ pub fn page(file: &Path, data: &ReversalData, setup: &ReversalSetup, o: &Outcome
         data: file.display().to_string(),
         method: o.method.to_owned(),
         summary: summary(o),
-        standing: Some(if o.warnings.is_empty() {
+        standing: Some(if o.warnings.is_empty() && o.open().is_none() {
             Standing::Good
         } else {
             Standing::Caution
@@ -118,6 +118,9 @@ pub fn page(file: &Path, data: &ReversalData, setup: &ReversalSetup, o: &Outcome
             .iter()
             .map(|(name, why)| format!("{name}: {why}"))
             .collect(),
+        open: o
+            .open()
+            .map(|open| format!("{}: {}.", open.combination, open.remedy)),
         warnings: o.warnings.clone(),
     })
 }

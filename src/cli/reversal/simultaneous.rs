@@ -194,6 +194,8 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         })
     });
     Outcome {
+        channels: data.channels(),
+        still: false,
         method: "simultaneous",
         convention: fit.convention,
         contrasts,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use errsep_models::reversal::Convention;
-use errsep_models::reversal::staged::{self, NoiseSource, Options, Removal, Staged, Value};
+use errsep_models::reversal::staged::{self, Noise, NoiseSource, Options, Removal, Staged, Value};
 use errsep_models::uncertainty::DegreesOfFreedom;
 
 use super::outcome::{Angle, Closure, Convergence, Form, Outcome, Residual};
@@ -57,6 +57,8 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         })
         .collect();
     Outcome {
+        channels: s.lines.iter().map(|l| l.channel).collect(),
+        still: false,
         method: s.removal.name(),
         covariances: None,
         convention: s.convention,
@@ -168,6 +170,9 @@ fn method_errors(s: &Staged) -> Vec<(String, f64, String)> {
 /// A contrast or closure beyond this many standard uncertainties is told.
 const SIGNIFICANT: f64 = 4.0;
 
+/// A closure larger than the noise explains by this share is told, where chance does not make it.
+const EXCESS: f64 = 1.5;
+
 pub const NOTHING_CLOSES: &str = "with fewer than four channels nothing closes: drift, a poor reversal \
      and other errors of the method go unnoticed";
 
@@ -189,12 +194,39 @@ pub fn slope_warning(slope: Value, convention: Convention) -> Option<String> {
     })
 }
 
+/// Traces that moved as a whole between their repeats.
+pub fn moved_traces(data: &ReversalData) -> Option<String> {
+    let moved = staged::moved(&data.observations)?;
+    Some(format!(
+        "model and readings disagree: repeats of {} scatter by {} µm, neighbouring readings by {} µm only; \
+         whole traces moved between the repeats, which the model does not have and the uncertainties take \
+         for noise",
+        moved.channel.name(),
+        number::plain(moved.repeats, 3),
+        number::plain(moved.neighbours, 3)
+    ))
+}
+
 /// Whether the closure profile is larger than the noise explains; absent where the noise is not known
-/// apart from the model.
+/// apart from the model. Where the closure alone tells the noise, neighbouring readings bound it.
 fn profile_exceeds_noise(s: &Staged) -> Option<bool> {
-    let known = s.noise.source == NoiseSource::Declared || s.noise.source == NoiseSource::Repeats;
-    let closure = s.closure.as_ref().filter(|_| known)?;
-    Some(closure.rms > 1.5 * closure.expected_rms)
+    let closing = noise_by(s, NoiseSource::Closure)?;
+    match s.noise.source {
+        NoiseSource::Declared | NoiseSource::Repeats => {
+            // Few positions scatter: by chance the closure of seven exceeds the share once in twenty.
+            let clear = s.noise.exceeded_by(closing).is_some();
+            Some(clear && closing.sigma > EXCESS * s.noise.sigma)
+        }
+        NoiseSource::Closure => {
+            let neighbours = noise_by(s, NoiseSource::Neighbours).filter(|_| s.one_grid)?;
+            neighbours.exceeded_by(closing).map(|_| true)
+        }
+        NoiseSource::Neighbours => None,
+    }
+}
+
+fn noise_by(s: &Staged, source: NoiseSource) -> Option<&Noise> {
+    s.noise_figures.iter().find(|n| n.source == source)
 }
 
 fn warnings(s: &Staged, setup: &ReversalSetup) -> Vec<String> {
@@ -222,10 +254,16 @@ fn warnings(s: &Staged, setup: &ReversalSetup) -> Vec<String> {
         Some(closure) => {
             warnings.extend(slope_warning(closure.slope, s.convention));
             if profile_exceeds_noise(s) == Some(true) {
+                // The noise that the closure itself told has no say here.
+                let bound = match (s.noise.source, noise_by(s, NoiseSource::Neighbours)) {
+                    (NoiseSource::Closure, Some(n)) => n.sigma / s.noise.sigma,
+                    _ => 1.0,
+                };
                 warnings.push(format!(
-                    "the closure profile, {} µm, is larger than the noise explains, {} µm: the model lacks something",
+                    "model and readings disagree: the closure profile, {} µm, is larger than the noise \
+                     explains, {} µm",
                     number::plain(closure.rms, 2),
-                    number::plain(closure.expected_rms, 2)
+                    number::plain(bound * closure.expected_rms, 2)
                 ));
             }
         }

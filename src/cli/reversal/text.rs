@@ -16,6 +16,11 @@ use crate::report::number;
 
 /// One sentence that answers the question: is the slide parallel to the spindle, and how straight?
 pub fn summary(o: &Outcome) -> String {
+    if o.still {
+        return "All readings are equal, which tells neither tilt nor form: the resolution of the indicators is \
+                too coarse, or the column is not the reading."
+            .to_owned();
+    }
     let Some(alpha) = o.alpha() else {
         return "These channels do not determine the tilt between slide and spindle by itself."
             .to_owned();
@@ -43,6 +48,10 @@ pub fn summary(o: &Outcome) -> String {
         let side = if alpha.value < 0.0 { "near" } else { "far" };
         format!("As x grows the slide runs towards the {side} side of the spindle axis by {size}")
     };
+    if o.open().is_some() {
+        text += ", if the two sides of the artefact are parallel: these channels count half the angle \
+                 between them, its cone, as alpha";
+    }
     let lines = o.straightness();
     if let Some((_, lines)) = lines.iter().find(|(name, _)| *name == "M") {
         let zone = lines[2].1;
@@ -111,6 +120,13 @@ fn write_all(t: &mut String, file: &Path, data: &ReversalData, o: &Outcome) -> s
             t,
             "  not read: {}; what stands alone above is determined, sums are determined only together",
             names(&missing)
+        )?;
+    }
+    if let Some(open) = o.open() {
+        writeln!(
+            t,
+            "\nNot determined by these channels\n  {}: {}",
+            open.combination, open.remedy
         )?;
     }
     write_effects(t, o)?;

@@ -4,6 +4,7 @@ use errsep_models::diagonal::{Assumptions, ComponentEstimate, Location, Total};
 use serde_json::{Value, json};
 
 use super::Found;
+use crate::cli::disagreement;
 use crate::cli::quantity::{COVERAGE, coverage_json, quantity_json, unexpandable};
 use crate::io::Message;
 
@@ -22,6 +23,8 @@ pub(super) fn as_json(found: &Found, assumptions: &Assumptions) -> Result<Value,
         "rank": fit.rank,
         "noise": fit.noise.map(|v| json!({"value": v, "unit": "um"})),
         "degrees_of_freedom": fit.degrees_of_freedom,
+        "disagreement": disagreement::as_json(fit.disagreement),
+        "remarks": found.remarks,
         "uncertainty": coverage_json(fit.noise_degrees_of_freedom)?,
         "quantities": angles.iter().map(quantity_json).collect::<Result<Vec<_>, _>>()?,
         "components": functions(&fit.components)?,

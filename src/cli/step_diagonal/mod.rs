@@ -14,7 +14,7 @@ use errsep_models::diagonal::{
 use errsep_models::uncertainty::DegreesOfFreedom;
 
 use super::diagnose::joined::{self, Given};
-use super::{Answer, ColumnArgs, CommonArgs};
+use super::{Answer, ColumnArgs, CommonArgs, disagreement};
 use crate::io::diagonal::{DiagonalSetup, read_readings};
 use crate::io::{Message, Status};
 use crate::report::step_diagonal::{StepDiagonalView, page};
@@ -77,6 +77,8 @@ struct Found {
     forms: Vec<ClosedForm>,
     totals: DiagonalTotals,
     choices: Vec<SequenceChoice>,
+    /// What the reader has to weigh.
+    remarks: Vec<String>,
 }
 
 /// Analyses the readings.
@@ -117,9 +119,15 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         forms: closed_forms(&zone, &readings).map_err(refused)?,
         totals: totals(&zone, &readings).map_err(refused)?,
         choices: Vec::new(),
+        remarks: Vec::new(),
         zone,
         readings,
     };
+    if let (Some(refuted), Some(stated)) = (found.fit.disagreement, assumptions.noise) {
+        let seen = "Readings and model disagree";
+        let words = disagreement::in_words(refuted, seen, "the set-up states", stated);
+        found.remarks.push(words);
+    }
     if args.choose {
         let (diagonals, targets) = used(&found.readings);
         found.choices = choose_sequences(&found.zone, &diagonals, &targets).map_err(refused)?;
@@ -135,6 +143,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
                 forms: &found.forms,
                 totals: &found.totals,
                 choices: &found.choices,
+                remarks: &found.remarks,
             })
         }),
         tables: vec![tables::components(&found.fit), tables::residuals(&found)],

@@ -29,6 +29,9 @@ pub(super) fn in_words(name: &str, found: &Found) -> Result<String, Message> {
         ),
         None => writeln!(text, ", noise of a reading not known"),
     };
+    for remark in &found.remarks {
+        let _ = writeln!(text, "  {remark}");
+    }
     let angles = fit.angles().map_err(unexpandable)?;
     let _ = writeln!(text, "\nWhat the readings determine");
     for c in &fit.components {

@@ -33,12 +33,10 @@ pub fn page(view: &View) -> Page {
 }
 
 fn tilts(view: &View) -> Section {
-    let warned = view
-        .warnings
-        .iter()
-        .fold(Section::new("Tilts"), |section, text| {
-            section.warning(text.clone())
-        });
+    let open = view.open.iter().map(|o| format!("Not determined: {o}"));
+    let warned = open
+        .chain(view.warnings.iter().cloned())
+        .fold(Section::new("Tilts"), Section::warning);
     if view.tilts.is_empty() {
         return warned;
     }

@@ -48,6 +48,8 @@ pub struct View {
     pub setup: String,
     /// What no such measurement can show.
     pub hidden: Vec<String>,
+    /// What the channels leave open, with what to do.
+    pub open: Option<String>,
     /// Anything the reader has to be careful about.
     pub warnings: Vec<String>,
 }

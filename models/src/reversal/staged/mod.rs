@@ -23,7 +23,7 @@ mod trace;
 pub use super::Combination;
 pub use estimates::ErrorEstimates;
 pub use no_solution::NoSolution;
-pub use noise::{Noise, NoiseSource};
+pub use noise::{Moved, Noise, NoiseSource, moved};
 pub use resample::Interpolation;
 pub use rotation::Removal;
 pub use trace::Trace;

@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::line::Line;
 use super::trace::Trace;
+use crate::reversal::{Channel, Observations};
+use crate::uncertainty::{DegreesOfFreedom, Disagreement, TOLD_BELOW};
 
 /// Where a noise figure comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -41,6 +43,50 @@ pub struct Noise {
     pub source: NoiseSource,
     /// Degrees of freedom; absent where declared.
     pub degrees_of_freedom: Option<f64>,
+}
+
+impl Noise {
+    /// The scatter of another figure where it is clearly larger than this one.
+    pub fn exceeded_by(&self, other: &Self) -> Option<Disagreement> {
+        let freedom = other.degrees_of_freedom?;
+        let degrees = self
+            .degrees_of_freedom
+            .map_or(DegreesOfFreedom::Infinite, DegreesOfFreedom::Finite);
+        let squares = freedom * other.sigma * other.sigma;
+        Disagreement::of(squares, freedom, self.sigma, degrees)
+    }
+}
+
+/// A channel whose traces moved as a whole between their repeats.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moved {
+    /// Which channel.
+    pub channel: Channel,
+    /// Standard deviation of a reading by its repeats, µm.
+    pub repeats: f64,
+    /// The same by its neighbours, µm.
+    pub neighbours: f64,
+    /// Probability that independent noise alone shows as much, in any channel.
+    pub p_value: f64,
+}
+
+/// The channel whose repeats differ most clearly by more than its neighbouring readings do, which
+/// independent noise has alike. Channels are compared each with itself: their noise may differ.
+pub fn moved(observations: &Observations) -> Option<Moved> {
+    let channels = observations.channels();
+    let of = |channel: &Channel| {
+        let trace = [Trace::of(observations, *channel)?];
+        let (repeats, neighbours) = (from_repeats(&trace)?, from_neighbours(&trace)?);
+        let p_value = channels.len() as f64 * neighbours.exceeded_by(&repeats)?.p_value;
+        (p_value < TOLD_BELOW).then_some(Moved {
+            channel: *channel,
+            repeats: repeats.sigma,
+            neighbours: neighbours.sigma,
+            p_value,
+        })
+    };
+    let all = channels.iter().filter_map(of);
+    all.min_by(|a, b| a.p_value.total_cmp(&b.p_value))
 }
 
 /// From the scatter of repeats, if there are any.

@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use errsep_models::reversal::designs::{DesignFit, Found, angle_name};
+use errsep_models::reversal::simultaneous::NoiseOrigin;
 use errsep_models::reversal::staged::Value;
 
 use super::Outcome;
@@ -28,6 +29,14 @@ pub fn meaning(name: &str) -> &'static str {
 
 /// One or two sentences: does the slide run parallel to the spindle?
 pub fn summary(o: &Outcome) -> String {
+    let readings = &o.data.observations.readings;
+    if o.fit.noise_origin != NoiseOrigin::Declared
+        && readings.windows(2).all(|r| r[0].value == r[1].value)
+    {
+        return "All readings are equal, which tells neither tilt nor form: the resolution of the indicators is \
+                too coarse, or the column is not the reading."
+            .to_owned();
+    }
     let planes = [
         ("alpha_h", "horizontally", "near", "far"),
         ("alpha_v", "vertically", "top", "bottom"),

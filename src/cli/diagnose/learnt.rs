@@ -90,10 +90,14 @@ pub(super) fn only_unknown(
                 .iter()
                 .map(|effect| format!("--without {effect}"))
                 .collect();
+            let explain = match diagnosis.verdict.effects.len() {
+                1 => "explains",
+                _ => "explain",
+            };
             refused(
                 match option {
-                    "--learn" => format!("{names} explains the gap, so there is nothing to learn"),
-                    _ => format!("{names} explains the gap, so no law is sought in it"),
+                    "--learn" => format!("{names} {explain} the gap, so there is nothing to learn"),
+                    _ => format!("{names} {explain} the gap, so no law is sought in it"),
                 },
                 match option {
                     "--learn" => format!(

@@ -24,7 +24,7 @@ use crate::noise::dependence::Dependence;
 use crate::noise::spikes::calmed;
 use crate::options::Options;
 use crate::search::Reach;
-use crate::verdict::told::{no_noise, of_what};
+use crate::verdict::told::{no_noise, of_what, pulled_in};
 use crate::verdict::types::NoiseOut;
 
 /// Fits of noise and state without the effects: the second begins with sizes that are nearly right.
@@ -200,10 +200,7 @@ pub(crate) fn in_the_fit<R>(
     let causes = fitted(&context, &readings);
     let mut notes = Vec::new();
     if calm.count > 0 {
-        notes.push(format!(
-            "{} single readings stand out of their neighbours and of their own repeats by more than four standard deviations; they are pulled in to four.",
-            calm.count
-        ));
+        notes.push(pulled_in(calm.count));
     }
     Ok(then(&context, &readings, &causes, notes))
 }

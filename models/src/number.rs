@@ -3,6 +3,9 @@
 /// Decimal exponents outside this range are written as a power of ten.
 const PLAIN_EXPONENTS: std::ops::RangeInclusive<i32> = -4..=6;
 
+/// From here on a double has no decimals, and digits of it that are none of the number's.
+const FIXED: f64 = 1e15;
+
 /// What stands in a report where there is no number.
 pub const NOT_DETERMINED: &str = "not determined";
 
@@ -31,9 +34,11 @@ pub fn plain(value: f64, digits: usize) -> String {
     }
 }
 
-/// `value` with exactly `decimals` places.
+/// `value` with exactly `decimals` places; from 1e15 on as a power of ten.
 pub fn fixed(value: f64, decimals: usize) -> String {
-    if value.is_finite() {
+    if value.abs() >= FIXED {
+        plain(value, 6)
+    } else if value.is_finite() {
         minus(unsigned_zero(format!("{value:.decimals$}")))
     } else {
         NOT_DETERMINED.to_owned()
@@ -67,7 +72,15 @@ pub fn measured(value: f64, std: Option<f64>) -> String {
     };
     // More than fifteen decimals say nothing: a double does not carry them.
     let decimals = (factor - place).clamp(0, 15) as usize;
-    let scaled = |v: f64| shift(v, -factor);
+    let scaled = |v: f64| {
+        // Digits of the integer part below the place of the uncertainty are zeros.
+        let rounded = if factor == 0 && place > 0 {
+            shift(shift(v, -place).round(), place)
+        } else {
+            v
+        };
+        shift(rounded, -factor)
+    };
     let text = format!(
         "{} ± {}",
         fixed(scaled(value), decimals),
@@ -78,6 +91,30 @@ pub fn measured(value: f64, std: Option<f64>) -> String {
     } else {
         format!("({text}) × 10{}", superscript(factor))
     }
+}
+
+/// An uncertainty that stands by itself: two significant digits, zeros behind them (GUM 7.2.6).
+///
+/// ```
+/// use errsep_models::number::uncertainty;
+/// assert_eq!(uncertainty(0.012_34), "0.012");
+/// assert_eq!(uncertainty(33_088.0), "33000");
+/// ```
+pub fn uncertainty(value: f64) -> String {
+    if !value.is_finite() || value == 0.0 {
+        return plain(value, 2);
+    }
+    let place = scientific(value, 2).1 - 1;
+    if place > 0 {
+        plain(shift(shift(value, -place).round(), place), 2)
+    } else {
+        plain(value, 2)
+    }
+}
+
+/// "1 reading", "2 readings".
+pub fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 /// A probability: two digits, `< 0.0001` below that.
@@ -156,6 +193,8 @@ mod tests {
     fn uncertainty_sets_the_last_place() {
         assert_eq!(measured(1234.6, Some(12.0)), "1235 ± 12");
         assert_eq!(measured(-0.000_4, Some(0.002)), "−0.0004 ± 0.0020");
+        assert_eq!(measured(92_367.0, Some(33_088.0)), "92000 ± 33000");
+        assert_eq!(measured(-12_367.0, Some(995.0)), "−12400 ± 1000");
         assert_eq!(measured(0.0, Some(0.099_6)), "0.00 ± 0.10");
         assert_eq!(measured(5.0, Some(f64::NAN)), "5.000");
         assert_eq!(measured(f64::NAN, Some(1.0)), NOT_DETERMINED);
@@ -163,6 +202,7 @@ mod tests {
 
     #[test]
     fn no_negative_zero() {
+        assert_eq!(fixed(1e200, 2), "1.00000 × 10²⁰⁰");
         assert_eq!(fixed(-0.001, 2), "0.00");
         assert_eq!(fixed(-0.006, 2), "−0.01");
     }

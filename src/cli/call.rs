@@ -3,10 +3,8 @@
 
 use std::cell::RefCell;
 
-use clap::{CommandFactory, FromArgMatches};
-
 use super::common::{Called, Wanted};
-use super::{Answer, Cli, Command, Traced};
+use super::{Answer, Command, Traced, declared, parsed};
 use crate::io::Message;
 use crate::io::source::{InMemory, begin_record_with};
 
@@ -48,7 +46,9 @@ pub(super) fn answer(
     wanted: Wanted,
 ) -> Result<Answer, Message> {
     let words = std::iter::once("errsep").chain(arguments.iter().map(String::as_str));
-    let cli = parsed(words).map_err(|error| not_understood(&error))?;
+    let cli = DECLARED
+        .with_borrow_mut(|declared| parsed(declared, words))
+        .map_err(|error| not_understood(&error))?;
     let Command::Answer(command) = &cli.command else {
         return Err(Message::bad_input("this command answers no question")
             .remedy("call one that does, such as `reversal`"));
@@ -60,14 +60,7 @@ pub(super) fn answer(
 
 thread_local! {
     /// The command line as it is declared: made once for all calls of a thread.
-    static DECLARED: RefCell<clap::Command> = RefCell::new(Cli::command());
-}
-
-fn parsed<'w>(words: impl Iterator<Item = &'w str>) -> Result<Cli, clap::Error> {
-    DECLARED.with_borrow_mut(|declared| {
-        let mut matches = declared.try_get_matches_from_mut(words)?;
-        Cli::from_arg_matches_mut(&mut matches).map_err(|error| error.format(declared))
-    })
+    static DECLARED: RefCell<clap::Command> = RefCell::new(declared());
 }
 
 /// What is wrong with the arguments, and the hint that comes with it.

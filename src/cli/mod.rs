@@ -24,11 +24,12 @@ pub mod step_diagonal;
 pub mod straightness;
 pub mod traces;
 
+use std::any::TypeId;
 use std::borrow::Cow;
 use std::ffi::OsString;
 use std::io::Write;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use answer::{Answer, Report, Traced, result_json};
 pub use common::{ColumnArgs, CommonArgs, Format, progress};
@@ -82,8 +83,7 @@ enum Answering {
 pub fn run(arguments: Vec<OsString>) -> u8 {
     let told = arguments.iter().skip(1);
     let told = told.map(|a| a.to_string_lossy().into_owned()).collect();
-    let parsed = Cli::try_parse_from(arguments);
-    match parsed {
+    match parsed(&mut declared(), arguments) {
         Ok(cli) => Cli {
             arguments: told,
             ..cli
@@ -91,6 +91,38 @@ pub fn run(arguments: Vec<OsString>) -> u8 {
         .execute(),
         Err(error) => not_run(&error),
     }
+}
+
+/// The command line as it is declared. A number may be negative everywhere: the command says what it may be.
+fn declared() -> clap::Command {
+    fn signed(command: clap::Command) -> clap::Command {
+        let numbers = [
+            TypeId::of::<f64>(),
+            TypeId::of::<u32>(),
+            TypeId::of::<u64>(),
+            TypeId::of::<usize>(),
+        ];
+        let may_be_negative = |arg: clap::Arg| {
+            let kind = arg.get_value_parser().type_id();
+            let is_number = numbers.iter().any(|number| kind == *number);
+            if is_number && arg.get_action().takes_values() {
+                arg.allow_negative_numbers(true)
+            } else {
+                arg
+            }
+        };
+        command.mut_args(may_be_negative).mut_subcommands(signed)
+    }
+    signed(Cli::command())
+}
+
+/// What the words of a command line ask for.
+fn parsed<W: Into<OsString> + Clone>(
+    declared: &mut clap::Command,
+    words: impl IntoIterator<Item = W>,
+) -> Result<Cli, clap::Error> {
+    let mut matches = declared.try_get_matches_from_mut(words)?;
+    Cli::from_arg_matches_mut(&mut matches).map_err(|error| error.format(declared))
 }
 
 /// Prints what clap has to say instead of running a command.

@@ -88,7 +88,7 @@ pub(super) fn expanded_words(quantity: &Quantity, coverage: f64) -> Result<Strin
     let expanded = quantity.expanded(coverage).map_err(unexpandable)?;
     Ok(format!(
         "U = {} {unit} (k = {}, {}, {} degrees of freedom)",
-        number::plain(factor * expanded.expanded_uncertainty, 2),
+        number::uncertainty(factor * expanded.expanded_uncertainty),
         number::plain(expanded.coverage_factor, 3),
         format_args!("{} %", per_cent(coverage)),
         quantity.degrees_of_freedom

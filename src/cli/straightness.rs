@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{Answer, ColumnArgs, CommonArgs};
 use crate::io::{ColumnMap, CsvTable, Message, Status, TableReader};
-use crate::report;
+use crate::report::{self, number};
 
 /// Straightness of a profile: least-squares, end-point and minimum-zone reference lines.
 #[derive(Debug, clap::Args)]
@@ -164,13 +164,13 @@ fn profile(x: &[f64], y: &[f64], results: &[Straightness]) -> serde_json::Value 
 
 fn in_words(s: &Straightness) -> String {
     format!(
-        "{:13} {:.3} µm (from {:.3} to {:+.3}), slope of the line {:.3} µrad",
+        "{:13} {} µm (from {} to +{}), slope of the line {} µrad",
         s.reference.name(),
-        s.error(),
-        s.lowest,
-        s.highest,
+        number::fixed(s.error(), 3),
+        number::fixed(s.lowest, 3),
+        number::fixed(s.highest, 3),
         // µm/mm = mrad.
-        s.slope * 1e3
+        number::fixed(s.slope * 1e3, 3)
     )
 }
 

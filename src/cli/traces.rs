@@ -78,7 +78,10 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let refuse = |why: NoTraces| {
         Message::bad_input(why.to_string())
             .in_file(&args.run)
-            .remedy("give a run in one direction in which the spindle turns steadily, and --rpm if its speed is known")
+            .remedy(match args.rpm {
+                Some(_) => "give --rpm as about the speed of the spindle in this run, or leave it out: it is found in the readings",
+                None => "give a run in one direction in which the spindle turns steadily, and --rpm if its speed is known",
+            })
     };
     let turning = find_turning(&samples, args.rpm.map(|r| r / 60.0)).map_err(refuse)?;
     let data = traces(

@@ -109,7 +109,12 @@ pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 pub(super) enum NotATable {
     Empty,
     Utf16,
-    Binary { offset: usize, byte: u8 },
+    /// A byte that is no text, at a line and a column from 1.
+    Binary {
+        line: usize,
+        column: usize,
+        byte: u8,
+    },
 }
 
 impl Dialect {
@@ -121,19 +126,12 @@ impl Dialect {
         // First without early ends, so that many bytes are looked at together.
         let is_odd = head.iter().fold(false, |found, b| found | is_binary(*b));
         if is_odd && let Some(offset) = head.iter().position(|&b| is_binary(b)) {
-            return Err(NotATable::Binary {
-                offset,
-                byte: head[offset],
-            });
+            return Err(no_text_at(head, offset));
         }
         if let Err(e) = std::str::from_utf8(head) {
             // A character may be cut at the end of the head, not at the end of the file.
             if whole || e.error_len().is_some() {
-                let offset = e.valid_up_to();
-                return Err(NotATable::Binary {
-                    offset,
-                    byte: head[offset],
-                });
+                return Err(no_text_at(head, e.valid_up_to()));
             }
         }
         let byte_order_mark = head.starts_with(BYTE_ORDER_MARK);
@@ -181,6 +179,19 @@ impl Dialect {
     }
 }
 
+/// Where the byte at an offset stands.
+fn no_text_at(head: &[u8], offset: usize) -> NotATable {
+    let before = head[..offset].strip_prefix(BYTE_ORDER_MARK);
+    let before = String::from_utf8_lossy(before.unwrap_or(&head[..offset]));
+    let end = if before.contains('\n') { '\n' } else { '\r' };
+    let line = before.rsplit(end).next().unwrap_or_default();
+    NotATable::Binary {
+        line: before.matches(end).count() + 1,
+        column: line.chars().count() + 1,
+        byte: head[offset],
+    }
+}
+
 /// A control character that no text file holds.
 pub(super) const fn is_binary(byte: u8) -> bool {
     (byte < b' ')
@@ -191,7 +202,12 @@ pub(super) const fn is_binary(byte: u8) -> bool {
         & (byte != 0x1A)
 }
 
-/// Blank lines and comments.
+/// Blank lines, comments, and the empty rows that spreadsheets leave: nothing but separators.
 pub(super) fn is_skipped(line: &[u8]) -> bool {
-    matches!(line.trim_ascii().first(), None | Some(b'#'))
+    let nothing = |b: &u8| matches!(b, b',' | b';') || b.is_ascii_whitespace();
+    match line.trim_ascii().first() {
+        None | Some(b'#') => true,
+        Some(b',' | b';') => line.iter().all(nothing),
+        Some(_) => false,
+    }
 }

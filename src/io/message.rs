@@ -1,5 +1,6 @@
 //! The one error type of the program: what is wrong, where, and what to do about it.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -128,9 +129,22 @@ impl Shown {
     }
 }
 
+/// A number that is written with more digits than this has them from its power of ten.
+const DIGITS: usize = 40;
+
+/// A word of a message; a number of hundreds of digits as a power of ten.
+fn word(word: &str) -> Cow<'_, str> {
+    match word.parse::<f64>() {
+        Ok(number) if word.len() > DIGITS && number.is_finite() => format!("{number:e}").into(),
+        _ => word.into(),
+    }
+}
+
 /// One line of a message: fit for a terminal, its middle left out where it is very long.
 fn told(text: &str) -> String {
-    let text = printable::line(text);
+    let words: Vec<Cow<'_, str>> = text.split(' ').map(word).collect();
+    let text = words.join(" ");
+    let text = printable::line(&text);
     let count = text.chars().count();
     if count <= LONGEST {
         return text.into_owned();

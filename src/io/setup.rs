@@ -80,7 +80,13 @@ impl SetupFile {
             match unknown_name(message) {
                 Some((kind, key, known)) => {
                     let known = nearest_first(key, known);
+                    let table = if kind == "key" {
+                        self.table_of::<T>(key)
+                    } else {
+                        None
+                    };
                     let remedy = match (kind, nearest(key, known.iter().copied())) {
+                        _ if let Some(table) = table => format!("put it under [{table}]"),
                         ("value", Some(near)) => {
                             format!("did you mean `{near}`? Write {}", list(&known))
                         }
@@ -93,13 +99,31 @@ impl SetupFile {
                     };
                     self.bad(span, format!("unknown {kind} `{key}`"), remedy)
                 }
-                None => self.bad(
-                    span,
-                    message.lines().collect::<Vec<_>>().join("; "),
-                    remedy(message),
-                ),
+                None => self.bad(span, in_words(message), remedy(message)),
             }
         })
+    }
+
+    /// The table at the top of the set-up that takes a key which stands at another place.
+    fn table_of<T: DeserializeOwned>(&self, key: &str) -> Option<String> {
+        let whole: toml::Table = toml::from_str(&self.text).ok()?;
+        let tables = whole.values().filter_map(toml::Value::as_table);
+        let value = std::iter::once(&whole)
+            .chain(tables)
+            .find_map(|table| table.get(key))?;
+        // What a set-up may have at its top is told by refusing a name that nothing has.
+        let none = toml::from_str::<T>("\"\" = 0").err()?;
+        let (_, _, top) = unknown_name(none.message())?;
+        let takes = |table: &&str| {
+            let within = toml::Table::from_iter([(key.to_owned(), value.clone())]);
+            let alone = toml::Table::from_iter([((*table).to_owned(), within.into())]);
+            match toml::from_str::<T>(&alone.to_string()) {
+                Ok(_) => true,
+                Err(why) => why.message().starts_with("missing field"),
+            }
+        };
+        let mut found = top.into_iter().filter(takes);
+        found.next().map(str::to_owned)
     }
 
     /// A message about a value of the set-up.
@@ -133,6 +157,35 @@ impl SetupFile {
     }
 }
 
+/// What the programs call a kind of value, for people.
+fn expected_in_words(expected: &str) -> &str {
+    match expected {
+        "f32" | "f64" => "a number",
+        "i64" | "u8" | "u32" | "u64" | "usize" => "a whole number",
+        "a boolean" => "true or false",
+        "a string" => "a text",
+        "a sequence" => "a list",
+        "a map" => "a table",
+        other if other.starts_with("struct ") => "a table",
+        other => other,
+    }
+}
+
+/// A fault in the words of serde and of the TOML reader, without names of types.
+fn in_words(message: &str) -> String {
+    let line = message.lines().collect::<Vec<_>>().join("; ");
+    match line.split_once(", expected ") {
+        Some((found, expected)) if found.starts_with("invalid ") => {
+            let found = match found.strip_prefix("invalid type: ") {
+                Some(found) => found.replace("floating point", "the number"),
+                None => found.to_owned(),
+            };
+            format!("{found} where {} belongs", expected_in_words(expected))
+        }
+        _ => line,
+    }
+}
+
 /// What to do about a fault, in the words of serde and of the TOML reader.
 fn remedy(message: &str) -> String {
     let quoted = || message.split('`').nth(1).unwrap_or_default();
@@ -145,14 +198,11 @@ fn remedy(message: &str) -> String {
     if let Some((found, expected)) = message.split_once(", expected ")
         && found.starts_with("invalid ")
     {
-        let expected = match expected {
-            "f32" | "f64" => "a number, such as 1.5",
-            "i64" | "u8" | "u32" | "u64" | "usize" => "a whole number",
-            "a boolean" => "true or false",
-            "a string" => "a text in double quotes",
-            "a sequence" => "a list, such as [1.0, 2.0]",
-            "a map" => "a table, such as { key = 1 }",
-            other if other.starts_with("struct ") => "a table, such as { key = 1 }",
+        let expected = match expected_in_words(expected) {
+            "a number" => "a number, such as 1.5",
+            "a text" => "a text in double quotes",
+            "a list" => "a list, such as [1.0, 2.0]",
+            "a table" => "a table, such as { key = 1 }",
             other => other,
         };
         return format!("write {expected} here");

@@ -267,7 +267,7 @@ fn effects_are_switched_on() {
     bad_input(
         &folder,
         &asked("thermal-drif=1"),
-        &["no effect `thermal-drif`", "thermal-drift?"],
+        &["no effect `thermal-drif`", "`thermal-drift`?"],
     );
     bad_input(&folder, &asked("taper=wide"), &["wide is not a number"]);
     bad_input(&folder, &asked("taper"), &["has no size"]);

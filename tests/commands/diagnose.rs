@@ -180,6 +180,39 @@ fn what_cannot_be_told_is_asked_for() {
     }
 }
 
+/// What a simulation is made from, by its kind.
+#[test]
+fn every_key_of_a_truth_is_documented() {
+    let folder = Folder::with(&[(
+        "m.toml",
+        "chain = \"XYFZ\"\n[errors.EXX]\npolynomial = [0.1]\n",
+    )]);
+    let page = crate::command::document("json/simulate.md");
+    let crest = "--design 0/0,180/0,0/180,180/180 --thickness 40 --tip-radius 3 --off-crest 0.1";
+    for (kind, row, more) in [
+        ("anova", "| `anova` |", ""),
+        ("calibration-line", "| `calibration-line` |", ""),
+        ("circle", "| `circle` |", ""),
+        ("four-sensor", "| `four-sensor` |", ""),
+        ("fourier", "| `fourier` |", ""),
+        ("positioning", "| `positioning` |", ""),
+        ("reversal", "| `reversal` |", ""),
+        ("reversal", "| `reversal` with `--design` |", crest),
+        ("step-diagonal", "| `step-diagonal` |", ""),
+        ("turning-bar", "| `turning-bar` |", ""),
+    ] {
+        let given = format!("simulate {kind} {more} --format json");
+        let out = run(&folder, &given.split_whitespace().collect::<Vec<_>>());
+        assert_eq!(out.status, 0, "{given}: {}", out.stderr);
+        let answer: Value = serde_json::from_str(&out.stdout).unwrap();
+        let line = page.lines().find(|line| line.starts_with(row));
+        let line = line.unwrap_or_else(|| panic!("no row of {row}"));
+        for key in answer["truth"].as_object().unwrap().keys() {
+            assert!(line.contains(&format!("`{key}`")), "{row} lacks `{key}`");
+        }
+    }
+}
+
 /// A size that the effect's own parameter in the catalogue cannot have is refused with value, unit and bounds.
 #[test]
 fn a_size_that_cannot_be_is_not_simulated() {
@@ -292,6 +325,121 @@ fn one_effect_may_be_withheld_by_name_only() {
     );
     let answer: Value = serde_json::from_str(&out.stdout).unwrap();
     assert_eq!(answer["verdict"]["kind"], "unknown");
+    // Nor is it put in, nor named, in a proof.
+    let plain = run(&folder, &["simulate", "circle"]);
+    folder.write("plain.csv", &plain.stdout);
+    let proof = |without: &[&str]| -> Value {
+        let arguments = [
+            "diagnose",
+            "plain.csv",
+            "--model",
+            "circle",
+            "--prove",
+            "30",
+        ];
+        let out = run(
+            &folder,
+            &[&arguments[..], &["--format", "json"], without].concat(),
+        );
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        serde_json::from_str::<Value>(&out.stdout).unwrap()["proof"].clone()
+    };
+    let names = |proof: &Value| proof["truths"].to_string() + &proof["answers"].to_string();
+    let all = names(&proof(&[]));
+    let put_in = proof(&[])["truths"].as_array().unwrap().clone();
+    let effects = put_in.iter().map(|t| t.as_str().unwrap());
+    let first = effects.into_iter().find(|t| *t != "none").unwrap();
+    assert!(all.contains(first));
+    let rest = names(&proof(&["--without", first]));
+    assert!(!rest.contains(first), "{first} is withheld: {rest}");
+}
+
+/// What is made, and what the diagnosis alone knows.
+#[test]
+fn effects_of_a_simulated_reversal_are_told() {
+    let folder = Folder::with(&[]);
+    let help = run(&folder, &["simulate", "reversal", "--help"]).stdout;
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    let (_, told) = help.split_once("Effects: ").unwrap();
+    let (four, rest) = told.split_once(". With --design also ").unwrap();
+    let (design, _) = rest.split_once(". Examples").unwrap();
+    let made = |name: &str, more: &[&str]| {
+        let effect = format!("{name}=1e-4");
+        let of = [
+            "simulate",
+            "reversal",
+            "--positions",
+            "9",
+            "--effect",
+            &effect,
+        ];
+        run(&folder, &[&of[..], more].concat())
+    };
+    let four_as_design = ["--design", "0/0,180/0,180/180,0/180", "--thickness", "40"];
+    for name in four.split(", ") {
+        assert_eq!(made(name, &[]).status, 0, "{name}");
+    }
+    for name in design.split(", ") {
+        let out = made(name, &[]);
+        assert_eq!(out.status, 2, "{name}");
+        assert!(out.stderr.contains("with --design alone"), "{}", out.stderr);
+        if name != "oval-cone" {
+            let out = made(name, &four_as_design);
+            assert_eq!(out.status, 0, "{name}: {}", out.stderr);
+        }
+    }
+    for more in [&[][..], &four_as_design] {
+        let out = made("sticking-plunger", more);
+        assert_eq!(out.status, 2);
+        assert!(
+            out.stderr
+                .contains("effect of errsep diagnose that this simulation does not make"),
+            "{}",
+            out.stderr
+        );
+        let out = made("tapir", more);
+        assert!(
+            out.stderr.contains("did you mean `taper`?"),
+            "{}",
+            out.stderr
+        );
+    }
+}
+
+/// Numbers of an answer have the minus sign of typography, and nouns their number.
+#[test]
+fn an_answer_in_words_has_one_minus_sign() {
+    let folder = Folder::with(&[]);
+    let hyphened = |text: &str| {
+        let words = text.split(['\n', ' ', '(', ',', '[']);
+        let minus = words.filter_map(|word| word.strip_prefix('-'));
+        let numbers = minus.filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
+        numbers.map(str::to_owned).collect::<Vec<_>>()
+    };
+    let made =
+        "simulate reversal --alpha -20 --effect taper=-2e-5 --repeats 2 --positions 31 --out d";
+    let one = "simulate reversal --design 0/0,0/90,0/180,0/270 --repeats 2 --both-directions \
+               --positions 21 --alpha -20 --out one";
+    for (made, asked) in [
+        (made, "diagnose d/readings.csv"),
+        (made, "reversal d/readings.csv --simultaneous --diagnose"),
+        (one, "diagnose one/readings.csv"),
+    ] {
+        let words = |line: &'static str| line.split_whitespace().collect::<Vec<_>>();
+        assert_eq!(
+            run(&folder, &[&words(made)[..], &["--force"]].concat()).status,
+            0
+        );
+        let out = run(&folder, &words(asked));
+        assert_eq!(out.status, 0, "{asked}: {}", out.stderr);
+        let found = hyphened(&out.stdout);
+        assert!(found.is_empty(), "{asked}: {found:?} in {}", out.stdout);
+        let told = match made == one {
+            true => "4 channels of 1 indicator in 4 positions of the spindle",
+            false => "\u{2212}",
+        };
+        assert!(out.stdout.contains(told), "{asked}: {}", out.stdout);
+    }
 }
 
 /// What a plan says holds in itself: nothing is seen, told apart or imitated at a size that is not

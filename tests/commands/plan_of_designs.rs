@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::command::{Folder, run};
+use crate::command::{Folder, document, documented, run};
 
 const EIGHT: &str = "0/0,180/0,90/0,270/0,0/180,180/180,90/180,270/180";
 
@@ -171,4 +171,61 @@ fn what_cannot_be_planned_is_told() {
             );
         }
     }
+}
+
+/// Minutes and standard uncertainties of a recipe are those of the plan that it ends with.
+fn recipe_is_what_its_plan_says(page: &str) {
+    let (page, plan) = page.split_once("\nThe plan:\n").unwrap();
+    let answer = planned(&plan.replace("\n    ", "\n"));
+    let designs = answer["designs"].as_array().unwrap();
+    let row = |begin: &str| -> Vec<&str> {
+        let line = page.lines().find(|line| line.starts_with(begin)).unwrap();
+        let cells: Vec<&str> = line
+            .trim_matches('|')
+            .split('|')
+            .skip(1)
+            .map(str::trim)
+            .collect();
+        assert_eq!(cells.len(), designs.len(), "{line}");
+        cells
+    };
+    for (cell, design) in row("| channels, time |").iter().zip(designs) {
+        let minutes = (design["time"]["seconds"].as_f64().unwrap() / 60.0).round();
+        let channels = design["channels"].as_array().unwrap().len();
+        assert_eq!(*cell, format!("{channels}, {minutes} min"));
+    }
+    for (begin, quantity, factor, unit) in [
+        ("| u(α_h) |", "alpha_h", 1e6, "µrad"),
+        ("| u(α_v) |", "alpha_v", 1e6, "µrad"),
+        ("| u(M_h), over the travel |", "M_h", 1.0, "µm"),
+        ("| u(M_v) |", "M_v", 1.0, "µm"),
+        ("| sides known |", "S", 1.0, "µm"),
+    ] {
+        if !page.lines().any(|line| line.starts_with(begin)) {
+            continue;
+        }
+        for (cell, design) in row(begin).iter().zip(designs) {
+            let wanted = design["wanted"].as_array().unwrap();
+            let own = wanted.iter().find(|w| w["quantity"] == quantity).unwrap();
+            let std = own["std"].as_f64();
+            let printed = std.map(|std| format!("{:.3} {unit}", factor * std));
+            match printed {
+                Some(printed) => assert!(cell.contains(&printed), "{begin} {cell}: {printed}"),
+                None => assert!(!cell.contains(unit), "{begin} {cell}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn recipes_print_what_their_plans_say() {
+    recipe_is_what_its_plan_says(&document("recipes/one-indicator-every-90.md"));
+    recipe_is_what_its_plan_says(&document("recipes/two-planes-at-once.md"));
+}
+
+#[test]
+fn every_key_of_a_plan_is_documented() {
+    let designs = format!("{PLAN}[[design]]\nname = \"eight\"\nchannels = \"{EIGHT}\"\n");
+    documented(&planned(&designs), "docs/json/diagnosis.md");
+    documented(&planned(PLAN), "docs/json/diagnosis.md");
 }

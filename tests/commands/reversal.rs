@@ -101,6 +101,21 @@ fn every_dialect_and_layout_is_the_same_data() {
         ),
         ("old_mac", wide(",", "\r", ".", ""), "CR line ends"),
         ("tidy", tidy(), "decimal point; one row a reading"),
+        (
+            "capitals",
+            tidy().replace("reading,x,channel", "Reading,X,Channel"),
+            "decimal point; one row a reading",
+        ),
+        (
+            "minus_signs",
+            tidy().replace('-', "\u{2212}"),
+            "decimal point; one row a reading",
+        ),
+        (
+            "empty_rows",
+            wide(",", "\n", ".", "") + ",,,,\n,, ,,\n",
+            "fields separated by comma, decimal point",
+        ),
     ] {
         fs::write(folder.path().join("other.csv"), text).unwrap();
         let other = json(folder.path(), &["reversal", "other.csv"]);

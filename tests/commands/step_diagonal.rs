@@ -47,7 +47,7 @@ fn plane_says_what_cannot_be_told_apart() {
         .collect();
     assert!(
         statements.contains(
-            &"positioning slope of X, positioning slope of Y and mirror misalignment cannot be told apart: measure one slope"
+            &"positioning slope of X (EXX), positioning slope of Y (EYY) and mirror misalignment cannot be told apart: measure one slope"
         ),
         "{statements:?}"
     );
@@ -205,7 +205,7 @@ fn the_way_back_gives_the_reversals() {
     assert!(
         folder
             .read("out/report.html")
-            .contains("reversal of rotation of Y about Z")
+            .contains("reversal of yaw of Y")
     );
     assert!(folder.read("out/components.csv").contains("EBY reversal"));
     assert!(folder.read("out/residuals.csv").contains("backward"));
@@ -256,7 +256,8 @@ fn report_shows_errors_and_ambiguities() {
     let page = folder.read("out/report.html");
     for part in [
         "<svg",
-        "rotation of Y about Z",
+        "yaw of Y",
+        "yaw of X (ECX)",
         "cannot be told apart",
         "two face diagonals",
     ] {

@@ -309,6 +309,19 @@ fn what_cannot_join_is_said_with_the_remedy() {
         &["S_A and S_B take it up", "another radius"],
     );
     no("common-gain", 1, &["scales every form", "calibrate"]);
+    for effect in ["stick-slip", "sticking-plunger"] {
+        let told = [
+            "errsep diagnose knows",
+            "from reading to reading",
+            "leave it out of --with",
+        ];
+        no(effect, 1, &told);
+    }
+    no(
+        "indexing-error",
+        1,
+        &["alpha and beta take it up", "align the artefact sideways"],
+    );
     no("termal-drift", 2, &["no effect is called", "thermal-drift"]);
     no("taper,taper", 2, &["asked for twice"]);
     let without = run(&folder, &["reversal", "data.csv", "--with", "taper"]);

@@ -48,7 +48,7 @@ fn wrong_columns() {
             ",position,",
             [
                 "data.csv:2:31: unknown column `position`",
-                "remove it; columns may be channel",
+                "such as x=position",
             ],
         ),
         (
@@ -83,6 +83,23 @@ fn wrong_columns() {
     ] {
         refused(&with(good, wrong), None, &[], &told);
     }
+    // Lines before the one that names the columns.
+    let preamble = [b"Instrument: XY\nDate: today\n", GOOD.as_bytes()].concat();
+    refused(
+        &preamble,
+        None,
+        &[],
+        &[
+            "data.csv:1:1: unknown column `Instrument: XY`",
+            "before the one that names the columns, remove them or begin them with #",
+        ],
+    );
+    refused(
+        &with("x,reading", "x,X"),
+        None,
+        &[],
+        &["data.csv:2:33: column `x` is named twice", "rename one"],
+    );
     // A column that is not there at all.
     let tidy = "channel,x\n1A,0\n";
     refused(
@@ -202,6 +219,27 @@ fn wrong_fields() {
         ),
         (
             "1A,1,forward,2",
+            "1A,1,forward,08:00:02",
+            [
+                "data.csv:5:14: time \"08:00:02\" is not a number",
+                "seconds since the first reading",
+            ],
+        ),
+        (
+            "1A,1,forward,2",
+            "1A,1,forward,2026-11-29T08:00:02",
+            ["data.csv:5:14: time", "seconds since the first reading"],
+        ),
+        (
+            "2,20,0.4",
+            "2,20,1e308",
+            [
+                "data.csv:5:19: a reading of 1e308 cannot be worked with",
+                "remove the row",
+            ],
+        ),
+        (
+            "1A,1,forward,2",
             "1A,1,\"forward,2",
             [
                 "data.csv:5:6: a quote is opened and not closed",
@@ -255,7 +293,7 @@ fn files_that_are_no_tables() {
         None,
         &[],
         &[
-            "data.csv:1:1: the file is not text: byte 5 is 0x02",
+            "data.csv:1:5: the file is not text: this byte is 0x02",
             "plain text",
         ],
     );
@@ -269,13 +307,25 @@ fn files_that_are_no_tables() {
         &with("0.4", "0.4\0"),
         None,
         &[],
-        &["data.csv:1:1: the file is not text", "plain text"],
+        &["data.csv:5:22: the file is not text", "plain text"],
+    );
+    refused(
+        b"channel,x,reading (\xb5m)\n1A,0,1\n",
+        None,
+        &[],
+        &[
+            "data.csv:1:20: the file is not text",
+            "save the file as UTF-8",
+        ],
     );
     refused(
         b"channel,x,reading\n1A,0,\xe9\n",
         None,
         &[],
-        &["data.csv:1:1: the file is not text", "plain text"],
+        &[
+            "data.csv:2:6: the file is not text",
+            "save the file as UTF-8",
+        ],
     );
     let mut late = GOOD.as_bytes().to_vec();
     for i in 0..20_000 {
@@ -283,11 +333,8 @@ fn files_that_are_no_tables() {
     }
     let lines = late.iter().filter(|&&b| b == b'\n').count();
     late.extend(b"1B,1,forward,1,\xff,0\n");
-    let place = format!(
-        "data.csv:{}:1: byte 16 of the line (0xFF) is not text",
-        lines + 1
-    );
-    refused(&late, None, &[], &[&place, "plain text"]);
+    let place = format!("data.csv:{}:16: this byte (0xFF) is not text", lines + 1);
+    refused(&late, None, &[], &[&place, "as UTF-8"]);
 }
 
 #[test]

@@ -67,8 +67,27 @@ fn wrong_setups() {
         ),
         (
             "42.0",
+            "1e200",
+            [
+                "setup.toml:2:13: a thickness of 1e200 mm cannot be",
+                "diameter",
+            ],
+        ),
+        (
+            "42.0",
             "\"thick\"",
-            ["setup.toml:2:13: invalid type: string", "write a number"],
+            [
+                "setup.toml:2:13: string \"thick\" where a number belongs",
+                "write a number",
+            ],
+        ),
+        (
+            "[artefact]",
+            "thickness = 42\n[artefact]",
+            [
+                "setup.toml:1:1: unknown key `thickness`",
+                "put it under [artefact]",
+            ],
         ),
         (
             "0.02",

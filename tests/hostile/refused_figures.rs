@@ -25,6 +25,8 @@ fn a_standard_deviation_is_not_negative() {
                 &["is no standard deviation", "help: give --noise"],
             );
         }
+        let apart = [&["simulate"], kind, &["--noise", "-1"]].concat();
+        bad_input(&folder, &apart, &["--noise -1 is no standard deviation"]);
         let arguments = [&["simulate"], kind, &["--noise=0"]].concat();
         assert_eq!(run(&folder, &arguments).status, 0, "{arguments:?}");
     }
@@ -148,7 +150,7 @@ fn a_speed_that_no_sample_shows_is_no_endless_search() {
         bad_input(
             &folder,
             &["traces", "run.csv", "--rpm", rpm],
-            &["turns a minute", "help: "],
+            &["turns a minute", "help: give --rpm as about the speed"],
         );
     }
     let output = crate::command::run(&folder, &["traces", "run.csv", "--rpm", "150"]);

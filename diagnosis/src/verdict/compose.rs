@@ -24,7 +24,7 @@ use crate::verdict::hidden::hidden;
 use crate::verdict::places::places;
 use crate::verdict::shape::fingerprint;
 use crate::verdict::statement::{separating, statement};
-use crate::verdict::told::{for_people, no_noise};
+use crate::verdict::told::{for_people, no_noise, pulled_in};
 use crate::verdict::types::{Detail, Diagnosis, Kind, NoiseOut, Verdict};
 use errsep_models::number::plain;
 
@@ -235,10 +235,7 @@ fn elsewhere(candidates: &[Candidate]) -> Vec<String> {
 fn notes(context: &Context<'_>, clean: &DVector<f64>, calm: &Calmed) -> Vec<String> {
     let mut notes = Vec::new();
     if calm.count > 0 {
-        notes.push(format!(
-            "{} single readings stand out of their neighbours and of their own repeats by more than four standard deviations; they are pulled in to four.",
-            calm.count
-        ));
+        notes.push(pulled_in(calm.count));
     }
     if let Some(tails) = calm.tails {
         notes.push(format!(

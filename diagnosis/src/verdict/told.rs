@@ -122,6 +122,17 @@ pub(crate) fn of_what(readings: f64) -> String {
     }
 }
 
+/// That readings which stand out were pulled in to the others.
+pub(crate) fn pulled_in(count: usize) -> String {
+    let [stand, its, they] = match count {
+        1 => ["reading stands", "its", "it is"],
+        _ => ["readings stand", "their", "they are"],
+    };
+    format!(
+        "{count} single {stand} out of {its} neighbours and of {its} own repeats by more than four standard deviations; {they} pulled in to four."
+    )
+}
+
 /// In what the differences between repeats are not independent noise.
 pub(crate) fn no_noise(model: &AnyModel, dependence: &Dependence) -> Option<String> {
     let between_channels = dependence.between_channels.as_ref().map(|both| {

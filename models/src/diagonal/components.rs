@@ -98,14 +98,25 @@ impl Component {
         }
     }
 
-    /// For people: "positioning of X", "straightness of Y in Z", "rotation of X about Z".
+    /// For people, in the words of ISO 230-1: "positioning of X", "straightness of Y in Z", "yaw of X"; of Z,
+    /// which stands upright, "tilt of Z about X".
     pub fn words(self) -> String {
         let (axis, direction) = (self.axis.letter(), self.direction.letter());
         match self.kind() {
             NodeKind::Positioning => format!("positioning of {axis}"),
             NodeKind::Straightness => format!("straightness of {axis} in {direction}"),
-            NodeKind::Angular => format!("rotation of {axis} about {direction}"),
+            NodeKind::Angular => match (self.axis, self.direction) {
+                (a, d) if a == d => format!("roll of {axis}"),
+                (Axis::Z, _) => format!("tilt of {axis} about {direction}"),
+                (_, Axis::Z) => format!("yaw of {axis}"),
+                _ => format!("pitch of {axis}"),
+            },
         }
+    }
+
+    /// The same with its symbol: "yaw of X (ECX)".
+    pub fn words_and_symbol(self) -> String {
+        format!("{} ({})", self.words(), self.name())
     }
 }
 
@@ -163,7 +174,18 @@ mod tests {
         }
         assert_eq!(Component::all().count(), Component::COUNT);
         let yaw = Component::from_name("ECX").unwrap();
-        assert_eq!(yaw.words(), "rotation of X about Z");
+        assert_eq!(yaw.words_and_symbol(), "yaw of X (ECX)");
+        for (name, words) in [
+            ("EAX", "roll of X"),
+            ("EBX", "pitch of X"),
+            ("EAY", "pitch of Y"),
+            ("EBY", "roll of Y"),
+            ("ECY", "yaw of Y"),
+            ("EAZ", "tilt of Z about X"),
+            ("ECZ", "roll of Z"),
+        ] {
+            assert_eq!(Component::from_name(name).unwrap().words(), words);
+        }
         assert_eq!(
             Component::from_name("EXY").unwrap().words(),
             "straightness of Y in X"

@@ -126,16 +126,18 @@ fn blocks(unknowns: &Unknowns) -> Vec<Block> {
         let rows: Vec<usize> = nodes.iter().map(|n| n.0).collect();
         let line = open_shape(function, &nodes);
         match component.kind() {
-            NodeKind::Angular => add(component.words(), rows, line, Part::Whole, 0),
-            NodeKind::Straightness => add(component.words(), rows, line, Part::Whole, 1),
+            NodeKind::Angular => add(component.words_and_symbol(), rows, line, Part::Whole, 0),
+            NodeKind::Straightness => {
+                add(component.words_and_symbol(), rows, line, Part::Whole, 1);
+            }
             NodeKind::Positioning => {
-                let axis = component.axis.letter();
+                let (axis, symbol) = (component.axis.letter(), component.name());
                 if rows.len() > 1 {
-                    let name = format!("shape of the positioning of {axis}");
+                    let name = format!("shape of the positioning of {axis} ({symbol})");
                     add(name, rows.clone(), line.clone(), Part::Shape, 2);
                 }
                 add(
-                    format!("positioning slope of {axis}"),
+                    format!("positioning slope of {axis} ({symbol})"),
                     rows,
                     line,
                     Part::Slope,
@@ -150,7 +152,7 @@ fn blocks(unknowns: &Unknowns) -> Vec<Block> {
             .into_iter()
             .collect();
         add(
-            location.words().to_owned(),
+            format!("{} ({})", location.words(), location.name()),
             rows,
             DVector::zeros(1),
             Part::Whole,
@@ -162,7 +164,7 @@ fn blocks(unknowns: &Unknowns) -> Vec<Block> {
         let nodes = nodes_of(unknowns, function);
         let rows: Vec<usize> = nodes.iter().map(|n| n.0).collect();
         let constant = open_shape(function, &nodes);
-        let words = component.words();
+        let words = component.words_and_symbol();
         add(
             format!("changes of the reversal in the {words}"),
             rows.clone(),

@@ -213,7 +213,7 @@ fn mirror_misalignment_is_a_slope_and_cannot_be_detected() {
     println!("{:#?}", fit.ambiguities);
     assert!(
         fit.ambiguities.iter().any(|a| a.statement
-            == "positioning slope of X, positioning slope of Y and mirror misalignment cannot be told apart: measure one slope"),
+            == "positioning slope of X (EXX), positioning slope of Y (EYY) and mirror misalignment cannot be told apart: measure one slope"),
     );
 }
 

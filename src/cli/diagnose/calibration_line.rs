@@ -10,7 +10,7 @@ use super::Args;
 use super::case::Case;
 use crate::cli::Answer;
 use crate::io::{ColumnMap, Message, SetupFile, TableReader};
-use crate::report::number::{plain, probability};
+use crate::report::number::{counted, plain, probability};
 
 /// The set-up.
 #[derive(Debug, Default, Deserialize)]
@@ -51,9 +51,9 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     }
     Case {
         readings: format!(
-            "{} readings in {} sets",
-            readings.len(),
-            model.traces().len()
+            "{} in {}",
+            counted(readings.len(), "reading"),
+            counted(model.traces().len(), "set")
         ),
         model: AnyModel::new(&model),
         along: "x",

@@ -91,7 +91,9 @@ impl Case {
                 severity: 0,
                 ..options.clone()
             };
-            let trials = prove(&clean, self::catalogue(args, &self.model)?, &options, count);
+            let mut catalogue = self::catalogue(args, &self.model)?;
+            catalogue.retain(|effect| !args.without.iter().any(|name| name == effect.name()));
+            let trials = prove(&clean, catalogue, &options, count);
             bar.finish_and_clear();
             Ok(trials)
         });

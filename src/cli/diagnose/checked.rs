@@ -16,7 +16,7 @@ use crate::diagnosis::{
 };
 use crate::io::source::{Read256, digest_of};
 use crate::io::{CsvTable, Message, Status};
-use crate::report::number::percent;
+use crate::report::number::{fixed, percent};
 use crate::report::plot::{Axis, Chart, Series};
 use crate::report::{self, Cell, Figure, Page, Section, Table};
 
@@ -153,18 +153,18 @@ fn in_words(found: &Checked) -> String {
         let expected = interval(n.sealed, n.found95, &n.unit);
         let _ = writeln!(
             text,
-            "  {name:<32} {expected:<36} {:<14} {:>6.2}",
+            "  {name:<32} {expected:<36} {:<14} {:>6}",
             number(scale * n.found),
-            n.z
+            fixed(n.z, 2)
         );
     }
     for (name, gap) in gaps(found) {
         let expected = interval(gap.sealed, gap.found95, for_people(found.unit));
         let _ = writeln!(
             text,
-            "  {name:<32} {expected:<36} {:<14} {:>6.2}",
+            "  {name:<32} {expected:<36} {:<14} {:>6}",
             number(gap.found),
-            gap.z
+            fixed(gap.z, 2)
         );
     }
     let by_channel: Vec<String> = (found.trace.by_channel.iter())

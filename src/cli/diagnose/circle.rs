@@ -11,6 +11,7 @@ use super::case::Case;
 use crate::cli::Answer;
 use crate::io::circle::not_converged;
 use crate::io::{ColumnMap, Message, SetupFile, TableReader};
+use crate::report::number;
 
 /// The set-up.
 #[derive(Debug, Default, Deserialize)]
@@ -70,8 +71,10 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         model: AnyModel::new(&model),
         along: "angle",
         notes: vec![format!(
-            "Centre and radius are given as they move from the circle of all points: centre ({:.6}, {:.6}) mm, radius {:.6} mm.",
-            circle.centre.x, circle.centre.y, circle.radius
+            "Centre and radius are given as they move from the circle of all points: centre ({}, {}) mm, radius {} mm.",
+            number::fixed(circle.centre.x, 6),
+            number::fixed(circle.centre.y, 6),
+            number::fixed(circle.radius, 6)
         )],
         inputs: Vec::new(),
     }

@@ -9,6 +9,7 @@ use crate::cli::Answer;
 use crate::cli::four_sensor::read::read;
 use crate::cli::four_sensor::setup::Setup;
 use crate::io::{Message, SetupFile};
+use crate::report::number::counted;
 
 /// Most points of surface: what the fit absorbs is a dense matrix here.
 const MOST: usize = 400;
@@ -40,9 +41,9 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         .map_err(|e| Message::not_determined(e.to_string()).in_file(&args.data))?;
     Case {
         readings: format!(
-            "four sensors at {} slide positions, {} repeats",
-            measured.outputs.readings().len(),
-            measured.repeats
+            "four sensors at {}, {}",
+            counted(measured.outputs.readings().len(), "slide position"),
+            counted(measured.repeats, "repeat")
         ),
         model: AnyModel::new(&model),
         along: "slide position",

@@ -274,8 +274,7 @@ fn in_words(fit: &Joined, statement: &str) -> String {
         let value = |value: f64, std: f64| {
             let (value, unit) = shown(value, &bias.unit);
             let (std, _) = shown(std, &bias.unit);
-            let words = crate::report::number::measured(value, Some(std));
-            (words.replace('\u{2212}', "-"), unit)
+            (crate::report::number::measured(value, Some(std)), unit)
         };
         let (before, unit) = value(bias.before, bias.std);
         let (after, _) = value(bias.after, bias.after_std);
@@ -283,7 +282,7 @@ fn in_words(fit: &Joined, statement: &str) -> String {
             text,
             "  {:<18} {before:>18} {after:>18} {unit}   {}",
             bias.quantity,
-            moved(bias).in_words().replace('\u{2212}', "-")
+            moved(bias).in_words()
         );
     }
     for note in &fit.notes {
@@ -313,5 +312,5 @@ fn parameters(effect: &JoinedEffect) -> Vec<String> {
             )
         }
     });
-    told.map(|words| words.replace('\u{2212}', "-")).collect()
+    told.collect()
 }

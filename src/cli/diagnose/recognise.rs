@@ -137,7 +137,7 @@ pub(super) fn model(args: &Args) -> Result<&'static Model, Message> {
         return Ok(model);
     }
     let table = TableReader::open_as(&args.data, &args.columns.map())?;
-    let found: Vec<&str> = table.bare_names().collect();
+    let found: Vec<&str> = table.bare_names().map(of_known_case).collect();
     if let Some(model) = of_a_run().filter(|_| is_run(&found)) {
         return Ok(model);
     }
@@ -173,6 +173,14 @@ pub(super) fn model(args: &Args) -> Result<&'static Model, Message> {
                 )))
         }
     }
+}
+
+/// The name of a model's column that this one is but for capitals.
+fn of_known_case(name: &str) -> &str {
+    let forms = MODELS.iter().flat_map(|m| m.columns.iter().copied());
+    let known = forms.flat_map(|form| form.iter().copied());
+    let mut same = known.filter(|known| known.eq_ignore_ascii_case(name));
+    same.next().unwrap_or(name)
 }
 
 /// The one model that most of the columns are those of, if it is one alone.

@@ -69,11 +69,11 @@ fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<An
     let gathered = readings_of_one(&model);
     let case = Case {
         readings: format!(
-            "{}; {} channels of {} indicators in {} positions of the spindle",
+            "{}; {} of {} in {} of the spindle",
             data.in_words(),
-            design.channels().len(),
-            design.indicators().len(),
-            design.positions().len()
+            number::counted(design.channels().len(), "channel"),
+            number::counted(design.indicators().len(), "indicator"),
+            number::counted(design.positions().len(), "position")
         ),
         notes: with_crest(setup, notes(&model)),
         model: AnyModel::new(&model),

@@ -110,7 +110,7 @@ pub fn in_words(diagnosis: &Diagnosis) -> String {
                 bias.quantity,
                 number(before),
                 number(after),
-                moved(bias).in_words().replace('\u{2212}', "-")
+                moved(bias).in_words()
             );
         }
     }
@@ -161,20 +161,27 @@ pub(super) fn by_shape(hidden: &Hidden) -> Option<String> {
     ))
 }
 
+/// Of the standard uncertainty of a quantity: by less it has not moved but for rounding.
+const NOT_MOVED: f64 = 1e-6;
+
 /// How far a quantity moves, as it is shown.
 pub(super) fn moved(bias: &Bias) -> Told {
-    let (value, unit) = shown(bias.moved, &bias.unit);
+    let told = |value: f64| {
+        let counts = value.abs() > NOT_MOVED * bias.std;
+        shown(if counts { value } else { 0.0 }, &bias.unit)
+    };
+    let (value, unit) = told(bias.moved);
     Told {
         name: "moved".to_owned(),
         value,
-        std: shown(bias.moved_std, &bias.unit).0,
+        std: told(bias.moved_std).0,
         unit: unit.to_owned(),
     }
 }
 
-/// Four digits with a hyphen for a minus, as terminals show it.
+/// Four digits.
 pub(super) fn number(value: f64) -> String {
-    plain(value, 4).replace('\u{2212}', "-")
+    plain(value, 4)
 }
 
 pub(super) fn proof_in_words(trials: &Trials) -> String {

@@ -202,7 +202,7 @@ fn in_words(
         text,
         "  a point of its profile         u up to {} µm, U = {} µm: {}",
         number::plain(greatest, 3),
-        number::plain(k * greatest, 2),
+        number::uncertainty(k * greatest),
         coverage_words(s.degrees_of_freedom)?
     );
     for step in &s.steps {

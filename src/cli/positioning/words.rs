@@ -77,7 +77,7 @@ fn figure(result: &Positioning, figure: Figure, unit: &str) -> Option<String> {
     let value = result.value(figure)?;
     let (sign, meaning) = figure.in_words();
     let expanded = match result.uncertainty(figure) {
-        Some(Ok(expanded)) => format!("U = {} {unit}", number::plain(expanded, 2)),
+        Some(Ok(expanded)) => format!("U = {} {unit}", number::uncertainty(expanded)),
         _ => String::new(),
     };
     // A letter with a bar above it is two characters of one width.

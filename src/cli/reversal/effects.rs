@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use errsep_models::reversal::effects::amplitude;
 use errsep_models::reversal::simultaneous::effects::CATALOGUE;
 use errsep_models::reversal::simultaneous::{EffectParameter, FittedEffect, ReversalError};
 use serde_json::{Value, json};
@@ -60,8 +61,13 @@ pub fn write_corrected(
     file: OutFile,
 ) -> Result<(), Message> {
     let names: Vec<String> = o.effects.iter().map(title).collect();
+    let change = if names.len() == 1 {
+        "changes"
+    } else {
+        "change"
+    };
     let comment = format!(
-        "readings of {} less what {} changes in them by the fit of these same readings: no independent evidence",
+        "readings of {} less what {} {change} in them by the fit of these same readings: no independent evidence",
         path.display().to_string().replace(['\n', '\r'], " "),
         names.join(" and ")
     );
@@ -80,6 +86,9 @@ pub fn refusal(why: &ReversalError) -> Option<Message> {
     let not_determined =
         |remedy: String| Some(Message::not_determined(why.to_string()).remedy(remedy));
     match why {
+        ReversalError::UnknownEffect { effect } if amplitude(effect).is_some() => {
+            Some(of_diagnosis_alone(effect))
+        }
         ReversalError::UnknownEffect { effect } => {
             let names: Vec<&str> = CATALOGUE.iter().map(|e| e.name).collect();
             let remedy = match nearest(effect, names.iter().copied()) {
@@ -108,4 +117,26 @@ pub fn refusal(why: &ReversalError) -> Option<Message> {
         ),
         _ => None,
     }
+}
+
+/// Why an effect that the diagnosis knows is no unknown of the fit, and what to do.
+fn of_diagnosis_alone(effect: &str) -> Message {
+    let (why, remedy) = match effect {
+        "indexing-error" => (
+            "two positions half a turn apart show it as a tilt of slide and artefact, so alpha and beta take it up whatever its size",
+            "check the angles of the spindle with a level or an encoder, and align the artefact sideways too",
+        ),
+        "stick-slip" | "sticking-plunger" => (
+            "where it sticks and lets go is followed from reading to reading, which is no size or shape that a fit could have as an unknown",
+            "leave it out of --with: errsep diagnose tells whether these readings show it",
+        ),
+        _ => (
+            "it has no unknowns that tilts and forms could be fitted along with",
+            "leave it out of --with: errsep diagnose tells whether these readings show it",
+        ),
+    };
+    Message::not_determined(format!(
+        "{effect}, an effect that errsep diagnose knows, cannot join this fit: {why}"
+    ))
+    .remedy(remedy)
 }

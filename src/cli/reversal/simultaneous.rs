@@ -301,7 +301,7 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
         criterion: "corrected Akaike criterion".to_owned(),
         tried: fit.knots.table.iter().map(|t| (t.cells, t.aicc)).collect(),
         chosen: cells,
-        reason: format!("{cells} cells, {how}; {verdict}"),
+        reason: format!("{}, {how}; {verdict}", number::counted(cells, "cell")),
     }
 }
 

@@ -60,12 +60,12 @@ pub fn summary(o: &Outcome) -> String {
             format!(
                 "; the slide is straight to {} µm (minimum zone of points known to ± {} µm)",
                 number::plain(zone, 3),
-                number::plain(std, 2)
+                number::uncertainty(std)
             )
         } else {
             format!(
                 "; how straight the slide is cannot be said: its points are known to ± {} µm only, which hides the {} µm found (minimum zone)",
-                number::plain(std, 2),
+                number::uncertainty(std),
                 number::plain(zone, 3)
             )
         };
@@ -110,7 +110,7 @@ fn write_all(t: &mut String, file: &Path, data: &ReversalData, o: &Outcome) -> s
             tilt.name,
             measured_urad(tilt.angle),
             number::plain(arcsec_from_rad(tilt.angle.value), 4),
-            number::plain(urad_from_rad(k * tilt.angle.std), 2),
+            number::uncertainty(urad_from_rad(k * tilt.angle.std)),
             o.meaning(tilt)
         )?;
     }
@@ -157,7 +157,7 @@ fn write_all(t: &mut String, file: &Path, data: &ReversalData, o: &Outcome) -> s
             .iter()
             .find(|f| f.name == name)
             .map_or(0.0, |f| middle(&f.std));
-        writeln!(t, "u {}", number::plain(std, 2))?;
+        writeln!(t, "u {}", number::uncertainty(std))?;
     }
     if let Some(closure) = &o.closure {
         writeln!(

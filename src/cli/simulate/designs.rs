@@ -13,7 +13,6 @@ use serde_json::{Map, Value, json};
 use super::reversal::Args;
 use super::sizes;
 use crate::cli::Answer;
-use crate::io::message::nearest;
 use crate::io::reversal::StylusBeside;
 use crate::io::{CsvTable, Message};
 
@@ -225,11 +224,8 @@ fn effects(args: &Args, plan: &DesignPlan) -> Result<Vec<(String, DesignEffect)>
             })?;
         let name = name.trim();
         if !DESIGN_EFFECTS.contains(&name) {
-            let remedy = match nearest(name, DESIGN_EFFECTS) {
-                Some(near) => format!("did you mean {near}?"),
-                None => format!("the effects are {}", DESIGN_EFFECTS.join(", ")),
-            };
-            return Err(refused(format!("there is no effect `{name}`"), remedy));
+            let diagnosed = amplitude_of_design(&plan.design, name).is_some();
+            return Err(super::not_made(name, &DESIGN_EFFECTS, diagnosed));
         }
         if name == "off-crest" && plan.thickness_mm == 0.0 {
             return Err(refused(

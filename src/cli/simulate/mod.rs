@@ -193,18 +193,26 @@ pub(super) fn effects<E>(
                 .filter(|v: &f64| v.is_finite())
                 .ok_or_else(|| bad(format!("`{value}` is not a number")))?;
             sizes::possible(name, size, parameter(name).as_ref())?;
-            make(name, size).ok_or_else(|| {
-                Message::bad_input(format!("there is no effect `{name}`")).remedy(
-                    match nearest(name, known.iter().copied()) {
-                        Some(near) => {
-                            format!("did you mean `{near}`? There are {}", known.join(", "))
-                        }
-                        None => format!("there are {}", known.join(", ")),
-                    },
-                )
-            })
+            make(name, size).ok_or_else(|| not_made(name, known, parameter(name).is_some()))
         })
         .collect()
+}
+
+/// A message about an effect that is none of those that are made, `known`; `diagnosed`: the catalogue of the
+/// diagnosis has it.
+pub(super) fn not_made(name: &str, known: &[&str], diagnosed: bool) -> Message {
+    let known_here = format!("there are {}", known.join(", "));
+    if diagnosed {
+        return Message::bad_input(format!(
+            "`{name}` is an effect of errsep diagnose that this simulation does not make"
+        ))
+        .remedy(known_here);
+    }
+    let remedy = match nearest(name, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`? T{}", &known_here[1..]),
+        None => known_here,
+    };
+    Message::bad_input(format!("there is no effect `{name}`")).remedy(remedy)
 }
 
 /// Columns in which a reading may be missing: the time where none is told, and what the second and

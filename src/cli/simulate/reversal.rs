@@ -2,6 +2,7 @@
 
 use errsep_models::basis::bspline::CubicBSpline;
 use errsep_models::reversal::Direction;
+use errsep_models::reversal::designs::simulate::DESIGN_EFFECTS;
 use errsep_models::reversal::effects::amplitude;
 use errsep_models::reversal::exact_readings::Injection;
 use errsep_models::reversal::injected::{Injected, Undisturbed};
@@ -28,12 +29,44 @@ const TRUTH_POSITIONS: usize = 201;
 /// Microradians in a radian, as the options are given.
 const URAD: f64 = 1e-6;
 
+/// The effects that are made of the four channels.
+const EFFECTS: [&str; 14] = [
+    "axis-backlash",
+    "common-gain",
+    "cyclic-error",
+    "gain-mismatch",
+    "gravity-sag",
+    "hysteresis",
+    "indicator-nonlinearity",
+    "local-contamination",
+    "reversal-shift",
+    "taper",
+    "thermal-drift",
+    "thickness-shift",
+    "tip-radius",
+    "zero-jump",
+];
+
+/// The end of the help.
+fn effects_and_examples() -> String {
+    let further: Vec<&str> = DESIGN_EFFECTS
+        .into_iter()
+        .filter(|name| !EFFECTS.contains(name))
+        .collect();
+    format!(
+        "Effects: {}.\nWith --design also {}.\n\nExamples:\n{EXAMPLES}",
+        EFFECTS.join(", "),
+        further.join(", ")
+    )
+}
+
+const EXAMPLES: &str = "    errsep simulate reversal --alpha 40 --thickness 42 --noise 0.02 --seed 7 --out data
+    errsep simulate reversal --design 0/0,180/0,90/0,270/0,0/180,180/180,90/180,270/180 --alpha-v 25 --out eight
+    errsep simulate reversal --design 0/0,180/0,90/0,270/0,0/180,180/180,90/180,270/180 --repeats 3 --both-directions --effect thermal-drift=0.5 --out drifting";
+
 /// Readings of a reversal in exact geometry, with known tilts and forms.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:
-    errsep simulate reversal --alpha 40 --thickness 42 --noise 0.02 --seed 7 --out data
-    errsep simulate reversal --design 0/0,180/0,90/0,270/0,0/180,180/180,90/180,270/180 --alpha-v 25 --out eight
-    errsep simulate reversal --design 0/0,180/0,90/0,270/0,0/180,180/180,90/180,270/180 --repeats 3 --both-directions --effect thermal-drift=0.5 --out drifting")]
+#[command(after_help = effects_and_examples())]
 pub struct Args {
     /// Tilt between slide and spindle axis, urad.
     #[arg(
@@ -329,11 +362,21 @@ fn effects(args: &Args, undisturbed: &Undisturbed) -> Result<Vec<(String, Inject
                 .ok()
                 .filter(|v: &f64| v.is_finite())
                 .ok_or_else(|| bad(format!("`{value}` is not a number")))?;
-            let parameter = amplitude(name.trim());
-            sizes::possible(name.trim(), size, parameter.as_ref())?;
-            let effect = Injection::named(name.trim(), size, &undisturbed.frame, &mut random)
-                .ok_or_else(|| bad(format!("there is no effect `{name}`")))?;
-            Ok((name.trim().to_owned(), effect))
+            let name = name.trim();
+            let parameter = amplitude(name);
+            if !EFFECTS.contains(&name) && DESIGN_EFFECTS.contains(&name) {
+                return Err(Message::bad_input(format!(
+                    "`{name}` is an effect of errsep diagnose that is made with --design alone"
+                ))
+                .remedy(format!(
+                    "give --design, such as --design 0/0,180/0,180/180,0/180 for the four channels; without it there are {}",
+                    EFFECTS.join(", ")
+                )));
+            }
+            sizes::possible(name, size, parameter.as_ref())?;
+            let effect = Injection::named(name, size, &undisturbed.frame, &mut random)
+                .ok_or_else(|| super::not_made(name, &EFFECTS, parameter.is_some()))?;
+            Ok((name.to_owned(), effect))
         })
         .collect()
 }

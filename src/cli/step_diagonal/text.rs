@@ -135,7 +135,7 @@ fn span(c: &ComponentEstimate) -> Result<String, Message> {
         None => format!("spans {span} {unit}{note}"),
         Some(expanded) => format!(
             "spans {span} {unit}, U up to {} {unit} (k = {}){note}",
-            number::plain(factor * expanded.expanded_uncertainty, 2),
+            number::uncertainty(factor * expanded.expanded_uncertainty),
             number::plain(expanded.coverage_factor, 3),
         ),
     })

@@ -256,6 +256,29 @@ impl Part {
     }
 }
 
+/// Greatest reading: the square of a sum of squares of them must be finite.
+const GREATEST: f64 = 1e60;
+
+/// A reading of a row in µm.
+///
+/// # Errors
+/// It is no number, or one whose square is none.
+pub(super) fn reading_of(row: Row<'_>, column: &Column, in_um: f64) -> Result<f64, Message> {
+    let value = row.number(column)? * in_um;
+    if value.abs() <= GREATEST {
+        return Ok(value);
+    }
+    Err(row
+        .error(
+            column,
+            format!(
+                "a reading of {} cannot be worked with: its square overflows",
+                row.text(column)
+            ),
+        )
+        .remedy("correct it, or remove the row"))
+}
+
 fn read_row(row: Row<'_>, columns: &Columns, data: &mut Part) -> Result<(), Message> {
     let x = row.number(&columns.x)? * columns.scales.x_mm;
     let repeat = match &columns.repeat {
@@ -271,7 +294,7 @@ fn read_row(row: Row<'_>, columns: &Columns, data: &mut Part) -> Result<(), Mess
         None => None,
     };
     let mut add = |channel: Channel, column: &Column| -> Result<(), Message> {
-        let value = row.number(column)? * columns.scales.reading_um[channel.index()];
+        let value = reading_of(row, column, columns.scales.reading_um[channel.index()])?;
         data.first[channel.index()].get_or_insert_with(|| row.place(column));
         data.readings.push(Reading {
             channel,

@@ -8,7 +8,7 @@ use errsep_models::reversal::designs::{
 };
 use errsep_models::reversal::{Channel, Direction, Observations, Reading};
 
-use super::data::{Layout, ReversalData, direction, read_table};
+use super::data::{Layout, ReversalData, direction, read_table, reading_of};
 use super::setup::ReversalSetup;
 use crate::io::dialect::Dialect;
 use crate::io::message::{Place, list, nearest};
@@ -205,7 +205,10 @@ fn read_design(mut table: TableReader, setup: &ReversalSetup) -> Result<DesignDa
         };
         match &fields {
             Fields::One(naming, column, in_um) => {
-                add(found.channel(row, naming)?, row.number(column)? * in_um);
+                add(
+                    found.channel(row, naming)?,
+                    reading_of(row, column, *in_um)?,
+                );
             }
             Fields::Wide(columns) => {
                 for (name, column, in_um) in columns {
@@ -214,7 +217,7 @@ fn read_design(mut table: TableReader, setup: &ReversalSetup) -> Result<DesignDa
                     } else {
                         add(
                             found.by_column(row, name, column)?,
-                            row.number(column)? * in_um,
+                            reading_of(row, column, *in_um)?,
                         );
                     }
                 }

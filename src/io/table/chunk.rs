@@ -123,11 +123,11 @@ impl Walk {
         self.line_number = chunk.lines_before;
     }
 
-    /// Goes on to the next line that is neither blank nor a comment; false where the chunk has none left.
+    /// Goes on to the next line that is no blank one, no comment and no empty row; false where the chunk has none left.
     pub fn seek(&mut self, end: u8, chunk: &Chunk) -> bool {
         let text = chunk.text();
         while let Some(first) = text.get(self.at) {
-            if matches!(first, b'!' | b'$'..=b'~') {
+            if matches!(first, b'!' | b'$'..=b'+' | b'-'..=b':' | b'<'..=b'~') {
                 return true;
             }
             let line = &text[self.at..];

@@ -108,6 +108,7 @@ impl TableReader {
                 names: Vec::new(),
                 headings: Vec::new(),
                 map: ColumnMap::default(),
+                renamable: false,
                 header: String::new(),
                 header_number: 0,
             },
@@ -131,6 +132,7 @@ impl TableReader {
             dialect,
             headings: names.iter().map(|name| Heading::of(name)).collect(),
             map: ColumnMap::default(),
+            renamable: false,
             header: names.join(","),
             header_number: 0,
             names,
@@ -159,6 +161,7 @@ impl TableReader {
     /// As [`open`](Self::open); a column of `map` that the file does not have.
     pub fn open_as(path: &Path, map: &ColumnMap) -> Result<Self, Message> {
         let mut table = Self::open(path)?;
+        table.sheet.renamable = true;
         if map.is_empty() {
             return Ok(table);
         }
@@ -269,14 +272,17 @@ impl TableReader {
     }
 
     /// A column that may be absent: one of this name, or of this name with a unit, `x (mm)`, `x [mm]` or
-    /// `x_mm`.
+    /// `x_mm`; capitals count only where two columns differ in nothing else.
     pub fn optional(&self, name: &str) -> Option<Column> {
         let as_written = self
             .sheet
             .names
             .iter()
             .position(|n| n == name && self.sheet.map.is_empty());
-        let index = as_written.or_else(|| self.bare_names().position(|n| n == name))?;
+        let same = |n: &str| n.eq_ignore_ascii_case(name);
+        let index = as_written
+            .or_else(|| self.bare_names().position(|n| n == name))
+            .or_else(|| self.bare_names().position(same))?;
         Some(Column::new(
             index,
             name,
@@ -320,25 +326,51 @@ impl TableReader {
             let refuse = |(what, remedy): (String, String)| self.in_header(0, what).remedy(remedy);
             return self.sheet.map.only(known).map_err(refuse);
         }
-        for (i, (name, bare)) in self.names().zip(self.bare_names()).enumerate() {
-            if self.bare_names().take(i).any(|before| before == bare) && known.contains(&bare) {
+        let columns: Vec<Option<&str>> = self
+            .names()
+            .zip(self.bare_names())
+            .map(|(name, bare)| meant(&[name, bare], known))
+            .collect();
+        for (i, (name, column)) in self.names().zip(&columns).enumerate() {
+            let Some(column) = column else {
+                return Err(self.unknown_column(i, name, &columns, known));
+            };
+            if columns[..i].contains(&Some(column)) {
                 return Err(self
-                    .in_header(i, format!("column `{bare}` is named twice"))
+                    .in_header(i, format!("column `{column}` is named twice"))
                     .remedy("keep one of the two, or rename one"));
-            }
-            if !known.contains(&name) && !known.contains(&bare) {
-                let remedy = match nearest(name, known.iter().copied()) {
-                    Some(near) => {
-                        format!("did you mean `{near}`? Columns may be {}", list(known))
-                    }
-                    None => format!("remove it; columns may be {}", list(known)),
-                };
-                return Err(self
-                    .in_header(i, format!("unknown column `{name}`"))
-                    .remedy(remedy));
             }
         }
         Ok(())
+    }
+
+    /// A message about a column that is none of `known`; `columns`: which each of the file is.
+    fn unknown_column(
+        &self,
+        index: usize,
+        name: &str,
+        columns: &[Option<&str>],
+        known: &[&str],
+    ) -> Message {
+        let near = nearest(name, known.iter().copied());
+        let mut remedy = match near {
+            Some(near) => format!("did you mean `{near}`? Columns may be {}", list(known)),
+            None => format!("remove it; columns may be {}", list(known)),
+        };
+        if columns.iter().all(Option::is_none) {
+            remedy += ". If lines stand before the one that names the columns, remove them or begin them with #";
+        }
+        let role = near.or_else(|| {
+            let mut absent = known.iter().filter(|k| !columns.contains(&Some(**k)));
+            absent.next().copied()
+        });
+        if let Some(role) = role.filter(|_| self.sheet.renamable) {
+            remedy += &format!(
+                ". Columns of other names are read with --columns ROLE=COLUMN,…, such as {role}={name}, which names every column that is to be read"
+            );
+        }
+        self.in_header(index, format!("unknown column `{name}`"))
+            .remedy(remedy)
     }
 
     /// A message about a column's name in the first line.
@@ -369,7 +401,7 @@ impl TableReader {
             .remedy("add the data below the first line")
     }
 
-    /// The next row; comments and blank lines are passed over. `None` at the end.
+    /// The next row; comments, blank lines and rows of nothing but separators are passed over. `None` at the end.
     ///
     /// # Errors
     /// The file cannot be read on, or the line is not a row of this table.
@@ -402,6 +434,16 @@ impl TableReader {
             Rows::Parquet(_) => Ok(None),
         }
     }
+}
+
+/// Which of the known columns one of these names is: as it is written, or but for capitals.
+fn meant<'k>(names: &[&str], known: &[&'k str]) -> Option<&'k str> {
+    let find = |same: &dyn Fn(&str, &str) -> bool| {
+        let mut found = known.iter().filter(|k| names.iter().any(|n| same(n, k)));
+        found.next().copied()
+    };
+    find(&|name, known| name == known)
+        .or_else(|| find(&|name, known| name.eq_ignore_ascii_case(known)))
 }
 
 impl Text {

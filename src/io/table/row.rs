@@ -179,8 +179,10 @@ impl<'a> Row<'a> {
             .remedy("write the number, or remove the row"))
     }
 
-    fn parse(self, column: &Column, text: &str) -> Result<f64, Message> {
+    fn parse(self, column: &Column, written: &str) -> Result<f64, Message> {
         let name = column.name();
+        // The minus sign of typography stands in what our own reports print and spreadsheets show.
+        let text = &written.replace('\u{2212}', "-");
         let decimal = self.decimal.get();
         if self.sheet.dialect.delimiter == Delimiter::Comma {
             if let Ok(value) = text.parse() {
@@ -214,9 +216,14 @@ impl<'a> Row<'a> {
                 return Ok(value);
             }
         }
+        let remedy = if name == "time" && is_clock(text) {
+            "write the seconds since the first reading, such as 12.5, not the time of day"
+        } else {
+            "write a plain number such as 1.25, without unit or text"
+        };
         Err(self
-            .error(column, format!("{name} \"{text}\" is not a number"))
-            .remedy("write a plain number such as 1.25, without unit or text"))
+            .error(column, format!("{name} \"{written}\" is not a number"))
+            .remedy(remedy))
     }
 
     /// The whole number from 1 in a field.
@@ -267,6 +274,12 @@ impl<'a> Row<'a> {
     pub(super) fn bad(self, index: usize, what: impl Into<String>) -> Message {
         Message::bad_input(what).at(self.place_of(index))
     }
+}
+
+/// Whether a text is a time of day or a date: 08:00:00, 2026-11-29T08:00.
+fn is_clock(text: &str) -> bool {
+    text.starts_with(|c: char| c.is_ascii_digit())
+        && (text.contains(':') || text.matches(['-', '/']).count() == 2)
 }
 
 /// Whether there are no blanks around a field, and something in it.

@@ -15,6 +15,8 @@ pub(super) struct Sheet {
     pub names: Vec<String>,
     pub headings: Vec<Heading>,
     pub map: ColumnMap,
+    /// Whether columns can be given roles.
+    pub renamable: bool,
     pub header: String,
     pub header_number: usize,
 }

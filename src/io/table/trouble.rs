@@ -6,6 +6,7 @@ use super::row::Row;
 use super::sheet::Sheet;
 use crate::io::dialect::{Delimiter, NotATable};
 use crate::io::message::{Message, Place};
+use crate::number::counted;
 
 /// Where a field stands in its line as written (quotes included).
 pub(super) fn place_of_field(
@@ -39,10 +40,6 @@ pub(super) fn place_of_field(
     }
 }
 
-fn count(n: usize, noun: &str) -> String {
-    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
-}
-
 pub(super) fn cannot_read(path: &Path, error: &std::io::Error) -> Message {
     let remedy = match error.kind() {
         std::io::ErrorKind::NotFound => "check the name and the folder",
@@ -64,31 +61,47 @@ pub(super) fn not_a_table(path: &Path, why: NotATable) -> Message {
             "the file is UTF-16".to_owned(),
             "save it again as UTF-8 (\"CSV UTF-8\" in a spreadsheet)",
         ),
-        NotATable::Binary { offset, byte } => (
-            format!("the file is not text: byte {} is 0x{byte:02X}", offset + 1),
-            "export it as plain text (CSV, UTF-8)",
+        NotATable::Binary { byte, .. } => (
+            format!("the file is not text: this byte is 0x{byte:02X}"),
+            remedy_of(byte),
         ),
+    };
+    let (line, column) = match why {
+        NotATable::Binary { line, column, .. } => (line, column),
+        NotATable::Empty | NotATable::Utf16 => (1, 1),
     };
     Message::bad_input(what)
         .at(Place {
             file: path.to_owned(),
-            line: 1,
-            column: 1,
+            line,
+            column,
             text: String::new(),
             length: 0,
         })
         .remedy(remedy)
 }
 
+/// What to do about a byte that is not text: that of a letter in an older encoding, or of no text at all.
+fn remedy_of(byte: u8) -> &'static str {
+    if byte >= 0x80 {
+        "save the file as UTF-8 (\"CSV UTF-8\" in a spreadsheet): an older encoding such as Latin-1 has letters like µ there"
+    } else {
+        "export it as plain text (CSV, UTF-8)"
+    }
+}
+
 /// A line with a byte that is not text.
 pub(super) fn no_text(sheet: &Sheet, number: usize, line: &[u8], byte: usize) -> Message {
-    let what = format!(
-        "byte {} of the line (0x{:02X}) is not text",
-        byte + 1,
-        line[byte]
-    );
-    let remedy = "save the file as plain text (CSV, UTF-8)";
-    sheet.at_line(number, what).remedy(remedy)
+    let what = format!("this byte (0x{:02X}) is not text", line[byte]);
+    Message::bad_input(what)
+        .at(Place {
+            file: sheet.path.clone(),
+            line: number,
+            column: String::from_utf8_lossy(&line[..byte]).chars().count() + 1,
+            text: String::new(),
+            length: 0,
+        })
+        .remedy(remedy_of(line[byte]))
 }
 
 /// A line whose quote does not end on it.
@@ -110,8 +123,9 @@ pub(super) fn open_quote(sheet: &Sheet, number: usize, line: &[u8]) -> Message {
 pub(super) fn wrong_count(sheet: &Sheet, row: Row<'_>, found: usize) -> Message {
     let expected = sheet.names.len();
     let what = format!(
-        "the row has {}, the first line names {expected} columns",
-        count(found, "field")
+        "the row has {}, the first line names {}",
+        counted(found, "field"),
+        counted(expected, "column")
     );
     let remedy = match sheet.dialect.delimiter {
         Delimiter::Comma => {

@@ -144,6 +144,7 @@ fn results_become_files() {
         "export linuxcnc positioning.json --out m --format json",
     );
     let json: Value = serde_json::from_str(&json).unwrap();
+    crate::command::documented(&json, "docs/json/export.md");
     assert_eq!(json["format"], "linuxcnc");
     assert_eq!(
         json["provenance"]["inputs"][0]["sha256"],

@@ -344,15 +344,14 @@ impl<'a, 'b> Told<'a, 'b> {
                 text,
                 "{mark} {:<16} {:>8}  {:>8}  {:>8}   {} µm",
                 w.effect,
-                plain(w.evidence, 3).replace('\u{2212}', "-"),
+                plain(w.evidence, 3),
                 percent(w.explained),
                 probability(w.p_value),
                 plain(w.left.rms, 2)
             );
         }
-        let figure = |value: &Value, factor: f64| {
-            measured(factor * value.value, Some(factor * value.std)).replace('\u{2212}', "-")
-        };
+        let figure =
+            |value: &Value, factor: f64| measured(factor * value.value, Some(factor * value.std));
         let _ = writeln!(
             text,
             "\n{:<26}{} µrad",

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::super::designs::{Common, Promise, ToldApart};
 use super::super::{AT_LEAST, Args, effect_size, size};
+use crate::report::number::counted;
 use crate::report::plot::{Axis, Bar, Bars};
 use crate::report::{Cell, Figure, Page, Section, Standing, Table};
 
@@ -54,10 +55,6 @@ fn described(p: &Promise) -> String {
         counted(p.time.turns, "turn"),
         counted(p.time.settings, "indicator"),
     )
-}
-
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Rows of a comparison: a name, then a cell a design.

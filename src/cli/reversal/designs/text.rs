@@ -144,7 +144,7 @@ fn write_all(t: &mut String, file: &Path, o: &Outcome, coverage: &str) -> std::f
             "  {:22} {} from lowest to highest, u {}",
             form.name,
             number::plain(high - low, 3),
-            number::plain(u, 2)
+            number::uncertainty(u)
         )?;
     }
     if !fit.closures.is_empty() {
@@ -201,7 +201,9 @@ fn write_all(t: &mut String, file: &Path, o: &Outcome, coverage: &str) -> std::f
 pub fn cells(fit: &DesignFit) -> String {
     let cells = fit.cells();
     match cells.first() {
-        Some((_, first)) if cells.iter().all(|c| c.1 == *first) => format!("{first} cells a form"),
+        Some((_, first)) if cells.iter().all(|c| c.1 == *first) => {
+            format!("{} a form", number::counted(*first, "cell"))
+        }
         _ => {
             let own: Vec<String> = cells
                 .iter()
@@ -219,7 +221,7 @@ fn write_slope(t: &mut String, slope: &Found, factor: f64) -> std::fmt::Result {
         slope.name,
         urad(slope.value),
         number::plain(arcsec_from_rad(slope.value.value), 4),
-        number::plain(urad_from_rad(factor * slope.value.std), 2),
+        number::uncertainty(urad_from_rad(factor * slope.value.std)),
         meaning(&slope.name)
     )
 }

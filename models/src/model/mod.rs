@@ -111,6 +111,21 @@ impl Record {
     }
 }
 
+/// The power of ten of which all readings are whole multiples: what they were rounded to. `None` where they have more
+/// decimals than anybody reads.
+fn decimal_step(readings: &[f64]) -> Option<f64> {
+    /// Decimals of a reading, in its unit, at most.
+    const MOST: i32 = 6;
+    // A unit may have been converted: a few roundings of a multiple.
+    let whole = |value: &f64, steps: f64| {
+        let multiple = value * steps;
+        (multiple - multiple.round()).abs() <= 1e-13 * multiple.abs().max(1.0)
+    };
+    let steps = (0..=MOST).map(|decimals| 10f64.powi(decimals));
+    let mut told = steps.filter(|steps| readings.iter().all(|value| whole(value, *steps)));
+    told.next().map(|steps| 1.0 / steps)
+}
+
 /// A sparse signature: the change of each reading per unit of an amplitude.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Column {
@@ -300,10 +315,12 @@ pub trait FittedModel: Clone + Send + Sync {
         &[]
     }
 
-    /// The smallest difference of readings that is more than rounding of what they were reckoned from:
-    /// 1e-12 of the greatest reading, unless they are small differences of greater numbers.
+    /// The smallest difference of readings that is more than rounding of what they were reckoned from or read to:
+    /// 1e-12 of the greatest reading, unless they are small differences of greater numbers, or the standard deviation of
+    /// rounding to the decimals that they have (GUM F.2.2.1).
     fn rounding(&self) -> f64 {
-        ROUNDING * self.observed().amax()
+        let read_to = decimal_step(self.observed().as_slice()).unwrap_or(0.0);
+        (ROUNDING * self.observed().amax()).max(read_to / 12f64.sqrt())
     }
 
     /// Standard deviation of one reading where the user states it.

@@ -16,3 +16,4 @@ pub mod reversal;
 pub mod straightness;
 pub mod uncertainty;
 pub mod units;
+pub mod zone;

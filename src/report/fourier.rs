@@ -17,6 +17,8 @@ pub struct FourierView<'a> {
     pub length: f64,
     /// The result.
     pub separation: &'a Separation,
+    /// Straightness of workpiece and slide.
+    pub widths: &'a [Width; 2],
     /// Other ways on the same scans.
     pub methods: &'a [Method],
     /// What the reader has to weigh.
@@ -57,14 +59,35 @@ impl Method {
     }
 }
 
-/// Greatest less least value.
-pub fn peak_to_valley(values: &[f64]) -> f64 {
-    let (low, high) = values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| {
-            (l.min(v), h.max(v))
-        });
-    if low <= high { high - low } else { 0.0 }
+/// Peak to valley of a profile about its least-squares line, µm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Width {
+    /// Of the profile as found.
+    pub value: f64,
+    /// Its standard deviation under the error of the profile.
+    pub std: f64,
+    /// What the error of the profile, once more, adds to it on average.
+    pub widening: f64,
+    /// Interval with a coverage probability of 95 %, which allows for that.
+    pub interval: (f64, f64),
+}
+
+impl Width {
+    /// "49.65 µm, 95 % interval 44.9 to 48.1 µm (as much noise again would add 1.4 µm)".
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        // Two digits of the uncertainty.
+        let decimals = (1.0 - self.std.log10().floor()).clamp(0.0, 6.0) as usize;
+        let shown = |value: f64| number::fixed(value, decimals);
+        format!(
+            "{} µm, {} interval {} to {} µm (as much noise again would add {} µm)",
+            shown(self.value),
+            number::percent(0.95),
+            shown(self.interval.0),
+            shown(self.interval.1),
+            number::plain(self.widening.max(0.0), 2)
+        )
+    }
 }
 
 /// Coverage factor of the 95 % bands.
@@ -77,22 +100,22 @@ fn band(s: &Separation) -> f64 {
 #[must_use]
 pub fn page(view: &FourierView) -> Page {
     let s = view.separation;
-    let straight = number::plain(peak_to_valley(&view.separation.straightness), 3);
+    let straight = view.widths[0].in_words();
     let (standing, sentence) = if s.lost.is_empty() && !view.remarks.is_empty() {
         (
             Standing::Caution,
-            format!("The workpiece is straight to {straight} µm; see what is noted below."),
+            format!("The workpiece is straight to {straight}; see what is noted below."),
         )
     } else if s.lost.is_empty() {
         (
             Standing::Good,
-            format!("The workpiece is straight to {straight} µm."),
+            format!("The workpiece is straight to {straight}."),
         )
     } else {
         (
             Standing::Caution,
             format!(
-                "The workpiece is straight to {straight} µm, without {} orders that no probe spacing passes.",
+                "The workpiece is straight to {straight}, without {} orders that no probe spacing passes.",
                 s.lost.len()
             ),
         )
@@ -108,12 +131,12 @@ fn profiles(view: &FourierView) -> Section {
     let s = view.separation;
     let half: Vec<f64> = s.straightness_std.iter().map(|u| band(s) * u).collect();
     let mut figures = vec![
-        KeyFigure::new(
-            "Straightness",
-            peak_to_valley(&view.separation.straightness),
-            "µm",
-        )
-        .meaning("workpiece, about its least-squares line"),
+        KeyFigure::new("Straightness", view.widths[0].value, "µm")
+            .std(view.widths[0].std)
+            .meaning("workpiece, about its least-squares line"),
+        KeyFigure::new("Straightness of the slide", view.widths[1].value, "µm")
+            .std(view.widths[1].std)
+            .meaning("read point by point: the noise adds to it"),
         KeyFigure::new("Noise of a reading", s.noise.0, "µm"),
     ];
     if let Some(value) = s.height_difference {
@@ -129,7 +152,13 @@ fn profiles(view: &FourierView) -> Section {
     for remark in view.remarks {
         section = section.warning(remark.as_str());
     }
+    let half_of_slide = s.slide_std.iter().map(|u| band(s) * u).collect();
     section
+        .paragraph(format!(
+            "Straightness of the workpiece: {}. Of the slide: {}.",
+            view.widths[0].in_words(),
+            view.widths[1].in_words()
+        ))
         .figure(Figure::new(
             "Workpiece",
             "Deviation from the least-squares line with the 95 % band of the reading noise.",
@@ -139,9 +168,9 @@ fn profiles(view: &FourierView) -> Section {
         ))
         .figure(Figure::new(
             "Slide",
-            "Mean reading of P1 less the workpiece; its slope cannot be told from the workpiece's.",
+            "Mean reading of P1 less the workpiece, with the 95 % band of each point; its slope cannot be told from the workpiece's.",
             Chart::new(Axis::new("position x", "mm"), Axis::new("deviation", "µm"))
-                .series(Series::line("slide", s.x.clone(), s.slide.clone())),
+                .series(Series::line("slide", s.x.clone(), s.slide.clone()).half_band(half_of_slide)),
         ))
         .note(
             "A height difference between P2 and P3 and a tilt of the workpiece are the same straight \

@@ -386,3 +386,67 @@ fn a_simulation_writes_its_set_up() {
         }
     }
 }
+
+/// The straightness of the slide is that of noisy points: its interval, not its value, holds the truth, and
+/// the uncertainty of its points is what they scatter by.
+#[test]
+fn straightness_has_an_interval_and_the_slide_its_uncertainty() {
+    let folder = Folder::with(&[]);
+    let straight = |x: &[f64], y: &[f64]| {
+        let found = errsep_models::fourier::straightness(x, y);
+        found.iter().copied().fold(f64::MIN, f64::max)
+            - found.iter().copied().fold(f64::MAX, f64::min)
+    };
+    let (mut held, mut beyond, mut squares) = ([0, 0], 0, 0.0);
+    for seed in 1..=20 {
+        let seed = seed.to_string();
+        let made = ["simulate", "fourier", "--samples", "200", "--seed", &seed];
+        folder.write("scans.csv", &run(&folder, &made).stdout);
+        let truth = json(&folder, &[&made[..], &["--format", "json"]].concat());
+        let args = [
+            "fourier",
+            "scans.csv",
+            "--length",
+            "100",
+            "--format",
+            "json",
+        ];
+        let answer = json(&folder, &args);
+        let x = numbers(&answer, "/profiles/x");
+        for (k, of) in ["workpiece", "slide"].into_iter().enumerate() {
+            let width = straight(&x, &numbers(&truth, &format!("/truth/profiles/{of}")));
+            let error = &answer["straightness"][of];
+            let interval = numbers(error, "/interval");
+            held[k] += usize::from(interval[0] <= width && width <= interval[1]);
+            beyond += usize::from(k == 1 && error["value"].as_f64().unwrap() > width);
+            assert!(error["std"].as_f64().unwrap() > 0.0);
+        }
+        let straightened = |y: &[f64]| errsep_models::fourier::straightness(&x, y);
+        let found = straightened(&numbers(&answer, "/profiles/slide"));
+        let truth = straightened(&numbers(&truth, "/truth/profiles/slide"));
+        let std = numbers(&answer, "/profiles/slide_std");
+        let own = found
+            .iter()
+            .zip(&truth)
+            .zip(&std)
+            .map(|((f, t), u)| ((f - t) / u).powi(2));
+        squares += own.sum::<f64>() / x.len() as f64 / 20.0;
+    }
+    // 95 % of 20: fewer than 16 have a probability of 0.3 %.
+    assert!(held.iter().all(|n| *n >= 16), "{held:?}");
+    // Half of 20 without a bias: 15 and more have a probability of 2 %.
+    assert!(beyond >= 15, "the noise widens the slide: {beyond}");
+    // Truncation: the line is taken out of both, a hundredth of the variance.
+    assert!((squares - 1.0).abs() < 0.1, "{squares}");
+    let text = run(
+        &folder,
+        &["fourier", "scans.csv", "--length", "100", "--out", "out"],
+    )
+    .stdout;
+    for said in [&text, &folder.read("out/report.html")] {
+        assert!(
+            said.contains("95 % interval") && said.contains("as much noise again would add"),
+            "{said}"
+        );
+    }
+}

@@ -38,6 +38,8 @@ pub(super) struct Profiled {
     pub orders: Vec<OrderResult>,
     /// Their covariance for unit noise of a reading.
     pub spread: Spread,
+    /// What the mean of P1 over the scans of the first length passes into each order.
+    pub through_first: Vec<Complex64>,
     /// Step that was taken out of the mean of each group, µm.
     pub taken: Vec<f64>,
     /// Workpiece on the section, µm.
@@ -202,12 +204,23 @@ impl<'a> Joined<'a> {
                 }
             }
         }
+        let mut through_first = nothing;
+        for (_, share) in groups
+            .iter()
+            .zip(&shares)
+            .filter(|(g, _)| g.samples == self.samples)
+        {
+            for (sum, value) in through_first.iter_mut().zip(share) {
+                *sum += value;
+            }
+        }
         let mut series = vec![Complex64::default()];
         series.extend(orders.iter().map(|o| o.coefficient));
         Profiled {
             workpiece: profile(&series, self.samples),
             orders,
             spread,
+            through_first,
             taken: steps,
         }
     }

@@ -24,6 +24,7 @@ mod spectrum;
 mod spread;
 mod steps;
 mod transfer;
+mod width;
 
 pub use beyond::BeyondOrders;
 pub use diagnosable::FourierScans;

@@ -3,6 +3,7 @@
 use super::beyond::BeyondOrders;
 use super::joint::Compensation;
 use super::noise::NoiseSource;
+use super::width::Errors;
 use crate::uncertainty::{DegreesOfFreedom, Disagreement};
 use realfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
@@ -112,6 +113,9 @@ pub struct Separation {
     pub straightness_std: Vec<f64>,
     /// Slide, µm, mean zero: mean over the scans of P1 less the workpiece.
     pub slide: Vec<f64>,
+    /// Standard uncertainty of the slide less its least-squares line at each position, µm: its slope
+    /// cannot be told from that of the workpiece.
+    pub slide_std: Vec<f64>,
     /// Orders 1, 2, ….
     pub orders: Vec<OrderResult>,
     /// Orders that no spacing passes; they are zero in the profile.
@@ -135,4 +139,5 @@ pub struct Separation {
     pub residuals: Vec<OrderResidual>,
     /// U_sp over the repeats, µm, where there are at least two complete ones.
     pub repeatability: Option<f64>,
+    pub(super) errors: Errors,
 }

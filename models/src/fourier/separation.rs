@@ -8,6 +8,7 @@ use super::noise::{Estimates, NoiseSource};
 use super::repeatability::repeatability;
 use super::result::{Combination, JointStep, OrderResidual, OrderResult, Separation};
 use super::scan::{FourierError, Scan, Section};
+use super::width::Errors;
 use crate::uncertainty::{DegreesOfFreedom, Disagreement};
 
 /// A form beyond the orders below this share of the difference signal is rounding.
@@ -83,6 +84,12 @@ pub fn separate(
     let x: Vec<f64> = (0..samples)
         .map(|i| section.length * i as f64 / samples as f64)
         .collect();
+    let errors = Errors {
+        spread: profiled.spread,
+        through_first: profiled.through_first,
+        scans: same_length(&joined.joints, samples).count(),
+    };
+    let straightness_std = scaled(straightness_std);
     let rise = mean(joined.joints.iter().filter_map(|j| j.rise));
     Ok(Separation {
         combination,
@@ -90,9 +97,10 @@ pub fn separate(
         straightness: straightness(&x, &workpiece),
         x,
         slide: slide_of(&joined.joints, &workpiece),
+        slide_std: errors.slide_std(sigma, &straightness_std),
         workpiece,
         workpiece_std: scaled(workpiece_std),
-        straightness_std: scaled(straightness_std),
+        straightness_std,
         lost: orders.iter().filter(|o| o.lost).map(|o| o.order).collect(),
         residuals: residuals_of(scans, &joined, &profiled.taken, &orders, sigma),
         height_difference: mean(steps.iter().map(|s| s.value))
@@ -108,6 +116,7 @@ pub fn separate(
             .collect(),
         repeatability: repeats(scans, section, used, combination)?,
         orders,
+        errors,
         noise: (sigma, source),
         degrees_of_freedom,
         beyond_orders,
@@ -129,11 +138,13 @@ fn terms(
         .collect()
 }
 
+/// The scans that have as many readings on the section as the profile.
+fn same_length(joints: &[Joint], samples: usize) -> impl Iterator<Item = &Joint> {
+    joints.iter().filter(move |j| j.first.len() == samples)
+}
+
 fn slide_of(joints: &[Joint], workpiece: &[f64]) -> Vec<f64> {
-    let same: Vec<&Joint> = joints
-        .iter()
-        .filter(|j| j.first.len() == workpiece.len())
-        .collect();
+    let same: Vec<&Joint> = same_length(joints, workpiece.len()).collect();
     let mut slide: Vec<f64> = workpiece
         .iter()
         .enumerate()

@@ -3,12 +3,14 @@
 use super::group::Group;
 use super::joint::ShiftTerm;
 use super::spectrum::{coefficients, profile};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
 use realfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 
 /// Covariance of the coefficients of orders 1, 2, … for unit noise of a reading: each part of each
 /// order by itself, and what acts on all orders together.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spread {
     /// Variance of the real and of the imaginary part of an order with the steps known.
     own: Vec<f64>,
@@ -74,6 +76,34 @@ impl Spread {
             self.add(per_reading, both);
             self.add(-per_reading, direct);
         }
+    }
+
+    /// An error of the coefficients for unit noise of a reading, given that of P1: `first` has the
+    /// coefficients of the mean noise of P1, orders 0, 1, …, each part of variance `variance`, and
+    /// `through` what of it passes into each order of the profile.
+    ///
+    /// What readings at a joint do to several orders at once is drawn apart from P1, and what they add
+    /// less (the negative outer products) left out: a share of 1/N of an order's own variance.
+    pub fn draw(
+        &self,
+        random: &mut impl Rng,
+        first: &[Complex64],
+        variance: f64,
+        through: &[Complex64],
+    ) -> Vec<Complex64> {
+        let mut normal = || -> f64 { StandardNormal.sample(random) };
+        let mut series = vec![Complex64::default()];
+        for ((own, of_first), passed) in self.own.iter().zip(first.iter().skip(1)).zip(through) {
+            let rest = (own - passed.norm_sqr() * variance).max(0.0).sqrt();
+            series.push(passed * of_first + rest * Complex64::new(normal(), normal()));
+        }
+        for (weight, response) in self.shared.iter().filter(|(weight, _)| *weight > 0.0) {
+            let amount = weight.sqrt() * normal();
+            for (sum, value) in series.iter_mut().skip(1).zip(response) {
+                *sum += amount * value;
+            }
+        }
+        series
     }
 
     /// Of the order at a place, from 0 for order 1.

@@ -7,9 +7,9 @@ use std::path::PathBuf;
 
 use errsep_models::fourier::{
     Compensation, FourierError, NoiseSource, OrderResult, Scan, Section, Separation, separate,
-    straightness,
 };
 use errsep_models::uncertainty::coverage_factor;
+use errsep_models::zone::StraightnessError;
 use serde_json::{Value, json};
 
 use self::weighing::{methods, remarks};
@@ -18,7 +18,7 @@ use super::quantity::{COVERAGE, coverage_json, coverage_words, unexpandable};
 use super::{Answer, ColumnArgs, CommonArgs, disagreement};
 use crate::io::fourier::{FourierSetup, read_scans, told};
 use crate::io::{CsvTable, Message, Status};
-use crate::report::fourier::{FourierView, Method, page, peak_to_valley};
+use crate::report::fourier::{FourierView, Method, Width, page};
 use crate::report::number;
 
 /// Orders kept where nothing is said.
@@ -115,6 +115,10 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let combination = setup.method.combination;
     let answer = separate(&scans, section, asked, combination, setup.probe.noise)
         .map_err(|e| refused(&e, args))?;
+    let widths = [
+        Width::of(&answer.workpiece_error())?,
+        Width::of(&answer.slide_error())?,
+    ];
     let methods = methods(&scans, section, asked, &answer);
     let remarks = remarks(&answer, section, asked);
     let name = args
@@ -134,13 +138,14 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         }
     };
     let answer = Answer {
-        text: in_words(&name, &scans, &answer, &methods, &remarks)?,
-        json: as_json(&scans, section, &answer, &methods, &remarks)?,
+        text: in_words(&name, &scans, (&answer, &widths), &methods, &remarks)?,
+        json: as_json(&scans, section, (&answer, &widths), &methods, &remarks)?,
         page: page(&FourierView {
             data: &name,
             scans: &scans,
             length,
             separation: &answer,
+            widths: &widths,
             methods: &methods,
             remarks: &remarks,
         }),
@@ -165,6 +170,28 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     )
 }
 
+impl Width {
+    fn of(found: &StraightnessError) -> Result<Self, Message> {
+        Ok(Self {
+            value: found.value,
+            std: found.std,
+            widening: found.widening,
+            interval: found.interval(COVERAGE).map_err(unexpandable)?,
+        })
+    }
+
+    fn as_json(&self) -> Value {
+        json!({
+            "value": self.value,
+            "std": self.std,
+            "widening": self.widening,
+            "interval": [self.interval.0, self.interval.1],
+            "coverage_probability": COVERAGE,
+            "unit": "um",
+        })
+    }
+}
+
 fn refused(error: &FourierError, args: &Args) -> Message {
     match args.data.first() {
         Some(only) if args.data.len() == 1 => told(error).in_file(only),
@@ -175,20 +202,23 @@ fn refused(error: &FourierError, args: &Args) -> Message {
 fn in_words(
     name: &str,
     scans: &[Scan],
-    s: &Separation,
+    (s, widths): (&Separation, &[Width; 2]),
     methods: &[Method],
     remarks: &[String],
 ) -> Result<String, Message> {
     let mut text = format!("Fourier separation of {name} ({})\n", counted(scans.len()));
+    for (what, width) in [("workpiece", &widths[0]), ("slide", &widths[1])] {
+        let _ = writeln!(
+            text,
+            "  {:30} {}",
+            format!("straightness of the {what}"),
+            width.in_words()
+        );
+    }
     let _ = writeln!(
         text,
-        "  straightness of the workpiece  {} µm (peak to valley about the least-squares line)",
-        number::plain(peak_to_valley(&s.straightness), 4)
-    );
-    let _ = writeln!(
-        text,
-        "  straightness of the slide      {} µm",
-        number::plain(peak_to_valley(&straightness(&s.x, &s.slide)), 4)
+        "  {:30} peak to valley about the least-squares line; its interval allows for what the noise has added",
+        ""
     );
     let _ = writeln!(
         text,
@@ -290,7 +320,7 @@ fn noise_words(s: &Separation) -> &'static str {
 fn as_json(
     scans: &[Scan],
     section: Section,
-    s: &Separation,
+    (s, widths): (&Separation, &[Width; 2]),
     methods: &[Method],
     remarks: &[String],
 ) -> Result<Value, Message> {
@@ -324,8 +354,8 @@ fn as_json(
         "rise": s.rise.map(|v| json!({"value": v, "unit": "um"})),
         "repeatability": s.repeatability.map(|v| json!({"value": v, "unit": "um"})),
         "straightness": {
-            "workpiece": {"value": peak_to_valley(&s.straightness), "unit": "um"},
-            "slide": {"value": peak_to_valley(&straightness(&s.x, &s.slide)), "unit": "um"},
+            "workpiece": widths[0].as_json(),
+            "slide": widths[1].as_json(),
         },
         "methods": methods.iter().map(|m| json!({
             "method": m.name,
@@ -353,6 +383,7 @@ fn as_json(
             "straightness": s.straightness,
             "straightness_std": s.straightness_std,
             "slide": s.slide,
+            "slide_std": s.slide_std,
             "unit": "um",
         },
     }))
@@ -366,6 +397,7 @@ fn profiles_table(s: &Separation) -> CsvTable {
         .numbers("straightness_um", s.straightness.clone())
         .numbers("straightness_std_um", s.straightness_std.clone())
         .numbers("slide_um", s.slide.clone())
+        .numbers("slide_std_um", s.slide_std.clone())
 }
 
 fn orders_table(s: &Separation) -> CsvTable {

@@ -314,8 +314,7 @@ impl Told {
             let scale = if bias["unit"] == "rad" { 1e6 } else { 1.0 };
             let moved = measured(scale * number("moved"), Some(scale * number("moved_std")));
             self.says(&self.page, &moved);
-            let typed = moved.replace('\u{2212}', "-");
-            self.says(&self.text, &format!("moved {typed}"));
+            self.says(&self.text, &format!("moved {moved}"));
         }
         assert_eq!(self.text.contains("Bias of the answer"), taken_out);
     }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use crate::attribution::context::{Cause, Context};
 use crate::detection::null::{BATCH, Tail};
 use crate::levels::{ADEQUATE, CONFIRMED, LAW_LEFT, LAW_ODDS};
+use crate::noise::dependence::Dependence;
 use crate::noise::law::{NoiseLaw, draw_scatter};
 use crate::noise::spikes::Spikes;
 use crate::options::Options;
@@ -40,6 +41,8 @@ pub(super) enum Refusal {
     Smooth,
     /// Something is left beside it.
     Left,
+    /// What differs between repeats beside it is no noise.
+    NoNoise,
     /// Noise alone would show as much too often.
     Chance,
 }
@@ -328,6 +331,10 @@ impl<'a> Bench<'a> {
         let adequacy = context.detection(&remainder);
         if adequacy <= ADEQUATE[0] || !context.adequate(&causes, &remainder) {
             return Err(Refusal::Left);
+        }
+        let show_whole = || context.repeats_show_whole();
+        if Dependence::of(self.model, &context.law, &left, show_whole).is_no_noise() {
+            return Err(Refusal::NoNoise);
         }
         Ok(Accepted {
             fitted,

@@ -90,6 +90,9 @@ impl Refusal {
             Self::NotConfirmed => "repeats that were held out do not confirm any",
             Self::Smooth => "a smooth curve that is no law explains the gap as well",
             Self::Left => "the best leaves something that stands out",
+            Self::NoNoise => {
+                "what differs between repeats beside the best is no noise, which would excuse what it leaves"
+            }
             Self::Chance => "noise alone shows as much too often",
         }
     }

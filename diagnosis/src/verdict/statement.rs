@@ -268,10 +268,11 @@ fn describe(candidate: &Candidate) -> String {
     if own.is_empty() {
         return String::new();
     }
-    let others = candidate.elsewhere.iter().map(|other| {
-        let there = detail(Some(&other.variant), &other.parameters);
-        format!("; as likely {there}")
-    });
+    let others = candidate.elsewhere.iter();
+    let others = others.map(|other| detail(Some(&other.variant), &other.parameters));
+    // What differs by less than is told is told once.
+    let others = others.filter(|there| *there != own);
+    let others = others.map(|there| format!("; as likely {there}"));
     format!(" ({own}{})", others.collect::<String>())
 }
 

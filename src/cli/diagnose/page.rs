@@ -177,7 +177,7 @@ fn candidate(candidate: &crate::diagnosis::Candidate) -> sheet::Candidate {
     sheet::Candidate {
         effect: candidate.effect.clone(),
         variant: candidate.variant.as_ref().map(|own| {
-            let others = candidate.elsewhere.iter();
+            let others = candidate.elsewhere.iter().filter(|o| o.variant != *own);
             others.fold(own.clone(), |text, other| {
                 format!("{text}; as likely {}", other.variant)
             })

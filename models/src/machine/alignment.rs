@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::turn::turn_of;
+use super::turn::{as_vector, turn_of};
 use super::{Axis, MachineError, MeasuredParts, PartReading, Position};
 use crate::units::um_from_mm;
 
@@ -114,12 +114,12 @@ impl MeasuredParts {
             let Some((turn, middle)) = turn_of(self.readings().iter().filter(of_part)) else {
                 continue;
             };
-            if turn.angle() > MOST {
-                let angle = turn.angle();
+            let (vector, angle) = as_vector(&turn);
+            if angle > MOST {
                 return Err(MachineError::Turned { part, angle });
             }
             self.turned_back(&part, |p| turn * (p - middle) - (p - middle));
-            self.turns.insert(part, turn.scaled_axis());
+            self.turns.insert(part, vector);
         }
         Ok(())
     }

@@ -140,12 +140,14 @@ mod tests {
         let truth = whole.slope.dot(&of(&positions));
         let carried = StraightLine::carried(&positions, &places);
         let profile = of(&places);
-        // The cubic's error is 3/128 of the fourth difference, here of 2 · 10⁻⁴, at the half of a spacing.
-        assert!((carried.slope.dot(&profile) - truth).abs() < 1e-9);
+        // A quarter of a spacing off its places a cubic misses 1/58 of the fourth difference, here 10⁻⁴: 2·10⁻⁶ of the wave,
+        // which the sums average, and less than a hundredth of what the line over the places is off.
+        let off = (carried.slope.dot(&profile) - truth).abs();
+        assert!(off < 5e-9, "{off:e}");
         let heights = whole.height.dot(&of(&positions)) - carried.height.dot(&profile);
         assert!(heights.abs() < 1e-6, "{heights:e}");
         let own = StraightLine::of(&places).slope.dot(&profile);
-        assert!((own - truth).abs() > 1e-5, "{own} {truth}");
+        assert!((own - truth).abs() > 100.0 * off, "{own} {truth} {off}");
     }
 
     /// *Limit*: the line of a line does not hang on its ends; that of t³ does, by what its line over a longer travel is.

@@ -17,10 +17,10 @@ use crate::reversal::simultaneous::readings::ChannelReadings;
 use crate::reversal::simultaneous::unknowns::Unknowns;
 
 /// Where the ladder carries fewer cells the positions are few.
-pub(super) const CELLS: usize = 8;
+pub(super) const CELLS: usize = 12;
 
 /// Probability under noise alone below which a rung leaves more than noise.
-const LEVEL: f64 = 1e-4;
+const LEVEL: f64 = 0.01;
 
 impl Choice<'_> {
     /// Takes in place of the best rung the one with the fewest cells that leaves no more than the finest does but for

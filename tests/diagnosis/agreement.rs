@@ -312,7 +312,12 @@ impl Told {
                 continue;
             }
             let scale = if bias["unit"] == "rad" { 1e6 } else { 1.0 };
-            let moved = measured(scale * number("moved"), Some(scale * number("moved_std")));
+            // Less than a millionth of what the quantity is known to is rounding.
+            let shown = |key: &str| match number(key) {
+                value if value.abs() > 1e-6 * number("std") => scale * value,
+                _ => 0.0,
+            };
+            let moved = measured(shown("moved"), Some(shown("moved_std")));
             self.says(&self.page, &moved);
             self.says(&self.text, &format!("moved {moved}"));
         }

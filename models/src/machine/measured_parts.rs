@@ -13,7 +13,8 @@ use super::{
     Axis, ComponentError, Machine, MachineError, PartReading, Position, effects, part_residuals,
 };
 use crate::model::{
-    Column, Course, Covariate, Effect, FittedModel, Freedom, Place, Quantity, Record,
+    Column, Course, Covariate, Effect, FittedModel, Freedom, Place, Quantity, ROUNDING, Record,
+    decimal_step,
 };
 use crate::units::um_from_mm;
 
@@ -27,6 +28,8 @@ pub struct MeasuredParts {
     expected: Arc<[Column]>,
     /// Columns of the zeros and turns of the parts, where these belong to the model.
     pub(super) alignment: Option<DMatrix<f64>>,
+    /// What the readings were rounded to, µm; zero where that is not seen.
+    read_to: f64,
     /// The turn of each part that was taken off its readings, rad about each axis.
     pub(super) turns: BTreeMap<String, Vector3<f64>>,
 }
@@ -87,6 +90,7 @@ impl MeasuredParts {
             expected,
             alignment: None,
             turns: BTreeMap::new(),
+            read_to: decimal_step(readings.iter().map(|r| r.value)).unwrap_or(0.0),
             readings,
         })
     }
@@ -214,6 +218,11 @@ impl FittedModel for MeasuredParts {
 
     fn record(&self) -> &Record {
         &self.record
+    }
+
+    /// Of the readings as they were given: a turn that was taken off them has all decimals.
+    fn rounding(&self) -> f64 {
+        (ROUNDING * self.observed().amax()).max(self.read_to / 12f64.sqrt())
     }
 
     fn freedom(&self) -> Freedom {

@@ -113,16 +113,16 @@ impl Record {
 
 /// The power of ten of which all readings are whole multiples: what they were rounded to. `None` where they have more
 /// decimals than anybody reads.
-fn decimal_step(readings: &[f64]) -> Option<f64> {
+pub(crate) fn decimal_step(readings: impl Iterator<Item = f64> + Clone) -> Option<f64> {
     /// Decimals of a reading, in its unit, at most.
     const MOST: i32 = 6;
-    // A unit may have been converted: a few roundings of a multiple.
-    let whole = |value: &f64, steps: f64| {
+    // A unit may have been converted, and a reading may be the difference of much greater coordinates.
+    let whole = |value: f64, steps: f64| {
         let multiple = value * steps;
-        (multiple - multiple.round()).abs() <= 1e-13 * multiple.abs().max(1.0)
+        (multiple - multiple.round()).abs() <= 1e-7 + 1e-13 * multiple.abs()
     };
     let steps = (0..=MOST).map(|decimals| 10f64.powi(decimals));
-    let mut told = steps.filter(|steps| readings.iter().all(|value| whole(value, *steps)));
+    let mut told = steps.filter(|steps| readings.clone().all(|value| whole(value, *steps)));
     told.next().map(|steps| 1.0 / steps)
 }
 
@@ -319,7 +319,7 @@ pub trait FittedModel: Clone + Send + Sync {
     /// 1e-12 of the greatest reading, unless they are small differences of greater numbers, or the standard deviation of
     /// rounding to the decimals that they have (GUM F.2.2.1).
     fn rounding(&self) -> f64 {
-        let read_to = decimal_step(self.observed().as_slice()).unwrap_or(0.0);
+        let read_to = decimal_step(self.observed().iter().copied()).unwrap_or(0.0);
         (ROUNDING * self.observed().amax()).max(read_to / 12f64.sqrt())
     }
 
@@ -401,4 +401,20 @@ pub trait FittedModel: Clone + Send + Sync {
 
     /// The effects which the model leaves out.
     fn effects(&self) -> Vec<Box<dyn Effect<Self>>>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::decimal_step;
+
+    /// *Definition*: tenths as they are typed and as differences of coordinates, whole numbers, and what nobody typed.
+    #[test]
+    fn readings_tell_what_they_were_rounded_to() {
+        let typed = [0.0, 1.2, -3.7, 25.0];
+        assert_eq!(decimal_step(typed.iter().copied()), Some(0.1));
+        let measured = typed.map(|um| 1e3 * ((100.0 + 1e-3 * um) - 100.0));
+        assert_eq!(decimal_step(measured.iter().copied()), Some(0.1));
+        assert_eq!(decimal_step([4.0, 7.0].into_iter()), Some(1.0));
+        assert_eq!(decimal_step([0.123_456_789_1].into_iter()), None);
+    }
 }

@@ -40,6 +40,8 @@ struct Case {
     /// The first channel's noise against that of the others.
     first: f64,
     stated: bool,
+    /// Whether the knots of each form are chosen from the data.
+    chosen: bool,
 }
 
 const EIGHT: Case = Case {
@@ -51,6 +53,7 @@ const EIGHT: Case = Case {
     noise: [NOISE_UM, 0.0, 0.0],
     first: 1.0,
     stated: false,
+    chosen: false,
 };
 
 const BOUND: [Case; 3] = [
@@ -68,7 +71,7 @@ const BOUND: [Case; 3] = [
     },
 ];
 
-const LAWS: [Case; 8] = [
+const LAWS: [Case; 9] = [
     Case {
         name: "4 repeats, white",
         repeats: 4,
@@ -90,6 +93,13 @@ const LAWS: [Case; 8] = [
         name: "4 repeats, white, one channel 10 times as noisy",
         repeats: 4,
         first: 10.0,
+        ..EIGHT
+    },
+    Case {
+        name: "4 repeats, each zeroed anew by 3 µm",
+        repeats: 4,
+        noise: [NOISE_UM, 0.0, 3.0],
+        chosen: true,
         ..EIGHT
     },
     Case {
@@ -119,7 +129,14 @@ pub fn bound(seeds: u64) -> Vec<Row> {
     let cases = BOUND
         .into_iter()
         .flat_map(|case| [true, false].map(|stated| Case { stated, ..case }));
-    cases.flat_map(|case| case.rows(seeds)).collect()
+    let chosen = BOUND.into_iter().map(|case| Case {
+        chosen: true,
+        ..case
+    });
+    cases
+        .chain(chosen)
+        .flat_map(|case| case.rows(seeds))
+        .collect()
 }
 
 /// The table of the laws of noise.
@@ -163,7 +180,11 @@ impl Case {
             .iter()
             .copied()
             .chain(["forms of the slide", "sides"]);
-        let stated = if self.stated { ", noise stated" } else { "" };
+        let stated = match (self.stated, self.chosen) {
+            (true, _) => ", noise stated",
+            (_, true) => ", knots chosen",
+            _ => "",
+        };
         names
             .zip(tallies)
             .chain(together)
@@ -187,7 +208,10 @@ impl Case {
             } else {
                 Noise::Estimated
             },
-            knots: Knots::Cells(CELLS),
+            knots: match self.chosen {
+                true => Knots::Chosen,
+                false => Knots::Cells(CELLS),
+            },
             ..DesignOptions::default()
         };
         let found = fit(&observations, &options).ok()?;

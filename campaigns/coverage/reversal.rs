@@ -29,7 +29,7 @@ struct Case {
     channels: [f64; 4],
     read: &'static [Channel],
     stated: bool,
-    /// Cells of the true forms.
+    /// Cells of the true forms; waves that no spline is where zero.
     cells: usize,
     /// Cells of the fit; chosen from the data where zero.
     knots: usize,
@@ -38,6 +38,10 @@ struct Case {
     /// Uneven steps between positions.
     jitter: f64,
 }
+
+/// Wavelength of the longest wave, mm, and how many there are, amplitudes as the squares of the wavelengths.
+const LONGEST_MM: f64 = 450.0;
+const WAVES: usize = 12;
 
 const ALL: &[Channel] = &Channel::ALL;
 
@@ -67,6 +71,34 @@ const CASES: &[Case] = &[
     },
     Case {
         name: "white, knots chosen",
+        knots: 0,
+        ..BASE
+    },
+    Case {
+        name: "white, waves, knots chosen",
+        cells: 0,
+        knots: 0,
+        ..BASE
+    },
+    Case {
+        name: "white, waves, 31 positions, knots chosen",
+        positions: 31,
+        cells: 0,
+        knots: 0,
+        ..BASE
+    },
+    Case {
+        name: "white, waves, 2 channels, knots chosen",
+        read: &[Channel::C1A, Channel::C2B],
+        cells: 0,
+        knots: 0,
+        ..BASE
+    },
+    Case {
+        name: "4 repeats, white and correlated, waves, knots chosen",
+        repeats: 4,
+        noise: [NOISE_UM, NOISE_UM, 0.0],
+        cells: 0,
         knots: 0,
         ..BASE
     },
@@ -162,6 +194,14 @@ const CASES: &[Case] = &[
         repeats: 4,
         noise: [NOISE_UM, NOISE_UM, 0.0],
         taper: 5.0,
+        ..BASE
+    },
+    Case {
+        name: "4 repeats, each zeroed anew by 3 µm, knots chosen",
+        repeats: 4,
+        noise: [NOISE_UM, 0.0, 3.0],
+        cells: 0,
+        knots: 0,
         ..BASE
     },
     Case {
@@ -316,10 +356,13 @@ impl Case {
     /// Readings without noise from the exact geometry, noise of the law on top.
     fn data(&self, seed: u64) -> Option<(Observations, Truth)> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let basis = CubicBSpline::uniform(0.0, LENGTH_MM, self.cells).ok()?;
+        let basis = CubicBSpline::uniform(0.0, LENGTH_MM, self.cells.max(1)).ok()?;
         let mut plan = Plan::even(0.0, LENGTH_MM, self.positions, 0.0);
         for form in [&mut plan.m, &mut plan.s_a, &mut plan.s_b] {
-            *form = TrueForm::random_spline(&mut random, basis.clone(), 1.0);
+            *form = match self.cells {
+                0 => TrueForm::random_waves(&mut random, 1.0, LONGEST_MM, WAVES),
+                _ => TrueForm::random_spline(&mut random, basis.clone(), 1.0),
+            };
         }
         (plan.alpha_rad, plan.beta_rad, plan.gamma_rad) = (40e-6, 0.0, -150e-6);
         plan.tau_rad = 1e-6 * self.taper;

@@ -5,7 +5,8 @@ use errsep_models::model::FittedModel;
 use errsep_models::reversal::Direction;
 use errsep_models::reversal::designs::simulate::{DesignPlan, simulate};
 use errsep_models::reversal::designs::{
-    Design, DesignFit, DesignObservations, DesignOptions, DesignReading, Determined, Zero, fit,
+    Design, DesignFit, DesignObservations, DesignOptions, DesignReading, Determined, FoundForm,
+    Zero, fit,
 };
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::simultaneous::Noise;
@@ -208,14 +209,11 @@ fn wanted(fit: &DesignFit, name: &str, plan: &Common) -> Wanted {
     let x: Vec<f64> = (0..plan.positions).map(|k| k as f64 * step).collect();
     let is_form = name.starts_with('M') || name.starts_with('S');
     // What the knots miss of the supposed forms counts as noise in a fit; here the noise alone is wanted.
-    let missed = fit.agreement.missed;
-    let by_noise = |std: f64, of_form: bool| {
-        let own = if of_form {
-            (std * std - missed * missed).max(0.0).sqrt()
-        } else {
-            std
-        };
-        own / 1.0_f64.hypot(missed / plan.noise)
+    let more = 1.0_f64.hypot(fit.agreement.missed / plan.noise);
+    let by_noise = |f: &FoundForm| {
+        let own = f.std.iter().map(|s| s * s - f.missed * f.missed);
+        own.map(|square| square.max(0.0).sqrt() / more)
+            .collect::<Vec<_>>()
     };
     let rms = |std: &[f64]| (std.iter().map(|s| s * s).sum::<f64>() / std.len() as f64).sqrt();
     let std = if is_form {
@@ -225,11 +223,11 @@ fn wanted(fit: &DesignFit, name: &str, plan: &Common) -> Wanted {
             let told = fit.forms(&x[..1]);
             told.iter().filter(|f| f.side.is_some()).count() == fit.design.sides().len()
         };
-        of.map(|f| rms(&f.std.iter().map(|s| by_noise(*s, true)).collect::<Vec<_>>()))
+        of.map(|f| rms(&by_noise(&f)))
             .reduce(f64::max)
             .filter(|_| complete)
     } else {
-        fit.slope(name).map(|v| by_noise(v.std, false))
+        fit.slope(name).map(|v| v.std / more)
     };
     Wanted {
         quantity: name.to_owned(),

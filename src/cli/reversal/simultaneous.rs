@@ -283,7 +283,7 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
     let how = match (setup.knots, fit.knots.refuted()) {
         (Some(_), _) => "as the set-up says".to_owned(),
         (None, None) => {
-            "chosen by the corrected information criterion (the forms' bands leave that choice out)"
+            "chosen by the corrected information criterion (what they cut off the forms is in the bands)"
                 .to_owned()
         }
         (None, Some(fewer)) => format!(

@@ -5,6 +5,7 @@
 //! readings tell them apart; [`White`](white::White) makes standard uncertainties of that;
 //! [`AlongTraces`](along::AlongTraces) puts the laws that repeats allow in the place of white noise.
 
+pub mod alike;
 pub mod along;
 pub mod levels;
 pub mod scatter;

@@ -12,7 +12,7 @@ pub struct Survey<'a> {
     /// Positions by channel, mm.
     pub x: Vec<&'a [f64]>,
     /// Readings by channel, µm.
-    values: Vec<&'a [f64]>,
+    pub(super) values: Vec<&'a [f64]>,
     pub traces: Vec<Vec<Trace>>,
     /// The repeats of each channel and direction; empty where nothing was repeated.
     pub repeats: Vec<Group>,

@@ -122,6 +122,12 @@ pub fn grouped(x: &[&[f64]], traces: &[Vec<Trace>]) -> Vec<Group> {
     groups
 }
 
+/// All traces of a channel, in whatever direction, on common cells.
+pub fn of_channel(channel: usize, x: &[f64], traces: &[Trace]) -> Group {
+    let own = (0..traces.len()).filter(|t| traces[*t].len() > 0);
+    group(channel, x, traces, own.collect())
+}
+
 fn group(c: usize, x: &[f64], traces: &[Trace], own: Vec<usize>) -> Group {
     let longest = own.iter().map(|t| traces[*t].len()).max().unwrap_or(0);
     let x_of = |t: usize| (0..traces[t].len()).map(move |k| x[traces[t].row(k)]);

@@ -19,9 +19,9 @@ use crate::reversal::channel_noise::settle::{Asked, Settled, settle};
 use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::channel_noise::white::Told;
 use crate::reversal::channel_noise::{freedom_left, weights_of};
-use crate::reversal::simultaneous;
 use crate::reversal::simultaneous::fitted_knots::FittedKnots;
 use crate::reversal::simultaneous::knots::FEWEST_POSITIONS;
+use crate::reversal::simultaneous::{self, Knots};
 
 /// Fewest readings beyond the unknowns from which the noise is told.
 pub const FEWEST_FREE: usize = 3;
@@ -42,7 +42,19 @@ pub fn fit(
     let mut sigmas = survey.first_noise(options.noise);
     let weights = weights_of(&sigmas);
     let ground = Ground::new(&observations.design, &determined, &traces, weights, options)?;
-    let chosen = knots::breaks(&ground)?;
+    let chosen = matches!(options.knots, Knots::Chosen);
+    let alike = chosen.then(|| survey.alike()).flatten().map(|values| {
+        let of = |(trace, value): (&Trace, _)| Trace {
+            value,
+            ..trace.clone()
+        };
+        traces.iter().zip(values).map(of).collect::<Vec<_>>()
+    });
+    let chosen = match &alike {
+        None => knots::breaks(&ground)?,
+        // Lines by which traces of a channel differ are no detail of a form.
+        Some(alike) => knots::breaks(&ground.of(alike))?,
+    };
     let unknowns = ground.layout.on(&chosen.breaks).free_count();
     enough(&ground, unknowns)?;
     let (mut problem, mut start) = ground.problem(chosen.breaks)?;
@@ -68,6 +80,7 @@ pub fn fit(
         told,
         sigmas,
         knots,
+        finer: chosen.forms,
     };
     let mut solution = DesignFit::new(observations, determined.clone(), reached);
     solution.convergence.seconds = began.elapsed().as_secs_f64();

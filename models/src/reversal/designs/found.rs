@@ -31,6 +31,8 @@ pub struct FoundForm {
     pub values: Vec<f64>,
     /// Standard uncertainties, µm.
     pub std: Vec<f64>,
+    /// What is no noise in each of these, µm: what the model misses, or the knots cut off.
+    pub missed: f64,
     /// Degrees of freedom of these: the fewest of any point.
     pub degrees_of_freedom: f64,
 }

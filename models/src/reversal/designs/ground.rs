@@ -74,6 +74,18 @@ impl<'a> Ground<'a> {
         })
     }
 
+    /// The same with other values of the readings.
+    pub fn of<'b>(&'b self, traces: &'b [Trace]) -> Ground<'b> {
+        Ground {
+            traces,
+            layout: self.layout.clone(),
+            lines: self.lines.clone(),
+            body: self.body.clone(),
+            weights: self.weights.clone(),
+            ..*self
+        }
+    }
+
     /// Number of readings.
     pub fn readings(&self) -> usize {
         self.traces.iter().map(Trace::len).sum()

@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use errsep_solvers::linear::bordered::Bordered;
+use errsep_solvers::linear::bordered::{Bordered, Solved};
 use errsep_solvers::structured::{StructuredProblem, evaluate};
 use nalgebra::DVector;
 
@@ -18,8 +18,11 @@ use super::problem::DesignProblem;
 use super::readings::range;
 use super::staged;
 use crate::basis::bspline::CubicBSpline;
+use crate::reversal::finer_forms::{Curves, FinerForms, TIMES};
 use crate::reversal::simultaneous::Knots;
-use crate::reversal::simultaneous::knots::{KnotTrial, PATIENCE, POSITIONS_A_CELL, ladder, trial};
+use crate::reversal::simultaneous::knots::{
+    FEWEST_POSITIONS, KnotTrial, PATIENCE, POSITIONS_A_CELL, ladder, trial,
+};
 
 /// The break points of a fit.
 #[derive(Debug, Clone)]
@@ -30,6 +33,8 @@ pub(super) struct Chosen {
     pub common: Vec<f64>,
     /// The ladder of all forms together, where they are chosen.
     pub table: Vec<KnotTrial>,
+    /// The forms on them and on finer ones, where they are chosen.
+    pub forms: Option<FinerForms>,
 }
 
 /// Times each form is tried again.
@@ -51,6 +56,7 @@ pub(super) fn breaks(ground: &Ground) -> Result<Chosen, DesignFitError> {
         breaks: vec![breaks.clone(); ground.layout.forms.len()],
         common: breaks,
         table,
+        forms: None,
     };
     match &ground.options.knots {
         Knots::At(breaks) => Ok(alike(breaks.clone(), Vec::new())),
@@ -65,14 +71,15 @@ pub(super) fn breaks(ground: &Ground) -> Result<Chosen, DesignFitError> {
             let mut rungs = Rungs::new(ground)?;
             let (best, table) = rungs.together()?;
             let common = rungs.breaks[best].clone();
-            if ground.options.alike {
-                return Ok(alike(common, table));
-            }
-            let own = rungs.by_form(best)?;
+            let own = match ground.options.alike {
+                true => vec![best; ground.layout.forms.len()],
+                false => rungs.by_form(best)?,
+            };
             Ok(Chosen {
                 breaks: own.iter().map(|r| rungs.breaks[*r].clone()).collect(),
                 common,
                 table,
+                forms: rungs.finer(&own, best)?,
             })
         }
     }
@@ -137,8 +144,13 @@ impl<'g, 'a> Rungs<'g, 'a> {
 
     /// The trial of a rung for each form; `None` where the readings do not carry it.
     fn trial(&self, rungs: &[usize]) -> Result<Option<KnotTrial>, DesignFitError> {
+        let breaks = rungs.iter().map(|r| self.breaks[*r].clone()).collect();
+        Ok(self.fitted(breaks)?.map(|own| own.0))
+    }
+
+    /// The trial of some breaks for each form, and the forms; `None` where the readings do not carry them.
+    fn fitted(&self, breaks: Vec<Vec<f64>>) -> Result<Option<(KnotTrial, Curves)>, DesignFitError> {
         let readings = self.ground.readings();
-        let breaks: Vec<Vec<f64>> = rungs.iter().map(|r| self.breaks[*r].clone()).collect();
         let most = breaks.iter().map(|b| b.len() - 1).max().unwrap_or(0);
         let (problem, start) = self.ground.problem(breaks)?;
         let count = problem.layout.free_count();
@@ -146,8 +158,39 @@ impl<'g, 'a> Rungs<'g, 'a> {
             return Ok(None);
         }
         let evaluation = evaluate(&problem, &start)?;
-        let squares = squares_left(&problem, &evaluation.system);
-        Ok(squares.map(|squares| trial(most, readings, count, squares)))
+        let found = squares_left(&problem, &evaluation.system);
+        Ok(found.map(|(squares, step)| {
+            let there = start.stepped(&step.band, &step.border);
+            let curves = Curves {
+                cubics: problem.cubics(&there),
+                bases: problem.splines.bases.clone(),
+            };
+            (trial(most, readings, count, squares), curves)
+        }))
+    }
+
+    /// The forms on these rungs and on finer breaks, no form's coarser than the rung that was best for all together;
+    /// `None` where the readings carry none.
+    fn finer(&self, rungs: &[usize], common: usize) -> Result<Option<FinerForms>, DesignFitError> {
+        let own: Vec<Vec<f64>> = rungs.iter().map(|r| self.breaks[*r].clone()).collect();
+        let most = self.ground.positions().saturating_sub(FEWEST_POSITIONS - 1);
+        let finer = own.iter().map(|b| {
+            let cells = (TIMES * (b.len() - 1)).max(self.breaks[common].len() - 1);
+            let cells = cells.min(most).max(1);
+            even(self.ground, cells)
+        });
+        let finer: Vec<Vec<f64>> = finer.collect::<Result<_, _>>()?;
+        if own
+            .iter()
+            .zip(&finer)
+            .any(|(own, finer)| finer.len() <= own.len())
+        {
+            return Ok(None);
+        }
+        let taken = self.fitted(own)?.map(|own| own.1);
+        let finer = self.fitted(finer)?.map(|own| own.1);
+        let both = taken.zip(finer);
+        Ok(both.map(|(taken, finer)| FinerForms { taken, finer }))
     }
 
     /// Goes up the ladder with all forms together: the best rung, and the table.
@@ -229,8 +272,8 @@ impl<'g, 'a> Rungs<'g, 'a> {
     }
 }
 
-/// The sum of squares that the linear fit leaves.
-fn squares_left(problem: &DesignProblem, system: &Bordered) -> Option<f64> {
+/// The sum of squares that the linear fit leaves, and the step there.
+fn squares_left(problem: &DesignProblem, system: &Bordered) -> Option<(f64, Solved)> {
     let missing = DVector::zeros(problem.constraints().len());
     let mut held = problem.held().to_vec();
     // No thickness shows where the forms are still zero.
@@ -240,5 +283,5 @@ fn squares_left(problem: &DesignProblem, system: &Bordered) -> Option<f64> {
     let solved = system.solve(problem.constraints(), &missing, &held).ok()?;
     let left =
         system.sum_of_squares() - 2.0 * system.predicted_reduction(&solved.band, &solved.border);
-    Some(left.max(system.unreachable_residual().powi(2)))
+    Some((left.max(system.unreachable_residual().powi(2)), solved))
 }

@@ -21,6 +21,7 @@ use crate::reversal::channel_noise::supposed::against_white;
 use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::channel_noise::white::Told;
 use crate::reversal::channel_noise::{rms, traces};
+use crate::reversal::finer_forms::FinerForms;
 use crate::reversal::forward::Attitude;
 use crate::reversal::simultaneous::fitted_knots::FittedKnots;
 use crate::reversal::simultaneous::{Agreement, Axis, NoiseOrigin};
@@ -37,6 +38,8 @@ pub struct DesignFit {
     layout: Layout,
     splines: Splines,
     cubics: Vec<Vec<Cubic>>,
+    /// The forms on the break points and on finer ones, where they were chosen.
+    finer: Option<FinerForms>,
     axis: Axis,
     parameters: Parameters,
     covariance: BorderedCovariance,
@@ -82,6 +85,8 @@ pub(super) struct Reached<'a> {
     /// Standard deviation of a reading of each channel in the weights, µm.
     pub sigmas: Vec<f64>,
     pub knots: FittedKnots,
+    /// The forms on the break points and on finer ones, where they were chosen.
+    pub finer: Option<FinerForms>,
     /// How the bar stands beside the stylus of each channel, where that is a term.
     pub beside: Vec<Beside>,
 }
@@ -124,6 +129,7 @@ impl DesignFit {
             layout: problem.layout.clone(),
             splines: problem.splines.clone(),
             cubics: problem.cubics(&result.parameters),
+            finer: reached.finer,
             axis: problem.axis,
             parameters: result.parameters.clone(),
             covariance: reached.covariance,
@@ -251,6 +257,11 @@ impl DesignFit {
                     .unwrap_or(0);
                 let alone = analysis.alone(&unknown).is_some();
                 let spread: Vec<(f64, f64)> = x.iter().map(|x| self.form_std(form, *x)).collect();
+                // What the model misses may lie in the form itself, finer than the knots.
+                let cut_off = self.finer.as_ref().map_or(0.0, |finer| {
+                    finer.cut_off(&[(form, 1.0)], |x| self.form_std(form, x).0.powi(2))
+                });
+                let missed = self.agreement.missed.max(cut_off);
                 FoundForm {
                     name: names[p].clone(),
                     side: match self.layout.forms[form] {
@@ -259,7 +270,8 @@ impl DesignFit {
                     },
                     alone,
                     values: x.iter().map(|x| self.form_value(form, *x)).collect(),
-                    std: spread.iter().map(|s| s.0).collect(),
+                    std: spread.iter().map(|s| s.0.hypot(missed)).collect(),
+                    missed,
                     degrees_of_freedom: spread.iter().fold(f64::INFINITY, |l, s| l.min(s.1)),
                 }
             })
@@ -336,8 +348,7 @@ impl DesignFit {
         horner(&self.cubics[form][k], (at - left) / width)
     }
 
-    /// Standard uncertainty of a form at a position, µm, and its degrees of freedom. What the model misses
-    /// may lie in the form itself, finer than the knots.
+    /// The part of the standard uncertainty of a form at a position that the noise makes, µm, and its degrees of freedom.
     fn form_std(&self, form: usize, at: f64) -> (f64, f64) {
         let (first, functions) = self.splines.bases[form].values(at);
         let band: Vec<(usize, f64)> = functions
@@ -348,6 +359,6 @@ impl DesignFit {
         let [height, slope] = self.layout.line(form);
         let border = [(height, -1.0), (slope, -self.axis.xi(at))];
         let (std, freedom) = self.scatter.spread(&self.covariance, &band, &border);
-        (std.hypot(self.agreement.missed), freedom)
+        (std, freedom)
     }
 }

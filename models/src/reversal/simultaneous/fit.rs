@@ -15,7 +15,7 @@ use super::error::ReversalError;
 use super::fitted_knots::FittedKnots;
 use super::ground::{Begun, Breaks, Ground};
 use super::knots::{self, FEWEST_POSITIONS};
-use super::options::{Noise, Options, Thickness};
+use super::options::{Knots, Noise, Options, Thickness};
 use super::problem::Reversal;
 use super::reached::Reached;
 use super::readings::ChannelReadings;
@@ -41,7 +41,17 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
     let channels = ChannelReadings::sort(observations);
     let survey = Survey::new(&channels, |i| observations.taken(i));
     let sigmas = survey.first_noise(options.noise);
-    let ground = Ground::new(observations, options, &channels, weights_of(&sigmas))?;
+    let chosen = matches!(options.knots, Knots::Chosen);
+    let alike = chosen.then(|| survey.alike()).flatten().map(|values| {
+        let pairs = channels.iter().zip(values);
+        let of = |(channel, value): (&ChannelReadings, _)| ChannelReadings {
+            value,
+            ..channel.clone()
+        };
+        pairs.map(of).collect::<Vec<_>>()
+    });
+    let both = [&channels[..], alike.as_deref().unwrap_or(&channels)];
+    let ground = Ground::new(observations, options, both, weights_of(&sigmas))?;
     let mut solution = if options.effects.is_empty() {
         solve(&ground, &survey, sigmas, None)?
     } else {
@@ -82,6 +92,7 @@ fn solve(
         points: breaks,
         table,
         linear,
+        forms,
     } = ground.breaks(effects)?;
     let readings = ground.observations.readings.len();
     let unknowns = ground.unknowns(breaks.len() + 2, effects);
@@ -107,6 +118,7 @@ fn solve(
     let settled = settle(&mut problem, start, asked, survey, &mut sigmas)?;
     let knots = FittedKnots::new(breaks, table, &settled.residuals);
     let mut solution = assemble(ground, &problem, &settled, &sigmas, knots)?;
+    solution.finer = forms;
     is_determined(&solution, &solution.covariance, channels, &problem.weights)?;
     let declared = matches!(options.noise, Noise::Declared(_));
     if !declared && options.loss == Loss::Quadratic && !survey.repeats.is_empty() {
@@ -151,6 +163,7 @@ fn assemble(
         axis: ground.axis,
         thickness_mm: problem.thickness(&result.parameters),
         cubics: problem.cubics(&result.parameters),
+        finer: None,
         gauge: problem.gauge().clone(),
         parameters: result.parameters.clone(),
         covariance,

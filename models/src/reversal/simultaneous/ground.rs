@@ -15,6 +15,7 @@ use super::seed;
 use super::unknowns::Unknowns;
 use crate::basis::bspline::CubicBSpline;
 use crate::reversal::Observations;
+use crate::reversal::finer_forms::FinerForms;
 
 /// Up to this tilt (rad) a probe wanders by so little that the first step is nearly the last.
 const SMALL_TILT: f64 = 0.1;
@@ -24,6 +25,8 @@ pub struct Ground<'a> {
     pub observations: &'a Observations,
     pub options: &'a Options,
     pub channels: &'a [ChannelReadings],
+    /// The same, as knots are chosen from them: traces of a channel shifted and tilted onto each other.
+    pub alike: &'a [ChannelReadings],
     /// Tilt and offset of each channel's line.
     pub lines: Vec<(f64, f64)>,
     pub axis: Axis,
@@ -40,6 +43,8 @@ pub struct Breaks {
     /// The ladder, where they were chosen, and what it found on them.
     pub table: Vec<KnotTrial>,
     pub linear: Option<LinearStep>,
+    /// The forms on them and on finer ones, where they were chosen.
+    pub forms: Option<FinerForms>,
 }
 
 /// Effects with the values from which the fit begins.
@@ -67,14 +72,14 @@ impl<'a> Begun<'a> {
 }
 
 impl<'a> Ground<'a> {
-    /// Lines and axis of the readings.
+    /// Lines and axis of the readings. `alike` is what knots are chosen from.
     ///
     /// # Errors
     /// [`ReversalError::OnePosition`] or [`ReversalError::TooSteep`].
     pub fn new(
         observations: &'a Observations,
         options: &'a Options,
-        channels: &'a [ChannelReadings],
+        [channels, alike]: [&'a [ChannelReadings]; 2],
         weights: Vec<f64>,
     ) -> Result<Self, ReversalError> {
         let lines = seed::lines(channels)?;
@@ -91,6 +96,7 @@ impl<'a> Ground<'a> {
             observations,
             options,
             channels,
+            alike,
             lines,
             axis,
             thickness_mm,
@@ -113,7 +119,7 @@ impl<'a> Ground<'a> {
     /// What the ladder of knots shares.
     pub(super) fn choice<'c>(&'c self, effects: Option<&'c Begun<'a>>) -> Choice<'c> {
         Choice {
-            channels: self.channels,
+            channels: self.alike,
             lines: &self.lines,
             axis: self.axis,
             thickness_mm: self.thickness_mm,
@@ -161,6 +167,7 @@ impl<'a> Ground<'a> {
                     points: choice.breaks(&of(chosen.cells + 3), chosen.cells)?,
                     table: chosen.table,
                     linear: chosen.linear,
+                    forms: chosen.forms,
                 });
             }
         };
@@ -168,6 +175,7 @@ impl<'a> Ground<'a> {
             points,
             table: Vec::new(),
             linear: None,
+            forms: None,
         })
     }
 

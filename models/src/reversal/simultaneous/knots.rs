@@ -6,6 +6,7 @@
 //! it in the table. With few positions the criterion's correction outweighs forms that stand far out of the
 //! noise; there what the finest rung leaves is the measure (`sparse.rs`).
 
+mod climbed;
 mod sparse;
 
 use errsep_solvers::linear::bordered::{Bordered, Solved};
@@ -21,25 +22,11 @@ use super::seed;
 use super::unknowns::Unknowns;
 use super::{Axis, ReversalError, gauge};
 use crate::basis::bspline::CubicBSpline;
+use crate::reversal::finer_forms::{Curves, TIMES};
 use crate::reversal::forward::Attitude;
 
-/// One rung of the ladder.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct KnotTrial {
-    /// Number of cells.
-    pub cells: usize,
-    /// Number of unknowns of the whole fit.
-    pub unknowns: usize,
-    /// Root mean square of the weighted residuals over their degrees of freedom, relative to the
-    /// first rung's guess of the noise.
-    pub noise: f64,
-    /// Corrected Akaike criterion.
-    pub aicc: f64,
-    /// Schwarz's criterion.
-    pub bic: f64,
-    /// Generalised cross-validation score.
-    pub gcv: f64,
-}
+pub use climbed::{Chosen, KnotTrial, LinearStep, trial};
+use climbed::{Climbed, RungFit};
 
 /// Rungs after the best one before the ladder is left.
 pub const PATIENCE: usize = 3;
@@ -169,19 +156,14 @@ impl Choice<'_> {
         if let Some(chosen) = self.by_moments(&unknowns_of)? {
             return Ok(chosen);
         }
-        let squares = |unknowns, bases| {
-            let squares = self.by_factors(unknowns, bases)?;
-            Ok(squares.map(|left| {
-                let rounding = 0.0;
-                (Squares { left, rounding }, ())
+        let climbed = self.climb(&unknowns_of, |unknowns, bases| {
+            let fitted = self.by_factors(unknowns, bases)?;
+            Ok(fitted.map(|(left, curves)| {
+                let (rounding, linear) = (0.0, None);
+                (Squares { left, rounding }, RungFit { curves, linear })
             }))
-        };
-        let climbed = self.climb(&unknowns_of, squares)?;
-        Ok(Chosen {
-            cells: climbed.cells(),
-            table: climbed.table,
-            linear: None,
-        })
+        })?;
+        Ok(climbed.chosen())
     }
 
     /// The ladder by normal equations; `None` where they do not tell.
@@ -195,22 +177,20 @@ impl Choice<'_> {
         let mut told = true;
         let squares = |unknowns: Unknowns, bases: Vec<CubicBSpline>| {
             let linear = rungs.solve(&unknowns, &bases);
-            let found = linear.and_then(|linear| Some((rungs.squares(&linear)?, (linear, bases))));
+            let found = linear.and_then(|linear| Some((rungs.squares(&linear)?, linear.step())));
             told &= found.is_some();
-            Ok(found)
+            Ok(found.map(|(squares, step)| {
+                let there = self.start(&unknowns).stepped(&step.0, &step.1);
+                let curves = unknowns.curves(&bases, self.axis, &there);
+                let linear = Some(LinearStep { step, bases });
+                (squares, RungFit { curves, linear })
+            }))
         };
         let climbed = self.climb(unknowns_of, squares)?;
         if !(told && climbed.clear) {
             return Ok(None);
         }
-        Ok(Some(Chosen {
-            cells: climbed.cells(),
-            table: climbed.table,
-            linear: climbed.found.map(|(linear, bases)| LinearStep {
-                step: linear.step(),
-                bases,
-            }),
-        }))
+        Ok(Some(climbed.chosen()))
     }
 
     /// The readings gathered for normal equations; `None` with effects, which know single readings.
@@ -229,15 +209,15 @@ impl Choice<'_> {
     }
 
     /// Goes up the ladder with the sums of squares that `squares` finds.
-    fn climb<T>(
+    fn climb(
         &self,
         unknowns_of: &impl Fn(usize) -> Unknowns,
         mut squares: impl FnMut(
             Unknowns,
             Vec<CubicBSpline>,
-        ) -> Result<Option<(Squares, T)>, ReversalError>,
-    ) -> Result<Climbed<T>, ReversalError> {
-        let readings: usize = self.channels.iter().map(ChannelReadings::len).sum();
+        ) -> Result<Option<(Squares, RungFit)>, ReversalError>,
+    ) -> Result<Climbed, ReversalError> {
+        let readings = self.readings();
         let most = positions(self.channels) / POSITIONS_A_CELL;
         let mut climbed = Climbed::default();
         for cells in std::iter::once(1).chain(ladder(most)) {
@@ -260,9 +240,37 @@ impl Choice<'_> {
             }
         }
         if most < sparse::CELLS {
-            self.climb_to_the_finest(unknowns_of, squares, &mut climbed)?;
+            self.climb_to_the_finest(unknowns_of, &mut squares, &mut climbed)?;
         }
+        self.look_finer(unknowns_of, squares, &mut climbed)?;
         Ok(climbed)
+    }
+
+    /// The fit on more cells than the best rung has, where the ladder did not come so far.
+    fn look_finer(
+        &self,
+        unknowns_of: &impl Fn(usize) -> Unknowns,
+        mut squares: impl FnMut(
+            Unknowns,
+            Vec<CubicBSpline>,
+        ) -> Result<Option<(Squares, RungFit)>, ReversalError>,
+        climbed: &mut Climbed,
+    ) -> Result<(), ReversalError> {
+        let most = positions(self.channels).saturating_sub(FEWEST_POSITIONS - 1);
+        let cells = (TIMES * climbed.cells()).min(most);
+        if climbed.on_cells(cells) {
+            return Ok(());
+        }
+        let (unknowns, bases) = self.rung(unknowns_of, cells)?;
+        let finer = bases[0].cell_count() > climbed.cells();
+        if finer && self.readings() >= unknowns.free_count() + FEWEST_FREE {
+            climbed.finer = squares(unknowns, bases)?.map(|(_, fit)| fit.curves);
+        }
+        Ok(())
+    }
+
+    fn readings(&self) -> usize {
+        self.channels.iter().map(ChannelReadings::len).sum()
     }
 
     /// The unknowns and bases with so many cells.
@@ -289,12 +297,12 @@ impl Choice<'_> {
         )
     }
 
-    /// The sum of squares that the linear fit leaves, by an orthogonal factorisation of all rows.
+    /// The sum of squares that the linear fit leaves and its forms, by an orthogonal factorisation of all rows.
     fn by_factors(
         &self,
         unknowns: Unknowns,
         bases: Vec<CubicBSpline>,
-    ) -> Result<Option<f64>, ReversalError> {
+    ) -> Result<Option<(f64, Curves)>, ReversalError> {
         let start = self.start(&unknowns);
         let problem = Reversal::new(
             self.channels,
@@ -309,118 +317,42 @@ impl Choice<'_> {
     }
 }
 
-/// What the ladder says.
-pub struct Chosen {
-    /// The best number of cells.
-    pub cells: usize,
-    /// Its rungs.
-    pub table: Vec<KnotTrial>,
-    /// The linear fit of the best of them, where normal equations tell.
-    pub linear: Option<LinearStep>,
-}
-
-/// The steps of band and border from where a fit begins to the minimum of its linear model.
-pub struct LinearStep {
-    pub step: (Vec<f64>, Vec<f64>),
-    /// On these bases.
-    pub bases: Vec<CubicBSpline>,
-}
-
-/// The rungs that were tried.
-#[derive(Debug)]
-struct Climbed<T> {
-    table: Vec<KnotTrial>,
-    /// The place of the best.
-    best: usize,
-    /// What was found there beside its squares.
-    found: Option<T>,
-    /// By how much the criterion of the best may be off.
-    doubt: f64,
-    /// Whether rounding has decided nothing.
-    clear: bool,
-}
-
-impl<T> Default for Climbed<T> {
-    fn default() -> Self {
-        Self {
-            table: Vec::new(),
-            best: 0,
-            found: None,
-            doubt: 0.0,
-            clear: true,
-        }
-    }
-}
-
-impl<T> Climbed<T> {
-    fn add(&mut self, trial: KnotTrial, readings: usize, squares: Squares, found: T) {
-        // m ln RSS moves by m δ/RSS.
-        let doubt = readings as f64 * squares.rounding / squares.left;
-        let last = self.table.len();
-        let is_best = match self.table.get(self.best) {
-            None => true,
-            Some(best) => {
-                let ahead = best.aicc - trial.aicc;
-                self.clear &= squares.rounding <= 0.0 || ahead.abs() > doubt + self.doubt;
-                ahead > 0.0
-            }
-        };
-        if is_best {
-            (self.best, self.doubt, self.found) = (last, doubt, Some(found));
-        }
-        self.table.push(trial);
-    }
-
-    fn cells(&self) -> usize {
-        self.table.get(self.best).map_or(1, |t| t.cells)
-    }
-}
-
-pub fn trial(cells: usize, readings: usize, unknowns: usize, squares: f64) -> KnotTrial {
-    let (m, p) = (readings as f64, unknowns as f64);
-    // Noise-free readings leave rounding only: keep the logarithm finite.
-    let log = (squares / m).max(f64::MIN_POSITIVE).ln();
-    KnotTrial {
-        cells,
-        unknowns,
-        noise: (squares / (m - p)).sqrt(),
-        aicc: m * log + 2.0 * p * m / (m - p - 1.0),
-        bic: m * log + p * m.ln(),
-        gcv: m * squares / (m - p).powi(2),
-    }
-}
-
-/// The sum of squares that the linear fit leaves; with effects, which hang on the forms, that of a second
-/// step from the forms that the first has found.
-fn squares_left(mut problem: Reversal, start: Parameters) -> Result<Option<f64>, NoValue> {
-    let mut evaluation = evaluate(&problem, &start)?;
+/// The sum of squares that the linear fit leaves, and its forms; with effects, which hang on the forms, those of a
+/// second step from the forms that the first has found.
+fn squares_left(
+    mut problem: Reversal,
+    start: Parameters,
+) -> Result<Option<(f64, Curves)>, NoValue> {
+    let (mut at, mut evaluation) = (start.clone(), evaluate(&problem, &start)?);
     if problem.joined.is_some() {
         let free = problem.held().to_vec();
         for k in 0..problem.unknowns.effects.len() {
             problem.hold(problem.unknowns.effect(k), true);
         }
         if let Some(step) = solved(&problem, &evaluation.system) {
-            evaluation = evaluate(&problem, &start.stepped(&step.band, &step.border))?;
+            at = start.stepped(&step.band, &step.border);
+            evaluation = evaluate(&problem, &at)?;
         }
         for (j, held) in free.into_iter().enumerate() {
             problem.hold(j, held);
         }
     }
-    Ok(linear_squares(&problem, &evaluation.system))
+    let system = &evaluation.system;
+    Ok(solved(&problem, system).map(|step| {
+        let left =
+            system.sum_of_squares() - 2.0 * system.predicted_reduction(&step.band, &step.border);
+        let there = at.stepped(&step.band, &step.border);
+        let curves = problem
+            .unknowns
+            .curves(&problem.bases, problem.axis, &there);
+        (left.max(system.unreachable_residual().powi(2)), curves)
+    }))
 }
 
 fn solved(problem: &Reversal, system: &Bordered) -> Option<Solved> {
     let missing = nalgebra::DVector::zeros(problem.constraints().len());
     let solved = system.solve(problem.constraints(), &missing, problem.held());
     solved.ok()
-}
-
-/// The sum of squares that the linear fit leaves.
-fn linear_squares(problem: &Reversal, system: &Bordered) -> Option<f64> {
-    let solved = solved(problem, system)?;
-    let left =
-        system.sum_of_squares() - 2.0 * system.predicted_reduction(&solved.band, &solved.border);
-    Some(left.max(system.unreachable_residual().powi(2)))
 }
 
 #[cfg(test)]

@@ -40,15 +40,28 @@ impl Simultaneous {
                     .par_iter()
                     .map_init(Room::default, |room, x| self.form_at(&weights, *x, room))
                     .collect();
+                let beside = self.agreement.missed.max(self.cut_off(&weights));
                 Profile {
                     name,
                     x: x.to_vec(),
                     values: at.iter().map(|a| a[0]).collect(),
-                    std: at.iter().map(|a| a[1]).collect(),
+                    std: at.iter().map(|a| a[1].hypot(beside)).collect(),
                     degrees_of_freedom: at.iter().fold(f64::INFINITY, |m, a| m.min(a[2])),
                 }
             })
             .collect()
+    }
+
+    /// What the knots cut off a sum of forms, µm root mean square: zero where they were not chosen.
+    fn cut_off(&self, weights: &[f64]) -> f64 {
+        let Some(finer) = &self.finer else {
+            return 0.0;
+        };
+        let weighted = weights.iter().copied().enumerate();
+        let sum: Vec<(usize, f64)> = weighted.filter(|(_, w)| *w != 0.0).collect();
+        finer.cut_off(&sum, |x| {
+            self.form_at(weights, x, &mut Room::default())[1].powi(2)
+        })
     }
 
     /// Names and values of the forms at positions, without their uncertainty.
@@ -101,8 +114,7 @@ impl Simultaneous {
             .sum()
     }
 
-    /// A form, its standard uncertainty and the degrees of freedom of that. What the model misses may lie
-    /// in the form itself, finer than the knots. Under white noise positions of one cell share the
+    /// A form, the part of its standard uncertainty that the noise makes, and the degrees of freedom of that. Under white noise positions of one cell share the
     /// covariance of its coefficients.
     fn form_at(&self, weights: &[f64], x: f64, room: &mut Room) -> [f64; 3] {
         let (band, border) = &mut room.terms;
@@ -134,7 +146,7 @@ impl Simultaneous {
                 self.scatter.spread(&self.covariance, band, border)
             }
         };
-        [value, std.hypot(self.agreement.missed), freedom]
+        [value, std, freedom]
     }
 
     pub(super) fn value_of(&self, form: usize, at: f64) -> (f64, f64) {

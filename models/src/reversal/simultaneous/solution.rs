@@ -23,6 +23,7 @@ use crate::reversal::channel_noise::supposed::{against_white, counted};
 use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::channel_noise::traces;
 use crate::reversal::combinations::determined;
+use crate::reversal::finer_forms::FinerForms;
 use crate::reversal::staged::Value;
 use crate::reversal::{Channel, Combination, Convention, Observations, Reading};
 
@@ -148,6 +149,8 @@ pub struct Simultaneous {
     pub(super) axis: Axis,
     pub(super) thickness_mm: f64,
     pub(super) cubics: Vec<Vec<Cubic>>,
+    /// The forms on the knots and on finer ones, where the knots were chosen.
+    pub(super) finer: Option<FinerForms>,
     pub(super) gauge: Constraints,
     pub(super) parameters: Parameters,
     pub(super) covariance: BorderedCovariance,

@@ -5,6 +5,11 @@
 //! straight line that is subtracted from each form (the gauge ties it to the band), the thickness
 //! where it is asked for, and the unknowns of effects.
 
+use errsep_solvers::structured::Parameters;
+
+use super::Axis;
+use crate::basis::bspline::{Cubic, CubicBSpline};
+use crate::reversal::finer_forms::{Curves, less_line};
 use crate::reversal::{Channel, Contrast, Convention};
 
 /// A form that is fitted.
@@ -146,6 +151,23 @@ impl Unknowns {
     pub fn line(&self, form: usize) -> [usize; 2] {
         let at = self.offsets_from() + self.channels.len() + 2 * form;
         [at, at + 1]
+    }
+
+    /// The fitted forms, less their lines, as polynomials of the cells of these bases, µm.
+    pub fn cubics(&self, bases: &[CubicBSpline], axis: Axis, at: &Parameters) -> Vec<Vec<Cubic>> {
+        let of = |(form, basis): (usize, &CubicBSpline)| {
+            let line = self.line(form).map(|j| at.border[j]);
+            less_line(basis, &self.coefficients_of(form, &at.band), line, axis)
+        };
+        bases.iter().enumerate().map(of).collect()
+    }
+
+    /// The same forms with their bases.
+    pub(super) fn curves(&self, bases: &[CubicBSpline], axis: Axis, at: &Parameters) -> Curves {
+        Curves {
+            cubics: self.cubics(bases, axis, at),
+            bases: bases.to_vec(),
+        }
     }
 
     /// The border unknowns that the gauge ties to the band: the lines of all forms.

@@ -120,3 +120,33 @@ fn different_knots_keep_derivatives_and_bound() {
     let bound = 0.5 * 0.05e-3 / spread.sqrt();
     assert!((alpha.std / bound - 1.0).abs() < 1e-5, "{alpha:?} {bound}");
 }
+
+/// Whether an indicator is zeroed before each trace or not, the forms are the same: what repeats differ by is no noise beside
+/// which detail could not be seen.
+#[test]
+fn a_zero_of_each_repeat_hides_no_detail() {
+    let made = DesignPlan {
+        forms_um: [1.0, 1.0],
+        repeats: 3,
+        ..plan(EIGHT, 3)
+    };
+    let (mut readings, truth) = simulate(&made).unwrap();
+    for reading in &mut readings.readings {
+        reading.value += 3.0 * f64::from(7 * reading.repeat + 5 * reading.channel as u32).sin();
+    }
+    let found = fit(&readings, &options(false)).unwrap();
+    let x = [30.0, 90.0, 150.0, 210.0, 270.0];
+    let form = found
+        .forms(&x)
+        .into_iter()
+        .find(|f| f.name == "M_h")
+        .unwrap();
+    for ((x, value), std) in x.iter().zip(&form.values).zip(&form.std) {
+        let error = value - truth.slide[0].at(*x);
+        // k·u of a form that is known to less than a fifth of the noise.
+        assert!(
+            error.abs() < 4.0 * std && *std < 0.01,
+            "{x}: {error} ± {std}"
+        );
+    }
+}

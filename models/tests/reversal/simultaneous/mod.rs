@@ -1,5 +1,6 @@
 //! The simultaneous solution against known truth, against the staged solution, and against itself.
 
+mod bands;
 mod effects;
 mod minimum;
 mod noise;

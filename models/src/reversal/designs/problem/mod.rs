@@ -24,6 +24,7 @@ use super::layout::{FormOf, Layout};
 use super::readings::Trace;
 use crate::basis::bspline::{Cubic, CubicBSpline};
 use crate::reversal::cells::Union;
+use crate::reversal::finer_forms::less_line;
 use crate::reversal::forward::Attitude;
 use crate::reversal::simultaneous::Axis;
 use crate::reversal::simultaneous::gauge::line_of_spline;
@@ -139,24 +140,12 @@ impl<'a> DesignProblem<'a> {
 
     /// The forms, less their lines, as polynomials of their cells, µm.
     pub(super) fn cubics(&self, at: &Parameters) -> Vec<Vec<Cubic>> {
-        self.splines
-            .bases
-            .iter()
-            .enumerate()
-            .map(|(form, basis)| {
-                let coefficients = self.layout.coefficients_of(form, &at.band);
-                let [height, slope] = self.layout.line(form).map(|j| at.border[j]);
-                (0..basis.cell_count())
-                    .map(|k| {
-                        let (left, width) = basis.cell(k);
-                        let mut cubic = basis.cubic(&coefficients, k);
-                        cubic[0] -= height + slope * self.axis.xi(left);
-                        cubic[1] -= slope * width / self.axis.scale;
-                        cubic
-                    })
-                    .collect()
-            })
-            .collect()
+        let of = |(form, basis): (usize, &CubicBSpline)| {
+            let line = self.layout.line(form).map(|j| at.border[j]);
+            let coefficients = self.layout.coefficients_of(form, &at.band);
+            less_line(basis, &coefficients, line, self.axis)
+        };
+        self.splines.bases.iter().enumerate().map(of).collect()
     }
 
     /// The first readings of the cells that a channel sees: of its side, then of the slide's forms.

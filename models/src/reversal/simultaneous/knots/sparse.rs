@@ -8,12 +8,11 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::{
-    Choice, Climbed, FEWEST_FREE, FEWEST_POSITIONS, KnotTrial, POSITIONS_A_CELL, Squares,
+    Choice, Climbed, FEWEST_FREE, FEWEST_POSITIONS, KnotTrial, POSITIONS_A_CELL, RungFit, Squares,
     positions, trial,
 };
 use crate::basis::bspline::CubicBSpline;
 use crate::reversal::simultaneous::ReversalError;
-use crate::reversal::simultaneous::readings::ChannelReadings;
 use crate::reversal::simultaneous::unknowns::Unknowns;
 
 /// Where the ladder carries fewer cells the positions are few.
@@ -25,19 +24,19 @@ const LEVEL: f64 = 0.01;
 impl Choice<'_> {
     /// Takes in place of the best rung the one with the fewest cells that leaves no more than the finest does but for
     /// noise, where the best leaves more.
-    pub(super) fn climb_to_the_finest<T>(
+    pub(super) fn climb_to_the_finest(
         &self,
         unknowns_of: &impl Fn(usize) -> Unknowns,
-        mut squares: impl FnMut(
+        squares: &mut impl FnMut(
             Unknowns,
             Vec<CubicBSpline>,
-        ) -> Result<Option<(Squares, T)>, ReversalError>,
-        climbed: &mut Climbed<T>,
+        ) -> Result<Option<(Squares, RungFit)>, ReversalError>,
+        climbed: &mut Climbed,
     ) -> Result<(), ReversalError> {
-        let readings: usize = self.channels.iter().map(ChannelReadings::len).sum();
+        let readings = self.readings();
         let places = positions(self.channels);
         let most = places.saturating_sub(FEWEST_POSITIONS - 1);
-        let mut finer: Vec<(KnotTrial, Squares, T)> = Vec::new();
+        let mut finer: Vec<(KnotTrial, RungFit)> = Vec::new();
         for cells in places / POSITIONS_A_CELL + 1..=most {
             let (unknowns, bases) = self.rung(unknowns_of, cells)?;
             let (count, cells) = (unknowns.free_count(), bases[0].cell_count());
@@ -45,11 +44,11 @@ impl Choice<'_> {
             if readings < count + FEWEST_FREE || known.last().is_some_and(|t| t.cells >= cells) {
                 break;
             }
-            let Some((squares, found)) = squares(unknowns, bases)? else {
+            let Some((squares, fit)) = squares(unknowns, bases)? else {
                 break;
             };
             let trial = trial(cells, readings, count, squares.left);
-            finer.push((trial, squares, found));
+            finer.push((trial, fit));
         }
         let Some((finest, ..)) = finer.last() else {
             return Ok(());
@@ -59,21 +58,12 @@ impl Choice<'_> {
         if best.as_ref().is_none_or(enough) {
             return Ok(());
         }
-        let coarse = climbed.table[climbed.best + 1..].iter().position(enough);
-        if let Some(after) = coarse {
-            let at = climbed.best + 1 + after;
-            let (unknowns, bases) = self.rung(unknowns_of, climbed.table[at].cells)?;
-            climbed.found = squares(unknowns, bases)?.map(|(_, found)| found);
-            climbed.best = at;
-            return Ok(());
+        for (trial, fit) in finer {
+            climbed.push(trial, fit);
         }
-        for (trial, _, found) in finer {
-            climbed.table.push(trial);
-            if enough(&trial) {
-                climbed.best = climbed.table.len() - 1;
-                climbed.found = Some(found);
-                break;
-            }
+        let passes = climbed.table[climbed.best + 1..].iter().position(enough);
+        if let Some(after) = passes {
+            climbed.best += 1 + after;
         }
         Ok(())
     }

@@ -63,7 +63,7 @@ fn normal_equations_choose_the_knots_that_orthogonal_factors_choose() {
         let (data, _) = simulate(&plan, &[]).unwrap();
         let channels = ChannelReadings::sort(&data);
         let weights = vec![1.0 / plan.traces[0].noise; channels.len()];
-        let ground = Ground::new(&data, &options, &channels, weights).unwrap();
+        let ground = Ground::new(&data, &options, [&channels; 2], weights).unwrap();
         let choice = ground.choice(None);
         let of = |coefficients: usize| ground.unknowns(coefficients, None);
         let rungs = choice.rungs(&of).unwrap();
@@ -71,7 +71,7 @@ fn normal_equations_choose_the_knots_that_orthogonal_factors_choose() {
             let own = rungs.solve(&unknowns, &bases);
             let own = own.and_then(|linear| rungs.squares(&linear));
             let left = choice.by_factors(unknowns, bases)?;
-            if let (Some(own), Some(left)) = (own, left) {
+            if let (Some(own), Some((left, _))) = (own, &left) {
                 compared += 1;
                 // Epsilons: the rounding of the sum itself, and that of the factorisation beside it.
                 let off = (own.left - left).abs();
@@ -81,9 +81,9 @@ fn normal_equations_choose_the_knots_that_orthogonal_factors_choose() {
                     own.rounding
                 );
             }
-            Ok(left.map(|left| {
-                let rounding = 0.0;
-                (Squares { left, rounding }, ())
+            Ok(left.map(|(left, curves)| {
+                let (rounding, linear) = (0.0, None);
+                (Squares { left, rounding }, RungFit { curves, linear })
             }))
         };
         let exact = choice.climb(&of, exact).unwrap();

@@ -140,22 +140,7 @@ impl<'a> Reversal<'a> {
 
     /// The fitted forms, less their lines, as polynomials of their cells, µm.
     pub fn cubics(&self, at: &Parameters) -> Vec<Vec<Cubic>> {
-        (0..self.unknowns.forms.len())
-            .map(|form| {
-                let coefficients = self.unknowns.coefficients_of(form, &at.band);
-                let [height, slope] = self.unknowns.line(form).map(|j| at.border[j]);
-                let basis = &self.bases[form];
-                (0..basis.cell_count())
-                    .map(|k| {
-                        let (left, width) = basis.cell(k);
-                        let mut cubic = basis.cubic(&coefficients, k);
-                        cubic[0] -= height + slope * self.axis.xi(left);
-                        cubic[1] -= slope * width / self.axis.scale;
-                        cubic
-                    })
-                    .collect()
-            })
-            .collect()
+        self.unknowns.cubics(&self.bases, self.axis, at)
     }
 
     /// Unknowns of the band that a row spans where its two cells lie at most so far apart.

@@ -1,0 +1,77 @@
+//! Bands of forms on knots that the data choose: detail that these cut off is in them, and zeros are not taken for noise.
+
+use errsep_models::reversal::simulate::{Plan, TrueForm, simulate};
+use errsep_models::reversal::simultaneous::{Knots, Options, fit};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// What is measured: positions, repeats, and by how much each repeat is zeroed anew, µm.
+struct Case {
+    positions: usize,
+    repeats: u32,
+    zeros_um: f64,
+}
+
+/// Part of the places in which a form of waves, which no spline is, lies within 1.96 standard uncertainties, number of places,
+/// and root mean square of the errors, µm.
+fn within(case: &Case, seeds: u64) -> [f64; 3] {
+    let (mut inside, mut count, mut squares) = (0.0, 0.0, 0.0);
+    for seed in 0..seeds {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut plan = Plan::even(0.0, 300.0, case.positions, 0.05);
+        for form in [&mut plan.m, &mut plan.s_a, &mut plan.s_b] {
+            *form = TrueForm::random_waves(&mut random, 1.0, 450.0, 12);
+        }
+        (plan.seed, plan.repeats) = (seed, case.repeats);
+        let (mut observations, truth) = simulate(&plan, &[]).unwrap();
+        for reading in &mut observations.readings {
+            let zero = f64::from(7 * reading.repeat + 5 * reading.channel as u32).sin();
+            reading.value += case.zeros_um * zero;
+        }
+        let options = Options {
+            knots: Knots::Chosen,
+            ..Options::default()
+        };
+        let solution = fit(&observations, &options).unwrap();
+        let x: Vec<f64> = (0..9).map(|k| 300.0 / 8.0 * f64::from(k)).collect();
+        let forms = [("M", &truth.m), ("S_A", &truth.s_a), ("S_B", &truth.s_b)];
+        for profile in solution.forms(&x) {
+            let (_, form) = forms.iter().find(|f| f.0 == profile.name).unwrap();
+            for ((x, value), std) in x.iter().zip(&profile.values).zip(&profile.std) {
+                inside += f64::from(u8::from((value - form.at(*x)).abs() < 1.97 * std));
+                squares += (value - form.at(*x)).powi(2);
+                count += 1.0;
+            }
+        }
+    }
+    [inside / count, count, f64::sqrt(squares / count)]
+}
+
+#[test]
+fn what_chosen_knots_cut_off_is_in_the_bands() {
+    for positions in [61, 31] {
+        let case = Case {
+            positions,
+            repeats: 1,
+            zeros_um: 0.0,
+        };
+        let [share, count, _] = within(&case, 120);
+        // k·u: neighbouring places share cells, so that half of them count; four standard deviations.
+        let off = 4.0 * f64::sqrt(0.95 * 0.05 / (count / 2.0));
+        assert!(share > 0.95 - off, "{positions} positions: {share}");
+    }
+}
+
+#[test]
+fn a_zero_of_each_repeat_hides_no_detail() {
+    let alike = |zeros_um| Case {
+        positions: 61,
+        repeats: 4,
+        zeros_um,
+    };
+    let [_, _, plain] = within(&alike(0.0), 10);
+    let [share, _, zeroed] = within(&alike(3.0), 10);
+    // Forms know nothing of zeros; the knots differ by a rung here and there.
+    assert!(zeroed < 1.2 * plain, "{zeroed} µm, {plain} µm");
+    assert!(share > 0.85, "{share}");
+}

@@ -28,6 +28,8 @@ use std::any::TypeId;
 use std::borrow::Cow;
 use std::ffi::OsString;
 use std::io::Write;
+use std::num::{IntErrorKind, ParseIntError};
+use std::str::FromStr;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
@@ -96,24 +98,38 @@ pub fn run(arguments: Vec<OsString>) -> u8 {
 /// The command line as it is declared. A number may be negative everywhere: the command says what it may be.
 fn declared() -> clap::Command {
     fn signed(command: clap::Command) -> clap::Command {
-        let numbers = [
-            TypeId::of::<f64>(),
-            TypeId::of::<u32>(),
-            TypeId::of::<u64>(),
-            TypeId::of::<usize>(),
-        ];
-        let may_be_negative = |arg: clap::Arg| {
-            let kind = arg.get_value_parser().type_id();
-            let is_number = numbers.iter().any(|number| kind == *number);
-            if is_number && arg.get_action().takes_values() {
-                arg.allow_negative_numbers(true)
-            } else {
-                arg
-            }
-        };
-        command.mut_args(may_be_negative).mut_subcommands(signed)
+        command.mut_args(number).mut_subcommands(signed)
     }
     signed(Cli::command())
+}
+
+/// An option, read as what it is where that is a number.
+fn number(arg: clap::Arg) -> clap::Arg {
+    if !arg.get_action().takes_values() {
+        return arg;
+    }
+    let kind = arg.get_value_parser().type_id();
+    let arg = if kind == TypeId::of::<u32>() {
+        arg.value_parser(whole::<u32>)
+    } else if kind == TypeId::of::<u64>() {
+        arg.value_parser(whole::<u64>)
+    } else if kind == TypeId::of::<usize>() {
+        arg.value_parser(whole::<usize>)
+    } else if kind == TypeId::of::<f64>() {
+        arg
+    } else {
+        return arg;
+    };
+    arg.allow_negative_numbers(true)
+}
+
+/// A number that counts something.
+fn whole<N: FromStr<Err = ParseIntError>>(text: &str) -> Result<N, &'static str> {
+    text.parse()
+        .map_err(|error: ParseIntError| match error.kind() {
+            IntErrorKind::PosOverflow => "it is too great",
+            _ => "give a whole number, 0 or greater",
+        })
 }
 
 /// What the words of a command line ask for.

@@ -88,3 +88,69 @@ fn a_reversal_is_answered_whole() {
     assert!(called.answer.page.render().contains("<svg"));
     assert_eq!(called.provenance.command, ["reversal", "<data>"]);
 }
+
+/// Numbers that count something, wherever they are given.
+#[test]
+fn a_number_that_counts_nothing_is_told_what_it_may_be() {
+    let refused = |words: &[&str]| {
+        let message = call(words, profile("x,deviation\n0,1\n1,2\n2,1\n"));
+        message.map(|_| ()).unwrap_err().what().to_owned()
+    };
+    for (option, what) in [
+        ("--seed=-1", "give a whole number, 0 or greater"),
+        ("--seed=1.5", "give a whole number, 0 or greater"),
+        ("--seed=99999999999999999999", "it is too great"),
+    ] {
+        let told = refused(&["straightness", "<data>", option]);
+        assert!(
+            told.contains("--seed <N>") && told.ends_with(what),
+            "{told}"
+        );
+    }
+    for option in ["--severity=-1", "--prove=-1"] {
+        let told = refused(&["diagnose", "<data>", option]);
+        assert!(
+            told.ends_with("give a whole number, 0 or greater"),
+            "{told}"
+        );
+    }
+    for option in ["--positions=-1", "--repeats=-1"] {
+        let told = refused(&["simulate", "circle", option]);
+        assert!(
+            told.ends_with("give a whole number, 0 or greater"),
+            "{told}"
+        );
+    }
+}
+
+/// Several values after commas are the same as the option given again for each.
+#[test]
+fn lists_have_commas_or_the_option_again() {
+    let json = |words: &[&str]| call(words, Vec::new()).unwrap().answer.json;
+    for (kind, commas, again) in [
+        (
+            "circle",
+            "--lobe=2:1.5,3:0.8",
+            &["--lobe=2:1.5", "--lobe=3:0.8"][..],
+        ),
+        (
+            "fourier",
+            "--spacing=48.5,34.1",
+            &["--spacing=48.5", "--spacing", "34.1"],
+        ),
+        (
+            "step-diagonal",
+            "--sequence=XYZ,ZYX",
+            &["--sequence=XYZ", "--sequence=ZYX"],
+        ),
+        (
+            "step-diagonal",
+            "--travel=500,400,300",
+            &["--travel", "500", "400", "300"],
+        ),
+    ] {
+        let of = |options: &[&str]| json(&[&["simulate", kind], options].concat());
+        assert_eq!(of(&[commas]), of(again), "{kind}");
+        assert_ne!(of(&[commas]), of(&[]), "{kind}");
+    }
+}

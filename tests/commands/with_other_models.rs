@@ -261,3 +261,27 @@ fn effects_join_a_reversal_by_its_own_command() {
     let arguments = ["diagnose", "r.csv", "--with", "taper"];
     bad_input(&folder, &arguments, &["errsep reversal r.csv"]);
 }
+
+/// The examples with `--with` that the help gives, as they stand there, on files of these names.
+#[test]
+fn examples_of_the_help_run() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/");
+    let folder = Folder::with(&[]);
+    for (name, fixture) in [
+        ("data.csv", "reversal/readings.csv"),
+        ("parts.csv", "nistir6868/drilled_holes.csv"),
+        ("points.csv", "nistir6868/holes.csv"),
+        ("machine.toml", "nistir6868/machine.toml"),
+    ] {
+        std::fs::copy(format!("{root}{fixture}"), folder.path().join(name)).unwrap();
+    }
+    for command in ["reversal", "diagnose"] {
+        let help = run(&folder, &[command, "--help"]).stdout;
+        let examples = help.lines().filter(|line| line.contains(" --with "));
+        let examples: Vec<&str> = examples.filter_map(|l| l.split("errsep ").nth(1)).collect();
+        assert_eq!(examples.len(), 1, "{help}");
+        let words: Vec<&str> = examples[0].split_whitespace().collect();
+        let out = run(&folder, &words);
+        assert_eq!(out.status, 0, "{words:?}: {}", out.stderr);
+    }
+}

@@ -36,7 +36,7 @@ use crate::io::source::want_digests;
 #[command(after_help = "\
 Example: errsep diagnose readings.csv --out diagnosis
          errsep diagnose readings.csv --without taper --prove 200
-         errsep diagnose parts.csv --setup machine.toml --points points.csv --with temperature
+         errsep diagnose parts.csv --setup machine.toml --points points.csv --with thermal-expansion
          errsep diagnose plate-1.txt plate-2.txt --setup cmm.toml
 
 A file for --effects has one table an effect:
@@ -85,8 +85,8 @@ pub struct Args {
     points: Option<PathBuf>,
     #[command(flatten)]
     columns: ColumnArgs,
-    /// Leave an effect out of the catalogue; may be given several times.
-    #[arg(long, value_name = "EFFECT")]
+    /// Leave these effects out of the catalogue.
+    #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
     without: Vec<String>,
     /// Seek nothing: fit these effects along with the model, with one covariance, by their names.
     #[arg(

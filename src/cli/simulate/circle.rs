@@ -42,8 +42,9 @@ pub struct Args {
     /// Standard deviation of each coordinate, um.
     #[arg(long, default_value_t = 1.0, value_name = "UM")]
     noise: f64,
-    /// A lobe of the form as undulations:amplitude in um, such as 3:2.5; may be given several times.
-    #[arg(long, value_name = "N:UM", value_parser = parse_lobe)]
+    /// A lobe of the form as undulations:amplitude in um, such as 3:2.5; several with commas, or the option
+    /// again for each.
+    #[arg(long, value_name = "N:UM,...", value_delimiter = ',', value_parser = parse_lobe)]
     lobe: Vec<(u32, f64)>,
     /// Switch on an effect of the diagnosis's catalogue at a size, in its exact form; may be given
     /// several times. Sizes are in um, those of scales are shares.

@@ -21,8 +21,8 @@ pub struct Args {
     /// Grid points on the section.
     #[arg(long, alias = "samples", default_value_t = 1000, value_name = "N")]
     positions: usize,
-    /// Probe spacing, mm; may be given several times (default 48.5, 34.1, 78.6).
-    #[arg(long, value_name = "MM")]
+    /// Probe spacing, mm; several with commas, or the option again for each (default 48.5, 34.1, 78.6).
+    #[arg(long, value_name = "MM,...", value_delimiter = ',')]
     spacing: Vec<f64>,
     /// Repeats of each spacing.
     #[arg(long, default_value_t = 1, value_name = "N")]

@@ -36,7 +36,13 @@ enum On {
 Example: errsep simulate step-diagonal --steps 5 --sequence XYZ --sequence ZYX > readings.csv")]
 pub struct Args {
     /// Travel of X, Y, Z, mm.
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], default_values_t = [600.0, 500.0, 400.0])]
+    #[arg(
+        long,
+        num_args = 1..=3,
+        value_names = ["X", "Y", "Z"],
+        value_delimiter = ',',
+        default_values_t = [600.0, 500.0, 400.0]
+    )]
     travel: Vec<f64>,
     /// Steps on each axis.
     #[arg(long, default_value_t = 5, value_name = "N")]
@@ -47,8 +53,8 @@ pub struct Args {
     /// Target.
     #[arg(long, value_enum, default_value_t = On::Mirror)]
     target: On,
-    /// Sequence (XYZ, …, together); may be given several times (default: all six).
-    #[arg(long, value_name = "SEQ", value_parser = parse_sequence)]
+    /// Sequence (XYZ, …, together); several with commas, or the option again for each (default: all six).
+    #[arg(long, value_name = "SEQ,...", value_delimiter = ',', value_parser = parse_sequence)]
     sequence: Vec<Sequence>,
     /// Size of the translational errors, um.
     #[arg(long, default_value_t = 5.0, value_name = "UM")]

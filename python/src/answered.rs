@@ -1,6 +1,7 @@
 //! Commands and their answers.
 
 use std::ffi::OsString;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -30,7 +31,7 @@ pub fn call(
     py: Python<'_>,
     arguments: Vec<String>,
     inputs: Vec<(String, Vec<u8>)>,
-    threads: Option<usize>,
+    threads: Option<NonZeroUsize>,
 ) -> PyResult<Answered> {
     let inputs = inputs.into_iter().map(|(name, bytes)| InMemory {
         name,

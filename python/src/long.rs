@@ -1,11 +1,12 @@
 //! Long work without the global interpreter lock, and how it ends early.
 
+use std::num::NonZeroUsize;
 use std::sync::OnceLock;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::Builder;
 use std::time::Duration;
 
-use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::marker::Ungil;
 use pyo3::prelude::*;
 
@@ -30,7 +31,7 @@ pub fn without_the_lock<T: Ungil>(py: Python<'_>, work: impl FnOnce() -> T + Ung
 /// machine has cores.
 pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
-    threads: Option<usize>,
+    threads: Option<NonZeroUsize>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
     let work = divided(threads, work)?;
@@ -76,17 +77,16 @@ const A_CORE: usize = 16;
 
 /// The work, dividing itself into so many threads.
 fn divided<T: Send + 'static>(
-    threads: Option<usize>,
+    threads: Option<NonZeroUsize>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<Work<T>> {
     let forked = *STARTED_IN.get_or_init(std::process::id) != std::process::id();
     let threads = match threads {
         None if !forked => return Ok(Box::new(work)),
         None => 0,
-        Some(0) => return Err(PyValueError::new_err("threads is 0: give 1 or more")),
         Some(threads) => {
             let cores = std::thread::available_parallelism().map_or(1, usize::from);
-            threads.min(A_CORE * cores)
+            threads.get().min(A_CORE * cores)
         }
     };
     let pool = rayon::ThreadPoolBuilder::new()

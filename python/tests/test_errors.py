@@ -114,3 +114,40 @@ def test_a_folder_that_holds_something_else_is_not_replaced(tmp_path: Path) -> N
     assert (tmp_path / "report.html").read_text() == "mine"
     answer.report(tmp_path, force=True)
     assert "Straightness" in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize("wrong", [-1, 0, 1.5, 10**30, "four", float("nan"), None])
+def test_a_count_that_is_none_is_told_in_words(wrong: object, tmp_path: Path) -> None:
+    profile = {"x": [0.0, 1.0, 2.0], "deviation": [0.0, 1.0, 0.0]}
+    calls = {
+        "threads": (lambda n: errsep.straightness(profile, threads=n), "give a whole number, 1 or greater"),
+        "jobs": (lambda n: errsep.batch("id,command,data\n", jobs=n), "give a whole number, 1 or greater"),
+        "max_iterations": (
+            lambda n: errsep.least_squares(lambda p: p, {"a": 1.0}, max_iterations=n),
+            "give a whole number, 0 or greater",
+        ),
+    }
+    for name, (call, help) in calls.items():
+        if wrong is None and name != "max_iterations" or wrong == 0 and name == "max_iterations":
+            continue
+        with pytest.raises(errsep.InputError) as caught:
+            call(wrong)
+        assert caught.value.what == f"{name} is {wrong!r}" and caught.value.help == help
+
+
+def test_options_of_the_commands_that_count_are_told_in_words(readings: Path) -> None:
+    for call in (
+        lambda: errsep.reversal(readings, seed=-1),
+        lambda: errsep.diagnose(readings, severity=-1),
+        lambda: errsep.diagnose(readings, prove=1.5),
+        lambda: errsep.simulate("circle", positions=-1),
+        lambda: errsep.machine({"chain": "FXYZ"}, "circularity", centre=(0, 0), radius=1, trials=-1),
+    ):
+        with pytest.raises(errsep.InputError, match="give a whole number, 0 or greater"):
+            call()
+
+
+def test_whole_numbers_of_other_kinds_count() -> None:
+    profile = {"x": [0.0, 1.0, 2.0], "deviation": [0.0, 1.0, 0.0]}
+    assert errsep.straightness(profile, threads=np.int64(2))["points"] == 3
+    assert errsep.least_squares(lambda p: p - 1, {"a": 0.0}, max_iterations=1e3).converged

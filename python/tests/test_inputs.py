@@ -198,6 +198,8 @@ def test_columns_by_other_names_and_units(readings: Path, columns: Columns, expe
 def test_what_is_no_table_is_told() -> None:
     with pytest.raises(TypeError, match="int is no table"):
         errsep.circle(3)
+    with pytest.raises(TypeError, match="Result is no table"):
+        errsep.circle(errsep.simulate("circle"))
     with pytest.raises(errsep.InputError, match="shape") as caught:
         errsep.circle(np.zeros((4, 3)))
     assert caught.value.help == "give columns 2 (x, y)"
@@ -221,3 +223,29 @@ def test_a_path_that_looks_like_an_option(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.chdir(tmp_path)
     Path("--help").write_text("x,deviation\n0,0\n1,1\n2,0\n")
     assert errsep.straightness("--help")["points"] == 3
+
+
+def test_a_single_name_is_one_name(readings: Path) -> None:
+    several = plain(errsep.reversal(readings, simultaneous=True, with_=["taper"]).to_dict())
+    assert plain(errsep.reversal(readings, simultaneous=True, with_="taper").to_dict()) == several
+    assert plain(errsep.reversal(readings, simultaneous=True, with_=iter(("taper",))).to_dict()) == several
+    several = plain(errsep.diagnose(readings, without=["taper"], severity=0).to_dict())
+    assert plain(errsep.diagnose(readings, without="taper", severity=0).to_dict()) == several
+    points = "point,x,y,z\n31,0,0,0\n32,100,0,0\n33,0,100,0\n"
+    machine = {"chain": "FXYZ", "errors": {"EXX": {"polynomial": [0.0, 0.01]}}}
+    length = errsep.machine(machine, "length", points, between="31:32")
+    assert list(length.quantities) == ["results.length 31 to 32"]
+    corners = {"first": "31,32", "second": "31,33"}
+    given = {name: words.split(",") for name, words in corners.items()}
+    square = errsep.machine(machine, "squareness", points, **corners)
+    assert plain(square.to_dict()) == plain(errsep.machine(machine, "squareness", points, **given).to_dict())
+    assert errsep.least_squares(lambda p: p - 1, [0.0], names="drift").names == ["drift"]
+
+
+def test_effects_of_a_simulation_come_as_they_are_written() -> None:
+    of = {"zero-jump": 0.2, "taper": 2e-5}
+    made = [
+        plain(errsep.simulate("reversal", positions=31, effects=effects, seed=7).to_dict())
+        for effects in (of, [f"{name}={size!r}" for name, size in of.items()])
+    ]
+    assert made[0] == made[1] and list(made[0]["truth"]["effects"])

@@ -267,8 +267,6 @@ def test_one_thread_gives_the_same_answer_as_all() -> None:
         for n in (None, 1, 3)
     ]
     assert answers[0] == answers[1] == answers[2]
-    with pytest.raises(ValueError, match="threads is 0"):
-        errsep.straightness(PROFILE, threads=0)
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="no list of threads")

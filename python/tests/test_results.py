@@ -7,6 +7,7 @@ import json
 import pickle
 import re
 from base64 import b64decode
+from collections.abc import Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -42,6 +43,7 @@ def answers() -> dict[str, errsep.Result]:
         "anova": errsep.anova(NISTIR / "replicates.csv"),
         "straightness": errsep.straightness({"x": [0, 1, 2], "deviation": [0.0, 1.0, 0.0]}),
         "diagnose": errsep.diagnose(reversal),
+        "diagnose with": errsep.diagnose(errsep.simulate("circle", repeats=3)["data"], with_="ovality"),
         "plan": errsep.plan({"noise": 0.02, "travel": 300.0, "positions": 31}),
         "simulate": errsep.simulate("reversal", seed=1),
         "simulate fourier": scans,
@@ -161,7 +163,55 @@ def test_json_and_dictionary_are_the_same_and_the_caller_s_own(answers: dict[str
     answer = answers["reversal"]
     assert answer.to_dict() == json.loads(answer.to_json())
     answer.to_dict()["tilts"].clear()
-    assert answer["tilts"] and "tilts" in answer and answer.keys()[0] == "schema"
+    assert answer["tilts"] and "tilts" in answer
+
+
+def test_an_answer_is_a_mapping(answers: dict[str, errsep.Result]) -> None:
+    answer = answers["reversal"]
+    assert isinstance(answer, Mapping)
+    assert list(answer) == list(answer.keys()) == list(json.loads(answer.to_json()))
+    assert len(answer) == len(answer.to_dict()) and dict(answer) == answer.to_dict()
+    assert dict(answer.items())["tilts"] == answer["tilts"]
+    assert answer.get("nothing") is None
+    with pytest.raises(KeyError, match="nothing"):
+        answer["nothing"]
+
+
+def test_a_diagnosis_has_the_sizes_of_the_causes_that_it_names() -> None:
+    made = errsep.simulate("circle", repeats=4, noise=0.2, effects={"ovality": 2.0}, seed=1)
+    answer = errsep.diagnose(made["data"], severity=0)
+    assert answer["verdict"]["effects"] == ["ovality"]
+    size = answer.quantities["candidates.ovality.parameters.amplitude"]
+    assert (size.label, size.unit, size.dof) == ("amplitude", "um", answer["noise"]["degrees_of_freedom"])
+    # k·u with k = 4.
+    assert abs(size.value - 2.0) < 4 * size.std
+    assert 10 < size.dof < np.inf and size.expanded is None
+    # What is not named has no size.
+    assert all(name.startswith("candidates.ovality.") for name in answer.quantities)
+    assert len(answer["candidates"]) > 1
+    stated = errsep.diagnose(made["data"], {"circle": {"noise": 0.2}}, severity=0)
+    assert stated.quantities["candidates.ovality.parameters.amplitude"].dof == np.inf
+    nothing = errsep.diagnose(errsep.simulate("circle", repeats=3, seed=2)["data"])
+    assert nothing["verdict"]["kind"] == "none" and not nothing.quantities
+
+
+def test_effects_in_a_fit_are_quantities_once(readings: Path) -> None:
+    made = errsep.simulate("step-diagonal", repeats=3, effects={"drift": 2.0}, seed=3)["data"]
+    answer = errsep.step_diagonal(made, with_="drift")
+    sizes = [name for name in answer.quantities if "drift" in name]
+    told = answer["effects"][0]["parameters"]
+    names = [one["name"] for one in told] + [one["linear"]["name"] for one in told if "linear" in one]
+    assert len(names) > len(told)
+    assert sorted(sizes) == sorted(f"effects.drift.parameters.{name}" for name in names)
+    assert answer.quantities[sizes[0]].dof == answer["with"]["noise"]["degrees_of_freedom"]
+    alone = errsep.diagnose(made, with_="drift").quantities
+    assert {name: alone[name] for name in sizes} == {name: answer.quantities[name] for name in sizes}
+    # A diagnosis beside the answer stands in its own place.
+    data = errsep.simulate("reversal", repeats=3, positions=61, thickness=42, effects={"taper": 1e-4}, seed=2)
+    setup = {"artefact": {"thickness": 42}}
+    beside = errsep.reversal(data["data"], setup, simultaneous=True, diagnose=True)
+    assert beside["diagnosis"]["verdict"]["effects"] == ["taper"]
+    assert beside.quantities["diagnosis.candidates.taper.parameters.half-angle"].unit == "rad"
 
 
 def test_a_data_frame_has_the_profiles(answers: dict[str, errsep.Result]) -> None:

@@ -3,13 +3,16 @@ the comparison is of equality and has no tolerance."""
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import FIXTURES, plain
+from conftest import FIXTURES, plain, program
 
 import errsep
 
@@ -34,6 +37,57 @@ def swing(load: float) -> float:
     return 0.02 * math.cos(2 * math.pi * load / 3.1 + 0.4)
 
 
+def renamed(text: str, names: dict[str, str]) -> str:
+    """A table whose columns have other names; lines of comment are left out."""
+    header, *rows = [line for line in text.splitlines() if line[:1] != "#"]
+    columns = ",".join(names.get(name, name) for name in header.split(","))
+    return "\n".join([columns, *rows]) + "\n"
+
+
+def with_effects(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[str | Path]]]:
+    """Effects in the fit, and columns by other names, for every command that takes them."""
+
+    def written(name: str, text: str) -> Path:
+        (tmp_path / name).write_text(text)
+        return tmp_path / name
+
+    made = {
+        "circle": errsep.simulate("circle", repeats=3, noise=0.2, effects="ovality=0.8", seed=3),
+        "four-sensor": errsep.simulate("four-sensor", repeats=3, effects=["gain=0.003"], seed=3),
+        "fourier": errsep.simulate("fourier", repeats=3, positions=200, effects={"yaw": 2e-5}, seed=3),
+        "step-diagonal": errsep.simulate("step-diagonal", repeats=3, effects={"drift": 2}, seed=3),
+    }
+    oval = written("oval.csv", renamed(made["circle"].summary(), {"x": "u", "y": "v", "repeat": "n"}))
+    bent = written("bent.csv", renamed(made["four-sensor"].summary(), {"repeat": "run"}))
+    sensors = ",".join(["x=x", "repeat=run", *(f"m{k}=m{k}" for k in range(1, 5))])
+    four = written("four.toml", made["four-sensor"].setup or "")
+    yawing = written("yawing.csv", made["fourier"].summary())
+    section = written("yawing.toml", made["fourier"].setup or "")
+    drifting = written("drifting.csv", made["step-diagonal"].summary())
+    return {
+        "circle with an effect, columns": (
+            lambda: errsep.circle(oval, with_="ovality", columns={"x": "u:mm", "y": "v:mm", "repeat": "n"}),
+            ["circle", oval, "--with", "ovality", "--columns", "x=u:mm,y=v:mm,repeat=n"],
+        ),
+        "four-sensor with an effect, columns": (
+            lambda: errsep.four_sensor(bent, four, with_=["gain"], columns=sensors),
+            ["four-sensor", bent, "--setup", four, "--with", "gain", "--columns", sensors],
+        ),
+        "fourier with an effect": (
+            lambda: errsep.fourier(yawing, setup=section, with_="yaw", seed=2),
+            ["fourier", yawing, "--setup", section, "--with", "yaw", "--seed", "2"],
+        ),
+        "step-diagonal with an effect": (
+            lambda: errsep.step_diagonal(drifting, with_="drift"),
+            ["step-diagonal", drifting, "--with", "drift"],
+        ),
+        "diagnose with an effect": (
+            lambda: errsep.diagnose(drifting, with_=("drift", "thermal-expansion")),
+            ["diagnose", drifting, "--with", "drift,thermal-expansion"],
+        ),
+    }
+
+
 def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[str | Path]]]:
     """A call of each function and the command that is the same."""
     readings, setup = FIXTURES / "reversal/readings.csv", FIXTURES / "reversal/setup.toml"
@@ -47,6 +101,15 @@ def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[st
     steps = tmp_path / "steps.csv"
     steps.write_text(errsep.simulate("step-diagonal", seed=5).summary())
     profile.write_text("x,deviation\n0,-0.3\n100,0.9\n200,0.1\n")
+    forms = tmp_path / "forms.csv"
+    (tmp_path / "of.csv").write_text("x,M,S\n0,0,1\n1,1,0\n2,0.5,1\n")
+    forms.write_text("place,M,S\n0,-0.3,1\n100,0.9,0\n200,0.1,1\n")
+    replicates = tmp_path / "replicates.csv"
+    replicates.write_text("piece,length\n1,1.0\n1,1.2\n2,3.0\n2,3.4\n")
+    drilled = tmp_path / "drilled.csv"
+    drilled.write_text(renamed((NISTIR / "drilled_holes.csv").read_text(), {"value": "found"}))
+    holes_by = {name: name for name in ("part", "point", "axis", "replicate")} | {"value": "found:um"}
+    holes_words = "part=part,point=point,axis=axis,replicate=replicate,value=found:um"
     planned = {"noise": 0.02, "travel": 300.0, "positions": 31, "repeats": 2}
     plan = tmp_path / "plan.toml"
     plan.write_text("\n".join(f"{key} = {value}" for key, value in planned.items()))
@@ -103,11 +166,27 @@ def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[st
             lambda: errsep.machine(machine, "parts", NISTIR / "drilled_holes.csv", points=holes),
             ["machine", machine, "parts", NISTIR / "drilled_holes.csv", "--points", holes],
         ),
+        "machine parts, columns": (
+            lambda: errsep.machine(machine, "parts", drilled, points=holes, columns=holes_by),
+            ["machine", machine, "parts", drilled, "--points", holes, "--columns", holes_words],
+        ),
         "anova": (
             lambda: errsep.anova(NISTIR / "replicates.csv", recipe="section-5.1", confidence=0.9),
             ["anova", NISTIR / "replicates.csv", "--recipe", "section-5.1", "--confidence", "0.9"],
         ),
+        "anova, columns": (
+            lambda: errsep.anova(replicates, columns={"part": "piece", "value": "length:mm"}),
+            ["anova", replicates, "--columns", "part=piece,value=length:mm"],
+        ),
         "straightness": (lambda: errsep.straightness(profile), ["straightness", profile]),
+        "straightness, columns": (
+            lambda: errsep.straightness(forms, columns="x=place:mm,deviation=M:um"),
+            ["straightness", forms, "--columns", "x=place:mm,deviation=M:um"],
+        ),
+        "straightness of a form": (
+            lambda: errsep.straightness({"x": [0, 1, 2], "M": [0.0, 1.0, 0.5], "S": [1, 0, 1]}, of="M"),
+            ["straightness", forms.with_name("of.csv"), "--of", "M"],
+        ),
         "diagnose": (
             lambda: errsep.diagnose(readings, setup, without=["taper"], false_alarm=0.05),
             ["diagnose", readings, "--setup", setup, "--without", "taper", "--false-alarm", "0.05"],
@@ -122,9 +201,23 @@ def both(tmp_path: Path) -> dict[str, tuple[Callable[[], errsep.Result], list[st
         ),
         "check": (lambda: errsep.check(sealed, readings), ["check", sealed, readings]),
         "plan": (lambda: errsep.plan(planned), ["plan", plan]),
+        **with_effects(tmp_path),
         "simulate": (
             lambda: errsep.simulate("reversal", alpha=-5, thickness=42, effects={"zero-jump": 0.2}, seed=7),
             ["simulate", "reversal", *"--alpha=-5 --thickness 42 --effect zero-jump=0.2 --seed 7".split()],
+        ),
+        "simulate, lists": (
+            lambda: errsep.simulate(
+                "circle", lobe=["2:1.5", "3:0.8"], effects=["ovality=1", "squareness=1e-5"]
+            ),
+            [
+                *"simulate circle --lobe 2:1.5 --lobe 3:0.8".split(),
+                *"--effect ovality=1 --effect squareness=1e-5".split(),
+            ],
+        ),
+        "simulate, numbers in lists": (
+            lambda: errsep.simulate("step-diagonal", travel=[500, 400, 300], sequence=["XYZ", "ZYX"]),
+            "simulate step-diagonal --travel 500 400 300 --sequence XYZ --sequence ZYX".split(),
         ),
         "simulate machine": (
             lambda: errsep.simulate("machine", machine, points=holes, **made_machine),
@@ -156,14 +249,25 @@ def calls(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         "machine length",
         "machine circularity",
         "machine parts",
+        "machine parts, columns",
         "anova",
+        "anova, columns",
         "straightness",
+        "straightness, columns",
+        "straightness of a form",
         "diagnose",
         "diagnose, columns and severity",
         "diagnose, law",
         "check",
         "plan",
+        "circle with an effect, columns",
+        "four-sensor with an effect, columns",
+        "fourier with an effect",
+        "step-diagonal with an effect",
+        "diagnose with an effect",
         "simulate",
+        "simulate, lists",
+        "simulate, numbers in lists",
         "simulate machine",
     ],
 )
@@ -184,11 +288,25 @@ def test_every_call_is_compared(calls: dict[str, Any]) -> None:
     assert functions == known | {"straightness", "diagnose", "check", "plan", "simulate"}
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        *["reversal", "circle", "four-sensor", "fourier", "step-diagonal", "anova", "straightness"],
+        *[f"machine {action}" for action in ("predict", "length", "squareness", "circularity", "parts")],
+        *["diagnose", "check", "plan"],
+    ],
+)
+def test_every_option_of_the_command_is_an_argument(words: str) -> None:
+    """But for how the answer is delivered, and the seed where nothing is random."""
+    told = subprocess.run([program(), *words.split(), "--help"], capture_output=True, check=True, text=True)
+    options = set(re.findall(r"^ +(?:-\w, )?--([a-z-]+)", told.stdout, re.MULTILINE))
+    function = getattr(errsep, words.split()[0].replace("-", "_"))
+    given = {name.strip("_").replace("_", "-") for name in inspect.signature(function).parameters}
+    assert options - given <= {"format", "out", "force", "quiet", "help", "seed"}
+    assert "with" not in options or "seed" in given
+
+
 def test_the_text_is_that_of_the_command(readings: Path) -> None:
-    import subprocess
-
-    from conftest import program
-
     words = [str(program()), "reversal", str(readings)]
     printed = subprocess.run(words, capture_output=True, check=True, text=True).stdout
     assert errsep.reversal(readings).summary() == printed
@@ -196,10 +314,6 @@ def test_the_text_is_that_of_the_command(readings: Path) -> None:
 
 def test_the_report_is_that_of_the_command(readings: Path, tmp_path: Path) -> None:
     """The same files with the same bytes, but for the command line and the seconds told in two of them."""
-    import subprocess
-
-    from conftest import program
-
     ours, theirs = tmp_path / "ours", tmp_path / "theirs"
     errsep.reversal(readings).report(ours)
     words = [str(program()), "reversal", str(readings), "--out", str(theirs)]

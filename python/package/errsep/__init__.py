@@ -15,18 +15,16 @@ from ._errsep import __version__
 from .batches import Batch, batch
 from .commands import (
     anova,
-    check,
     circle,
-    diagnose,
     four_sensor,
     fourier,
     machine,
-    plan,
     reversal,
     simulate,
     step_diagonal,
     straightness,
 )
+from .diagnosing import check, diagnose, plan
 from .engine import State, least_squares
 from .errors import Error, InputError, NotConverged, NotDetermined
 from .fit import Fit, Interval

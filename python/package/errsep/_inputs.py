@@ -10,9 +10,40 @@ import numpy as np
 
 from . import _errsep, _toml
 from .errors import InputError
+from .result import Result
 
 #: Columns of an array of two dimensions that has none of its own, by their number.
 Columns = Mapping[int, Sequence[str]]
+
+#: Names in a list, or one name; none.
+Names = str | Iterable[str] | None
+
+#: The greatest number that counts anything.
+_MOST = 2**64 - 1
+
+
+def listed(names: Names) -> list[str]:
+    """Names as a list; a single text is one name.
+
+    >>> listed("taper"), listed(("taper", "zero-jump"))
+    (['taper'], ['taper', 'zero-jump'])
+    """
+    return [names] if isinstance(names, str) else list(names or ())
+
+
+def whole(name: str, value: Any, least: int = 0) -> int:
+    """An argument that counts something, where the compiled half takes no other.
+
+    >>> whole("threads", 4, 1)
+    4
+    """
+    try:
+        number = int(value)
+    except (TypeError, ValueError, OverflowError):
+        number = -1
+    if number != value or not least <= number <= _MOST:
+        raise InputError(f"{name} is {value!r}", help=f"give a whole number, {least} or greater")
+    return number
 
 
 class Call:
@@ -106,7 +137,7 @@ def as_csv(data: Any, columns: Columns) -> bytes:
 
 
 def _named_columns(data: Any, columns: Columns) -> list[tuple[str, Any]]:
-    if isinstance(data, Mapping):
+    if isinstance(data, Mapping) and not isinstance(data, Result):
         return [(str(name), values) for name, values in data.items()]
     if isinstance(data, np.ndarray):
         return _of_array(data, columns)

@@ -143,6 +143,11 @@ def _anova(answer: Result, ax: Any) -> None:
 
 
 def _diagnose(answer: Result, ax: Any) -> None:
+    if answer["schema"] == "errsep.fit-with/1":
+        gap = answer["gap"]
+        sizes = [gap[key]["rms"] for key in ("before", "after")]
+        _bars(ax, ["without", "with"], sizes, f"gap ({gap['unit']} RMS)", "Without and with the effects")
+        return
     candidates = sorted(answer["candidates"], key=lambda c: -(c["evidence"] or 0.0))
     names = [candidate["effect"] for candidate in candidates]
     evidence = [candidate["evidence"] or 0.0 for candidate in candidates]

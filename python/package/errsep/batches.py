@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _errsep
-from ._inputs import as_csv
+from ._inputs import as_csv, whole
 
 #: A list of campaigns: a path, CSV text, a dictionary of columns, or a table of another package.
 Table = Any
@@ -124,11 +124,12 @@ def batch(
     """
     if client is not None and out is None:
         raise TypeError("a client works on files: give out, a folder that all its workers see")
+    if jobs is None:
+        jobs = (os.cpu_count() or 1) if client is None else 1
+    jobs = whole("jobs", jobs, 1)
     temporary = tempfile.TemporaryDirectory(prefix="errsep-") if out is None else None
     folder = Path(temporary.name if temporary is not None else os.fspath(out or "")).absolute()
     path, inputs = _list(frame)
-    if jobs is None:
-        jobs = (os.cpu_count() or 1) if client is None else 1
     shared = _errsep.Shared(
         path, inputs, folder, jobs=jobs, retry_failed=retry_failed, verify=verify, parquet=parquet
     )

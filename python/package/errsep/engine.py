@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _errsep
+from ._inputs import Names, listed, whole
 from .errors import InputError, NotConverged
 from .fit import Array, Fit
 
@@ -33,7 +34,7 @@ def least_squares(
     *,
     jacobian: Callable[..., ArrayLike] | None = None,
     args: Sequence[Any] = (),
-    names: Sequence[str] | None = None,
+    names: Names = None,
     units: Mapping[str, str] | None = None,
     bounds: Bounds | None = None,
     loss: str = "quadratic",
@@ -129,7 +130,7 @@ def least_squares(
         "step_tolerance": float(step_tolerance),
         "gradient_tolerance": float(gradient_tolerance),
         "rank_tolerance": rank_tolerance,
-        "max_iterations": int(max_iterations),
+        "max_iterations": whole("max_iterations", max_iterations),
         "time_limit": time_limit,
         "known_scale": sigma == "known",
         "profile": profile,
@@ -162,7 +163,7 @@ def least_squares(
     raise NotConverged(fit.ending).with_result(fit)
 
 
-def _start(start: ArrayLike | Mapping[str, float], names: Sequence[str] | None) -> tuple[list[str], Array]:
+def _start(start: ArrayLike | Mapping[str, float], names: Names) -> tuple[list[str], Array]:
     if isinstance(start, Mapping):
         if names is not None:
             raise InputError("the start names the parameters already", help="leave out names")
@@ -170,7 +171,7 @@ def _start(start: ArrayLike | Mapping[str, float], names: Sequence[str] | None) 
     first = np.array(start, dtype=float)
     if first.ndim != 1:
         raise InputError(f"the start has the shape {first.shape}", help="give one number a parameter")
-    names = [f"p{k}" for k in range(first.size)] if names is None else list(names)
+    names = [f"p{k}" for k in range(first.size)] if names is None else listed(names)
     if len(names) != first.size or len(set(names)) != len(names):
         raise InputError(
             f"{len(names)} names for {first.size} parameters", help="give each parameter a name of its own"

@@ -69,11 +69,14 @@ def plus_minus(value: float, std: float) -> str:
 
 
 def quantity(
-    value: Mapping[str, Any], expanded: Mapping[str, Any] | None = None, label: str = ""
+    value: Mapping[str, Any],
+    expanded: Mapping[str, Any] | None = None,
+    label: str = "",
+    dof: float | None = None,
 ) -> Quantity:
-    """A quantity as the answers write it."""
+    """A quantity as the answers write it; ``dof`` where it does not say its own degrees of freedom."""
     expanded = value.get("expanded") or expanded or {}
-    dof = value.get("degrees_of_freedom")
+    dof = value.get("degrees_of_freedom", dof)
     return Quantity(
         label=value.get("label", label),
         value=value["value"],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import html
 import json
+import math
 import os
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
@@ -18,19 +19,22 @@ from .quantity import Covariance, Quantities, Quantity, is_quantity, quantity
 from .quantity import to_gtc as _to_gtc
 from .quantity import to_uncertainties as _to_uncertainties
 
-#: Parts of an answer that say what goes into a quantity, not what came out.
-_NO_RESULTS = {"contributions", "contrasts", "candidates", "nistir6868", "provenance"}
+#: Parts of an answer that say what goes into a quantity, not what came out; what came out is no other
+#: variant of an effect (`elsewhere`), and the effects of a fit `with` them stand beside it.
+_NO_RESULTS = {"contributions", "contrasts", "nistir6868", "provenance", "elsewhere", "with"}
 
 #: Figures shown in a notebook; the report has all.
 _SHOWN = 2
 
 
-class Result:
+class Result(Mapping[str, Any]):
     """The answer of a command, in every form in which the command gives it.
 
     The values are those of the command's JSON (``errsep <command> --format json``), whose pages in
     ``docs/json`` say what each key means: ``result["forms"]["M"]``. Angles are in rad, positions in mm,
     readings and forms in µm.
+
+    It is a mapping that nothing changes: ``for key in result``, ``len``, ``keys``, ``items``, ``get``.
     """
 
     def __init__(self, command: str, answered: _errsep.Answered) -> None:
@@ -59,12 +63,11 @@ class Result:
     def __getitem__(self, key: str) -> Any:
         return self._json[key]
 
-    def __contains__(self, key: object) -> bool:
-        return key in self._json
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._json)
 
-    def keys(self) -> list[str]:
-        """The keys of the answer."""
-        return list(self._json)
+    def __len__(self) -> int:
+        return len(self._json)
 
     def report(self, folder: str | os.PathLike[str], *, force: bool = False) -> None:
         """Writes the report's folder, as ``--out`` does: report.html, result.json and the tables.
@@ -77,7 +80,8 @@ class Result:
 
     @cached_property
     def quantities(self) -> Quantities:
-        """Every single value with its uncertainty, by its place in the answer: ``tilts.alpha``."""
+        """Every single value with its uncertainty, by its place in the answer: ``tilts.alpha``; of a
+        diagnosis the sizes of the causes that it names: ``candidates.taper.parameters.half-angle``."""
         return Quantities(dict(_quantities(self._json, ())))
 
     @cached_property
@@ -240,9 +244,15 @@ def _unit_of(column: str) -> dict[str, str]:
     return {"units": unit} if unit in {"mm", "um", "rad", "urad", "deg", "s"} else {}
 
 
-def _quantities(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Quantity]]:
+def _quantities(
+    value: Any, path: tuple[str, ...], dof: float | None = None
+) -> Iterator[tuple[str, Quantity]]:
     if is_quantity(value):
-        yield ".".join(path), quantity(value, label=path[-1] if path else "")
+        yield ".".join(path), quantity(value, label=path[-1] if path else "", dof=dof)
+        linear = value.get("linear")
+        if is_quantity(linear):
+            # The quantity itself beside its logarithm.
+            yield ".".join((*path[:-1], linear["name"])), quantity(linear, label=linear["name"], dof=dof)
     elif isinstance(value, Mapping):
         for key, part in value.items():
             if key in _NO_RESULTS:
@@ -250,12 +260,31 @@ def _quantities(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Quanti
             if key == "result" and is_quantity(part):
                 # Its expanded uncertainty stands beside it.
                 yield ".".join(path), quantity(part, value.get("expanded"))
+            elif key == "candidates":
+                yield from _quantities(_named(value), (*path, key), _freedom(value))
             else:
-                yield from _quantities(part, (*path, key))
+                own = _freedom(value) if key == "effects" else dof
+                yield from _quantities(part, (*path, key), own)
     elif isinstance(value, list):
         for k, part in enumerate(value):
             if isinstance(part, (Mapping, list)):
-                yield from _quantities(part, (*path, _name(part, k)))
+                yield from _quantities(part, (*path, _name(part, k)), dof)
+
+
+def _named(answer: Mapping[str, Any]) -> list[Any]:
+    """Of the effects that a diagnosis weighs, those that it names."""
+    named = (answer.get("verdict") or {}).get("effects", [])
+    return [c for c in answer["candidates"] if isinstance(c, Mapping) and c.get("effect") in named]
+
+
+def _freedom(answer: Mapping[str, Any]) -> float | None:
+    """The degrees of freedom that the sizes of all effects share: those of the noise, infinite where it is
+    stated."""
+    of = answer.get("with") or answer
+    if of.get("schema") not in ("errsep.diagnosis/1", "errsep.fit-with/1"):
+        return None
+    dof = of["noise"].get("degrees_of_freedom")
+    return math.inf if dof is None else float(dof)
 
 
 def _name(part: Any, k: int) -> str:

@@ -49,7 +49,7 @@ fn of<M: FittedModel + 'static>(
     let mut rows = Vec::new();
     for (k, effect) in maker.effects.iter().enumerate() {
         // The zeros and turns of parts are drawn with the size as their standard deviation.
-        if ["part-zero", "part-rotation"].contains(effect) {
+        if ["part-zero", "part-rotation", "part-temperature"].contains(effect) {
             continue;
         }
         let least = seen_from(maker, effect, &Options::default());

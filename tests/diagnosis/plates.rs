@@ -2,7 +2,7 @@
 
 use errsep::diagnosis::{Kind, Options, diagnose};
 
-use crate::plate::{Wrong, line, plate, plate_turned};
+use crate::plate::{EXPANSION, Wrong, line, plate, plate_turned, warm_plates};
 
 fn options() -> Options {
     Options {
@@ -97,4 +97,57 @@ fn poses_are_told_and_what_points_on_a_line_do_not_tell() {
     let names: Vec<&str> = found.iter().map(|a| a.name.as_str()).collect();
     assert_eq!(names, ["zero of y", "turn about z"]);
     assert_eq!(open, ["zero of z of part rod", "turn about y of part rod"]);
+}
+
+/// Plates that were each measured at a temperature of their own, by 0.3 to 1.5 K, and nobody said so.
+const WARMER: [f64; 3] = [-0.4, 0.3, 1.5];
+
+#[test]
+fn temperatures_of_plates_are_named_and_told() {
+    let found = diagnose(&warm_plates(Wrong::default(), &WARMER, 0.3, 2), &options());
+    assert_eq!(
+        found.verdict.effects,
+        ["part-temperature"],
+        "{:?}",
+        found.verdict
+    );
+    assert!(found.verdict.indistinguishable.is_empty());
+    let of = |c: &&errsep::diagnosis::Candidate| c.effect == "part-temperature";
+    let told = &found.candidates.iter().find(of).unwrap().parameters;
+    assert_eq!(told[0].name, "scale-of-parts");
+    for (size, warmer) in told[1..].iter().zip(WARMER) {
+        // k·u with k = 4.
+        let off = (size.value - EXPANSION * warmer).abs();
+        assert!(
+            size.std < 1e-6 && off < 4.0 * size.std,
+            "{size:?}, not {warmer} K"
+        );
+    }
+    assert_eq!(told.len(), 1 + WARMER.len());
+}
+
+/// Plates alike are warm by one scale; a single plate has no other.
+#[test]
+fn plates_alike_are_warm_together() {
+    for kelvins in [&[1.0, 1.0, 1.0][..], &[1.0]] {
+        let found = diagnose(&warm_plates(Wrong::default(), kelvins, 0.3, 4), &options());
+        assert_eq!(found.verdict.effects, ["thermal-expansion"], "{kelvins:?}");
+    }
+    let alone = diagnose(&warm_plates(Wrong::default(), &[1.0], 0.3, 4), &options());
+    let mut candidates = alone.candidates.iter();
+    let own = candidates.find(|c| c.effect == "part-temperature").unwrap();
+    assert!(!own.in_set && own.visible == 0.0, "{own:?}");
+}
+
+/// What the machine does wrong is named beside what the plates do.
+#[test]
+fn temperatures_hide_no_squareness() {
+    let wrong = Wrong {
+        squareness: 7e-6,
+        ..Wrong::default()
+    };
+    let found = diagnose(&warm_plates(wrong, &WARMER, 0.3, 6), &options());
+    let mut names = found.verdict.effects.clone();
+    names.sort();
+    assert_eq!(names, ["part-temperature", "squareness-change"]);
 }

@@ -206,9 +206,9 @@ fn a_name_for_what_the_catalogue_lacks_is_weak_by_what_the_model_knows() {
         );
         let mut rivals = severity.rivals.iter();
         let own = rivals.find(|rival| rival.name.contains(along));
-        // One-sided 95 % lower limit above 5 %: 9 of 64 draws are.
+        // One-sided 95 % lower limit above 5 %: 12 of 128 draws are.
         assert!(
-            own.is_some_and(|own| own.probability > 0.1),
+            own.is_some_and(|own| own.probability > 0.09),
             "{effect}: {severity:?}"
         );
     }

@@ -125,6 +125,7 @@ pub const MAKERS: [Maker; 6] = [
             "datum-offset",
             "datum-rotation",
             "part-rotation",
+            "part-temperature",
             "part-zero",
             "squareness-change",
             "thermal-expansion",
@@ -275,9 +276,9 @@ pub fn machine_made(put: Put<'_>, seed: u64, noise: f64) -> MeasuredParts {
 
 /// Whether the size that was found is within two standard uncertainties of the true one, and of the
 /// sensor that was disturbed; none where the diagnosis leaves another variant open, and for parts
-/// whose own zeros and turns were drawn with that size as their standard deviation.
+/// whose own zeros, turns and scales were drawn with that size as their standard deviation.
 pub fn within(diagnosis: &Diagnosis, effect: &str, size: f64) -> Option<bool> {
-    if ["part-zero", "part-rotation"].contains(&effect) {
+    if ["part-zero", "part-rotation", "part-temperature"].contains(&effect) {
         return None;
     }
     let size = size * told_of_put(effect);

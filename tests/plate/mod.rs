@@ -66,6 +66,30 @@ pub fn plate(wrong: Wrong, noise_um: f64, seed: u64) -> MeasuredParts {
 
 /// The same that lies turned by so many rad.
 pub fn plate_turned(wrong: Wrong, noise_um: f64, seed: u64, turn: f64) -> MeasuredParts {
+    aligned(measured(wrong, noise_um, seed, turn, ("plate", 0.0)))
+}
+
+/// Steel, 1/K.
+pub const EXPANSION: f64 = 11.5e-6;
+
+/// Plates of steel, each so many kelvins warmer than when it was calibrated and with a pose of its own.
+pub fn warm_plates(wrong: Wrong, kelvins: &[f64], noise_um: f64, seed: u64) -> MeasuredParts {
+    let plates = kelvins.iter().enumerate().flat_map(|(k, warmer)| {
+        let own = 100 * seed + k as u64;
+        let name = format!("plate {}", k + 1);
+        measured(wrong, noise_um, own, pose(own).turn, (&name, *warmer))
+    });
+    aligned(plates.collect())
+}
+
+/// The readings of one plate that lies turned by so many rad: its name, and by how many kelvins it is warm.
+fn measured(
+    wrong: Wrong,
+    noise_um: f64,
+    seed: u64,
+    turn: f64,
+    (part, warmer): (&str, f64),
+) -> Vec<PartReading> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let Pose { shift, .. } = pose(seed);
     let noise = Normal::new(0.0, noise_um * 1e-3).unwrap();
@@ -74,14 +98,15 @@ pub fn plate_turned(wrong: Wrong, noise_um: f64, seed: u64, turn: f64) -> Measur
         for i in 0..6 {
             for j in 0..6 {
                 let (x, y) = (SIDE * f64::from(i) / 5.0, SIDE * f64::from(j) / 5.0);
-                let place = turned((x, y), turn, shift);
+                let grown = 1.0 + EXPANSION * warmer;
+                let place = turned((x * grown, y * grown), turn, shift);
                 let read = (
                     place.0 * (1.0 + wrong.scale_x) - place.1 * wrong.squareness.tan(),
                     place.1 * (1.0 + wrong.scale_y) + arc(place.0, wrong.sagitta),
                 );
                 for (axis, read, nominal) in [(Axis::X, read.0, x), (Axis::Y, read.1, y)] {
                     readings.push(PartReading {
-                        part: "plate".to_owned(),
+                        part: part.to_owned(),
                         feature: format!("{i}{j}"),
                         axis,
                         replicate,
@@ -92,7 +117,7 @@ pub fn plate_turned(wrong: Wrong, noise_um: f64, seed: u64, turn: f64) -> Measur
             }
         }
     }
-    aligned(readings)
+    readings
 }
 
 /// A rod along x of which y and z were measured at one place only, and z at one of x: its turn about y

@@ -70,19 +70,22 @@ pub enum PartDisturbance {
     PartZero(f64),
     /// Standard deviation of each part's own angle, rad.
     PartRotation(f64),
+    /// Standard deviation of each part's own scale.
+    PartTemperature(f64),
     /// The third part lies off by so much along x and half as much along y, um.
     BadPart(f64),
 }
 
 impl PartDisturbance {
     /// The names that [`Self::named`] knows.
-    pub const NAMES: [&'static str; 9] = [
+    pub const NAMES: [&'static str; 10] = [
         "angular-error-times-height",
         "axis-scale",
         "bad-part",
         "datum-offset",
         "datum-rotation",
         "part-rotation",
+        "part-temperature",
         "part-zero",
         "squareness-change",
         "thermal-expansion",
@@ -98,6 +101,7 @@ impl PartDisturbance {
             "datum-offset" => Self::DatumOffset(size),
             "datum-rotation" => Self::DatumRotation(size),
             "part-rotation" => Self::PartRotation(size),
+            "part-temperature" => Self::PartTemperature(size),
             "part-zero" => Self::PartZero(size),
             "squareness-change" => Self::SquarenessChange(size),
             "thermal-expansion" => Self::ThermalExpansion(size),
@@ -138,6 +142,7 @@ impl Lie {
                     lie.shift.y += mm_from_um(um) * normal();
                 }
                 PartDisturbance::PartRotation(angle) => lie.turn += angle * normal(),
+                PartDisturbance::PartTemperature(share) => lie.scale *= 1.0 + share * normal(),
                 PartDisturbance::BadPart(um) if part == 3 => {
                     lie.shift += Position::new(mm_from_um(um), mm_from_um(0.5 * um), 0.0);
                 }

@@ -94,6 +94,7 @@ fn each_effect_moves_the_points_as_it_says() {
             "datum-offset",
             "datum-rotation",
             "part-rotation",
+            "part-temperature",
             "part-zero",
             "squareness-change",
             "thermal-expansion",

@@ -59,7 +59,8 @@ pub struct Args {
     #[arg(long, value_name = "UM", default_value_t = 0.5)]
     noise: f64,
     /// Switch on an effect of the diagnosis's catalogue at a size, in its exact form; may be given
-    /// several times. They act on the parts. Sizes are in um, rad or shares; those of part-zero and part-rotation are standard deviations over the parts.
+    /// several times. They act on the parts. Sizes are in um, rad or shares; those of part-zero, part-rotation and
+    /// part-temperature are standard deviations over the parts.
     #[arg(long = "effect", value_name = "NAME=VALUE")]
     effects: Vec<String>,
     #[command(flatten)]

@@ -7,6 +7,7 @@ mod bad_part;
 mod datum_offset;
 mod datum_rotation;
 mod part_rotation;
+mod part_temperature;
 mod part_zero;
 mod positioning;
 mod scale_by_axis;
@@ -28,6 +29,7 @@ pub(super) fn all() -> Vec<Box<dyn Effect<MeasuredParts>>> {
         Box::new(datum_offset::DatumOffset),
         Box::new(datum_rotation::DatumRotation),
         Box::new(part_rotation::PartRotation),
+        Box::new(part_temperature::PartTemperature),
         Box::new(part_zero::PartZero),
         Box::new(squareness_change::SquarenessChange),
         Box::new(thermal_expansion::ThermalExpansion),
@@ -40,6 +42,7 @@ pub(super) fn of_aligned_parts() -> Vec<Box<dyn Effect<MeasuredParts>>> {
     vec![
         Box::new(angular_error_times_height::AngularErrorTimesHeight),
         Box::new(bad_part::BadPart),
+        Box::new(part_temperature::PartTemperature),
         Box::new(positioning::Positioning),
         Box::new(scale_by_axis::ScaleByAxis),
         Box::new(squareness_change::SquarenessChange),

@@ -282,10 +282,14 @@ def test_a_limit_that_limits_nothing_starts_no_more_threads_than_the_cores_can_u
         threading.Thread(target=watch, daemon=True).start()
         data = errsep.simulate("reversal", seed=1, positions=31)["data"]
         errsep.reversal(data, simultaneous=True, threads=30000)
+        errsep.batch({"id": ["a"], "command": ["straightness"], "data": ["nowhere.csv"]}, jobs=30000)
         print(most <= 40 + 17 * os.cpu_count(), most)
     """
     process = python(script)
-    told = process.communicate(timeout=60)[0]
+    try:
+        told = process.communicate(timeout=60)[0]
+    finally:
+        process.kill()
     assert told.startswith("True"), told
 
 

@@ -72,6 +72,10 @@ def test_tilts_have_what_the_guide_asks_for(answers: dict[str, errsep.Result]) -
         answer.tilts["delta"]
 
 
+def test_a_share_has_no_unit_in_words() -> None:
+    assert errsep.Quantity("scale", 1e-5, 1e-7, "1").words == "(1.000 ± 0.010)e-05"
+
+
 def test_degrees_of_freedom_of_what_is_known_are_infinite() -> None:
     angle = np.linspace(0, 6, 12)
     answer = errsep.circle({"x": 50 * np.cos(angle), "y": 50 * np.sin(angle)}, noise=1.0)

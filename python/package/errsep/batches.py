@@ -106,8 +106,8 @@ def batch(
         Folder of the answers, the same as that of ``errsep batch``. A cluster that is killed loses what
         it was at; called again, the batch goes on. It must be given with a client.
     jobs
-        Campaigns at the same time: in this process, by default as many as there are cores; in a task of a
-        client, by default 1, so that each thread of a worker does one.
+        Campaigns at the same time: in this process, by default as many as there are cores, at most
+        sixteen a core; in a task of a client, by default 1, so that each thread of a worker does one.
     retry_failed
         Try again what failed.
     verify

@@ -48,7 +48,7 @@ def diagnose(
         Those of the model's own command. Parts may come as a list of tables, a part each.
     model
         ``"reversal"``, ``"calibration-line"``, ``"circle"``, ``"four-sensor"``, ``"fourier"``,
-        ``"machine"``, ``"step-diagonal"``; columns and set-up tell where it is absent.
+        ``"machine"``, ``"step-diagonal"``, ``"turning-bar"``; columns and set-up tell where it is absent.
     points
         Points of the parts, for a machine.
     columns

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: Factors to the units that people read.
-_SHOWN = {"rad": (1e6, "µrad"), "um": (1.0, "µm")}
+_SHOWN = {"rad": (1e6, "µrad"), "um": (1.0, "µm"), "1": (1.0, "")}
 
 
 @dataclass(frozen=True)

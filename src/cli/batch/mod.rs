@@ -87,15 +87,20 @@ struct Outcome {
     failed: usize,
 }
 
+/// Campaigns at the same time: as many as there are cores, or what is asked for, at most sixteen a core.
+fn at_once(jobs: Option<usize>) -> usize {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    jobs.map_or(cores, |jobs| jobs.clamp(1, 16 * cores))
+}
+
 /// Works out what is not done yet.
 ///
 /// # Errors
 /// The list is wrong, or the folder cannot be written. A campaign that fails is a row, no error.
 pub fn run(args: &Args) -> Result<Status, Message> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let how = How {
         out: args.out.clone(),
-        jobs: args.jobs.map_or(cores, |n| usize::from(n).min(16 * cores)),
+        jobs: at_once(args.jobs.map(usize::from)),
         retry_failed: args.retry_failed,
         verify: args.verify,
         parquet: args.parquet,

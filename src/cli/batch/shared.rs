@@ -63,7 +63,7 @@ impl Shared {
         begin_record_with(false, in_memory);
         let how = How {
             out: asked.out.clone(),
-            jobs: asked.jobs.max(1),
+            jobs: super::at_once(Some(asked.jobs)),
             retry_failed: asked.retry_failed,
             verify: asked.verify,
             parquet: asked.parquet,

@@ -125,10 +125,9 @@ pub fn in_words(diagnosis: &Diagnosis) -> String {
                 }
             },
             |d| {
-                let (value, unit) = shown(d, &hidden.unit);
                 let least = if hidden.at_least { "at least " } else { "" };
                 let shapes = by_shape(hidden).map_or(String::new(), |range| format!(", {range}"));
-                format!("would show from {least}{} {unit}{shapes}", number(value))
+                format!("would show from {least}{}{shapes}", size(d, &hidden.unit))
             },
         );
         let _ = writeln!(
@@ -150,15 +149,19 @@ pub fn in_words(diagnosis: &Diagnosis) -> String {
 /// How far the size that shows is another for other shapes of an effect, in words.
 pub(super) fn by_shape(hidden: &Hidden) -> Option<String> {
     let shapes = hidden.by_shape.as_ref()?;
-    let (from, unit) = shown(shapes.from, &hidden.unit);
     let others = shapes.to.map_or("at no plausible size".to_owned(), |to| {
-        let (to, own) = shown(to, &hidden.unit);
-        format!("from {} {own}", number(to))
+        format!("from {}", size(to, &hidden.unit))
     });
     Some(format!(
-        "in some shapes from {} {unit} and in others {others}",
-        number(from)
+        "in some shapes from {} and in others {others}",
+        size(shapes.from, &hidden.unit)
     ))
+}
+
+/// A size with its unit, where it has one.
+fn size(value: f64, unit: &str) -> String {
+    let (value, unit) = shown(value, unit);
+    format!("{} {unit}", number(value)).trim_end().to_owned()
 }
 
 /// Of the standard uncertainty of a quantity: by less it has not moved but for rounding.

@@ -14,8 +14,8 @@ impl Effect<MeasuredParts> for ThermalExpansion {
 
     fn about(&self) -> About {
         About {
-            physics: "parts were warmer or colder when made than when measured, which scales all axes alike",
-            confirm: "record the temperature of a part at both times",
+            physics: "parts were warmer or colder when made than when measured, which scales all axes alike, as scales of the axes do that are off alike",
+            confirm: "record the temperature of a part at both times, and of the scales of the axes",
             source: "uniform scale from the datum: (x, y, z)",
         }
     }

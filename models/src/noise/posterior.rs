@@ -21,9 +21,10 @@ const MOST_ROUNDS: usize = 8;
 const NEGLIGIBLE: f64 = 1e-4;
 /// The grid is fine enough when closing in would shorten none of its sides to less than this share.
 const CLOSE: f64 = 0.7;
-/// Greatest share of the correlated part and of the shift: without any white noise the filter's
-/// weights would be infinite.
+/// Greatest share of the correlated part: without any white noise the filter's weights would be infinite.
 const MOST: f64 = 0.999;
+/// Greatest share of the shift, two thousand times the rest.
+const MOST_SHIFT: f64 = 1.0 - 1e-7;
 
 /// A law, its scale left open, that the contrasts allow.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -184,7 +185,7 @@ fn explore(
     let limits = [
         whole(lengths.map(|_| (0.0, MOST))),
         whole(lengths),
-        whole(shift.then_some((0.0, MOST))),
+        whole(shift.then_some((0.0, MOST_SHIFT))),
     ];
     let mut sides = limits;
     for round in 0..MOST_ROUNDS {

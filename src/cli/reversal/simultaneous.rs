@@ -305,8 +305,17 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
     }
 }
 
+/// That repeats were brought to one height.
+pub(super) fn levelled(greatest_um: f64) -> String {
+    format!(
+        "repeats differ as a whole, by up to {} µm from their mean, and some lack readings: they were brought to one height before \
+         the fit, as without that the forms would have steps where a repeat begins or ends",
+        number::plain(greatest_um, 3)
+    )
+}
+
 fn warnings(fit: &Simultaneous, closure: Option<&Closure>, setup: &ReversalSetup) -> Vec<String> {
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<String> = fit.levelled_um.map(levelled).into_iter().collect();
     if fit.agreement.disagree == Some(true) && fit.agreement.missed > 0.0 {
         warnings.push(noise::disagreement(fit.agreement.missed));
     }

@@ -199,8 +199,8 @@ pub fn moved_traces(data: &ReversalData) -> Option<String> {
     let moved = staged::moved(&data.observations)?;
     Some(format!(
         "model and readings disagree: repeats of {} scatter by {} µm, neighbouring readings by {} µm only; \
-         whole traces moved between the repeats, which the model does not have and the uncertainties take \
-         for noise",
+         whole traces drifted between the repeats, by more than their height, which the model does not have and the \
+         uncertainties take for noise",
         moved.channel.name(),
         number::plain(moved.repeats, 3),
         number::plain(moved.neighbours, 3)

@@ -1,7 +1,8 @@
-//! Readings of a channel without what its traces differ by in height and slope.
+//! Readings of a channel without what its traces differ by in height, or in height and slope.
 //!
 //! An indicator that is zeroed before each trace, a lost motion between the directions, and a drift along a trace shift
-//! and tilt whole traces. That is no detail of a form, yet beside it a criterion takes detail for noise.
+//! and tilt whole traces. That is no detail of a form, yet beside it a criterion takes detail for noise; and a mean over
+//! repeats of which one ends before the others has a step.
 
 use super::survey::Survey;
 use super::traces::{self, CellTrace, Group};
@@ -10,9 +11,25 @@ use super::traces::{self, CellTrace, Group};
 const PASSES: usize = 20;
 /// Change of a height, relative to the greatest, at which the passes end.
 const SETTLED: f64 = 1e-6;
-/// Cells that a trace must share with others for a height, and as part of its own for a slope.
+/// Cells that a trace must share with others, and as part of its own.
 const FEWEST_CELLS: usize = 3;
 const SHARED: f64 = 0.5;
+
+/// Variance of the heights of repeats, in that of the mean of independent readings, from which on they stand apart.
+const APART: f64 = 9.0;
+
+/// Readings brought to one height.
+pub struct Levelled {
+    /// By channel, µm.
+    pub values: Vec<Vec<f64>>,
+    /// How many heights were found, less one for each mean, by channel.
+    pub heights: Vec<usize>,
+    /// The greatest height taken out, µm.
+    pub greatest: f64,
+    /// Whether repeats stand apart of which some lack readings: elsewhere heights do not change a mean over repeats but for a
+    /// constant.
+    pub matters: bool,
+}
 
 /// Height, µm, and slope, µm per half the channel's travel, of what a trace lies above the others.
 type Line = [f64; 2];
@@ -36,6 +53,37 @@ impl Survey<'_> {
         )
     }
 
+    /// The readings of every channel less the heights by which the repeats of one direction differ, their mean left.
+    /// `None` where nothing is repeated.
+    pub fn levelled(&self) -> Option<Levelled> {
+        if self.repeats.is_empty() {
+            return None;
+        }
+        let mut level = Levelled {
+            values: self.values.iter().map(|v| v.to_vec()).collect(),
+            heights: vec![0; self.values.len()],
+            greatest: 0.0,
+            matters: false,
+        };
+        for group in &self.repeats {
+            let traces = &self.traces[group.channel];
+            let own = &mut level.values[group.channel];
+            let means = group.means(traces, own);
+            let found = lines(group, None, &means);
+            level.heights[group.channel] += found.iter().flatten().count().saturating_sub(1);
+            let lacking = group.complete().len() < group.positions.len();
+            level.matters |= lacking && stand_apart(&means, &found);
+            for (t, line) in group.traces.iter().zip(found) {
+                let height = line.map_or(0.0, |l| l[0]);
+                level.greatest = level.greatest.max(height.abs());
+                for k in 0..traces[*t].len() {
+                    own[traces[*t].row(k)] -= height;
+                }
+            }
+        }
+        Some(level)
+    }
+
     fn channel_alike(&self, channel: usize) -> Vec<f64> {
         let (x, traces) = (self.x[channel], &self.traces[channel]);
         let mut values = self.values[channel].to_vec();
@@ -46,14 +94,9 @@ impl Survey<'_> {
         let (middle, half) = (0.5 * (first + last), 0.5 * (last - first));
         let along = |x: f64| if half > 0.0 { (x - middle) / half } else { 0.0 };
         let xi: Vec<f64> = group.positions.iter().map(|x| along(*x)).collect();
-        let means: Vec<Vec<(usize, f64)>> = group
-            .traces
-            .iter()
-            .zip(&group.on_cells)
-            .map(|(t, cells)| cell_means(&traces[*t], cells, &values))
-            .collect();
-        let lines = lines(&group, &xi, &means);
+        let lines = lines(&group, Some(&xi), &group.means(traces, &values));
         for (t, line) in group.traces.iter().zip(lines) {
+            let line = line.unwrap_or_default();
             for k in 0..traces[*t].len() {
                 let row = traces[*t].row(k);
                 values[row] -= line[0] + line[1] * along(x[row]);
@@ -63,80 +106,116 @@ impl Survey<'_> {
     }
 }
 
-/// The cells of a trace with the mean of its readings.
-fn cell_means(trace: &traces::Trace, on_cells: &CellTrace, values: &[f64]) -> Vec<(usize, f64)> {
-    let mean = |range: &std::ops::Range<usize>| {
-        range.clone().map(|k| values[trace.row(k)]).sum::<f64>() / range.len() as f64
-    };
-    let cells = on_cells.cells.iter();
-    cells.map(|(cell, range)| (*cell, mean(range))).collect()
+impl Group {
+    /// By trace the cells with the mean of its readings.
+    fn means(&self, traces: &[traces::Trace], values: &[f64]) -> Vec<Vec<(usize, f64)>> {
+        let of = |(t, own): (&usize, &CellTrace)| {
+            let mean = |(cell, range): &(usize, std::ops::Range<usize>)| {
+                let sum: f64 = range.clone().map(|k| values[traces[*t].row(k)]).sum();
+                (*cell, sum / range.len() as f64)
+            };
+            own.cells.iter().map(mean).collect()
+        };
+        self.traces.iter().zip(&self.on_cells).map(of).collect()
+    }
 }
 
-/// By how much each trace lies above what all have in common, found in turns with it.
-fn lines(group: &Group, xi: &[f64], means: &[Vec<(usize, f64)>]) -> Vec<Line> {
+/// By how much each trace lies above what all have in common, found in turns with it; slopes where the cells have a place ξ.
+/// `None` for a trace that shares too few of its cells with others.
+fn lines(group: &Group, xi: Option<&[f64]>, means: &[Vec<(usize, f64)>]) -> Vec<Option<Line>> {
     let mut count = vec![0.0; group.positions.len()];
     for (cell, _) in means.iter().flatten() {
         count[*cell] += 1.0;
     }
-    let shared: Vec<Vec<(usize, f64)>> = means
+    let shared = |own: &Vec<(usize, f64)>| {
+        let shared: Vec<_> = own.iter().copied().filter(|m| count[m.0] > 1.0).collect();
+        let enough =
+            shared.len() >= FEWEST_CELLS && shared.len() as f64 >= SHARED * own.len() as f64;
+        enough.then_some(shared)
+    };
+    let shared: Vec<Option<Vec<(usize, f64)>>> = means.iter().map(shared).collect();
+    let mut of_cell = vec![0.0; count.len()];
+    for (cell, _) in shared.iter().flatten().flatten() {
+        of_cell[*cell] += 1.0;
+    }
+    let xi_of = |cell: usize| xi.map_or(0.0, |xi| xi[cell]);
+    let mut lines: Vec<Option<Line>> = shared
         .iter()
-        .map(|own| own.iter().copied().filter(|m| count[m.0] > 1.0).collect())
+        .map(|s| s.as_ref().map(|_| [0.0; 2]))
         .collect();
-    let mut lines = vec![[0.0; 2]; means.len()];
     for _ in 0..PASSES {
         let mut common = vec![0.0; count.len()];
-        for (own, line) in shared.iter().zip(&lines) {
+        for (own, line) in shared.iter().flatten().zip(lines.iter().flatten()) {
             for (cell, mean) in own {
-                common[*cell] += (mean - line[0] - line[1] * xi[*cell]) / count[*cell];
+                common[*cell] += (mean - line[0] - line[1] * xi_of(*cell)) / of_cell[*cell];
             }
         }
-        let before = lines.clone();
-        for ((line, own), all) in lines.iter_mut().zip(&shared).zip(means) {
-            let above = own
-                .iter()
-                .map(|(cell, mean)| (xi[*cell], mean - common[*cell]));
-            *line = fitted(&above.collect::<Vec<_>>(), all.len());
+        let mut next: Vec<Line> = shared
+            .iter()
+            .flatten()
+            .map(|own| {
+                let above = own
+                    .iter()
+                    .map(|(cell, mean)| (xi_of(*cell), mean - common[*cell]));
+                fitted(&above.collect::<Vec<_>>())
+            })
+            .collect();
+        let n = next.len() as f64;
+        let mean = [0, 1].map(|j| next.iter().map(|l| l[j]).sum::<f64>() / n);
+        let (mut moved, mut greatest) = (0.0_f64, 0.0_f64);
+        for (line, before) in next.iter_mut().zip(lines.iter_mut().flatten()) {
+            for j in 0..2 {
+                line[j] -= mean[j];
+                moved = moved.max((line[j] - before[j]).abs());
+                greatest = greatest.max(line[j].abs());
+            }
+            *before = *line;
         }
-        let n = lines.len() as f64;
-        let mean = [0, 1].map(|j| lines.iter().map(|l| l[j]).sum::<f64>() / n);
-        for line in &mut lines {
-            line[0] -= mean[0];
-            line[1] -= mean[1];
-        }
-        let greatest =
-            |all: &mut dyn Iterator<Item = f64>| all.fold(0.0, |m: f64, v| m.max(v.abs()));
-        let moved = greatest(
-            &mut lines
-                .iter()
-                .zip(&before)
-                .flat_map(|(a, b)| [a[0] - b[0], a[1] - b[1]]),
-        );
-        if moved <= SETTLED * greatest(&mut lines.iter().flatten().copied()) {
+        if moved <= SETTLED * greatest {
             break;
         }
     }
     lines
 }
 
-/// The least-squares line; without slope where it covers little of a trace.
-fn fitted(points: &[(f64, f64)], whole: usize) -> Line {
-    if points.len() < FEWEST_CELLS {
-        return [0.0; 2];
+/// Whether heights differ by more than readings independent of each other would let them.
+fn stand_apart(means: &[Vec<(usize, f64)>], heights: &[Option<Line>]) -> bool {
+    let cells = 1 + means.iter().flatten().map(|m| m.0).max().unwrap_or(0);
+    let level = || {
+        let pairs = means.iter().zip(heights);
+        pairs.filter_map(|(own, line)| line.map(|l| (own, l[0])))
+    };
+    let (mut sum, mut count) = (vec![0.0; cells], vec![0.0; cells]);
+    for (own, height) in level() {
+        for (cell, mean) in own {
+            sum[*cell] += mean - height;
+            count[*cell] += 1.0;
+        }
     }
+    let (mut squares, mut freedom, mut above) = (0.0, 0.0, 0.0);
+    for (own, height) in level() {
+        for (cell, mean) in own {
+            squares += (mean - height - sum[*cell] / count[*cell]).powi(2);
+        }
+        freedom += own.len() as f64;
+        above += own.len() as f64 * height * height;
+    }
+    let traces = level().count() as f64;
+    freedom -= count.iter().filter(|c| **c > 0.0).count() as f64 + traces - 1.0;
+    freedom > 0.0 && above * freedom > APART * (traces - 1.0) * squares
+}
+
+/// The least-squares line; the mean where all places are one.
+fn fitted(points: &[(f64, f64)]) -> Line {
     let n = points.len() as f64;
-    let [x, y] = [
-        points.iter().map(|p| p.0).sum::<f64>() / n,
-        points.iter().map(|p| p.1).sum::<f64>() / n,
-    ];
+    let x = points.iter().map(|p| p.0).sum::<f64>() / n;
+    let y = points.iter().map(|p| p.1).sum::<f64>() / n;
     let (mut product, mut spread) = (0.0, 0.0);
     for p in points {
         product += (p.0 - x) * (p.1 - y);
         spread += (p.0 - x) * (p.0 - x);
     }
-    let slope = match n >= SHARED * whole as f64 && spread > 0.0 {
-        true => product / spread,
-        false => 0.0,
-    };
+    let slope = if spread > 0.0 { product / spread } else { 0.0 };
     [y - slope * x, slope]
 }
 

@@ -6,7 +6,7 @@ use errsep_solvers::linear::bordered::BorderedCovariance;
 use errsep_solvers::loss::Loss;
 use errsep_solvers::structured::{Parameters, StructuredFit, fit_structured};
 
-use super::determined::Determined;
+use super::determined::{Determined, Zero};
 use super::error::DesignFitError;
 use super::ground::Ground;
 use super::knots;
@@ -36,20 +36,23 @@ pub fn fit(
 ) -> Result<DesignFit, DesignFitError> {
     let began = Instant::now();
     options.check(observations)?;
-    let traces = Trace::sort(observations);
+    let read = Trace::sort(observations);
     let determined = Determined::of(&observations.design, options.zero);
+    // Zeros that are kept are told, and their repeats say how well.
+    let kept = options.zero == Zero::Kept;
+    let level = Survey::new(&read, |i| observations.taken(i)).levelled();
+    let level = level.filter(|level| level.matters && !kept);
+    let greatest = level.as_ref().map(|level| level.greatest);
+    let traces = level.map_or_else(|| read.clone(), |level| with_values(&read, level.values));
     let survey = Survey::new(&traces, |i| observations.taken(i));
     let mut sigmas = survey.first_noise(options.noise);
     let weights = weights_of(&sigmas);
     let ground = Ground::new(&observations.design, &determined, &traces, weights, options)?;
     let chosen = matches!(options.knots, Knots::Chosen);
-    let alike = chosen.then(|| survey.alike()).flatten().map(|values| {
-        let of = |(trace, value): (&Trace, _)| Trace {
-            value,
-            ..trace.clone()
-        };
-        traces.iter().zip(values).map(of).collect::<Vec<_>>()
-    });
+    let alike = chosen
+        .then(|| survey.alike())
+        .flatten()
+        .map(|values| with_values(&traces, values));
     let chosen = match &alike {
         None => knots::breaks(&ground)?,
         // Lines by which traces of a channel differ are no detail of a form.
@@ -83,8 +86,25 @@ pub fn fit(
         finer: chosen.forms,
     };
     let mut solution = DesignFit::new(observations, determined.clone(), reached);
+    if greatest.is_some() {
+        for (read, level) in read.iter().zip(&traces) {
+            let heights = read.value.iter().zip(&level.value).map(|(r, l)| r - l);
+            for (i, height) in read.source.iter().zip(heights) {
+                solution.residuals[*i] += height;
+            }
+        }
+    }
+    solution.levelled_um = greatest;
     solution.convergence.seconds = began.elapsed().as_secs_f64();
     Ok(solution)
+}
+
+fn with_values(traces: &[Trace], values: Vec<Vec<f64>>) -> Vec<Trace> {
+    let of = |(trace, value): (&Trace, _)| Trace {
+        value,
+        ..trace.clone()
+    };
+    traces.iter().zip(values).map(of).collect()
 }
 
 /// The fit has no answer: how it ended, and where.

@@ -64,6 +64,8 @@ pub struct DesignFit {
     pub degrees_of_freedom: f64,
     /// Reading less model, µm, in the order of the observations.
     pub residuals: Vec<f64>,
+    /// The greatest height taken out of a trace, µm, where repeats that stand apart were brought to one height for the fit.
+    pub levelled_um: Option<f64>,
     /// The same by channel.
     pub by_channel: Vec<ChannelResiduals>,
     /// Combinations of channels that are zero whatever the forms are.
@@ -144,6 +146,7 @@ impl DesignFit {
             agreement: told.agreement,
             degrees_of_freedom: readings as f64 - problem.layout.free_count() as f64,
             residuals,
+            levelled_um: None,
             by_channel,
             knots: reached.knots,
             convergence: DesignConvergence {

@@ -38,19 +38,17 @@ use crate::units::mm_from_um;
 pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneous, ReversalError> {
     let began = Instant::now();
     check(observations, options)?;
-    let channels = ChannelReadings::sort(observations);
-    let survey = Survey::new(&channels, |i| observations.taken(i));
+    let read = ChannelReadings::sort(observations);
+    let level = level(&read, observations, options);
+    let channels = level.as_ref().map_or(&read, |l| &l.0);
+    let survey = Survey::new(channels, |i| observations.taken(i));
     let sigmas = survey.first_noise(options.noise);
     let chosen = matches!(options.knots, Knots::Chosen);
-    let alike = chosen.then(|| survey.alike()).flatten().map(|values| {
-        let pairs = channels.iter().zip(values);
-        let of = |(channel, value): (&ChannelReadings, _)| ChannelReadings {
-            value,
-            ..channel.clone()
-        };
-        pairs.map(of).collect::<Vec<_>>()
-    });
-    let both = [&channels[..], alike.as_deref().unwrap_or(&channels)];
+    let alike = chosen
+        .then(|| survey.alike())
+        .flatten()
+        .map(|values| with_values(channels, values));
+    let both = [&channels[..], alike.as_deref().unwrap_or(channels)];
     let ground = Ground::new(observations, options, both, weights_of(&sigmas))?;
     let mut solution = if options.effects.is_empty() {
         solve(&ground, &survey, sigmas, None)?
@@ -68,8 +66,40 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         solution.times_assumed = !setting.timed && asks_for_time(options);
         solution
     };
+    if let Some((level, greatest)) = level {
+        for (read, level) in read.iter().zip(&level) {
+            let heights = read.value.iter().zip(&level.value).map(|(r, l)| r - l);
+            for (i, height) in read.source.iter().zip(heights) {
+                solution.residuals[*i as usize] += height;
+            }
+        }
+        solution.levelled_um = Some(greatest);
+    }
     solution.convergence.seconds = began.elapsed().as_secs_f64();
     Ok(solution)
+}
+
+/// The readings with repeats brought to one height, and the greatest height, µm, where that changes the forms: a mean over repeats
+/// of which one ends before the others would have a step. Effects know readings as they are.
+fn level(
+    read: &[ChannelReadings],
+    observations: &Observations,
+    options: &Options,
+) -> Option<(Vec<ChannelReadings>, f64)> {
+    if !options.effects.is_empty() {
+        return None;
+    }
+    let level = Survey::new(read, |i| observations.taken(i)).levelled();
+    let level = level.filter(|level| level.matters)?;
+    Some((with_values(read, level.values), level.greatest))
+}
+
+fn with_values(channels: &[ChannelReadings], values: Vec<Vec<f64>>) -> Vec<ChannelReadings> {
+    let of = |(channel, value): (&ChannelReadings, _)| ChannelReadings {
+        value,
+        ..channel.clone()
+    };
+    channels.iter().zip(values).map(of).collect()
 }
 
 /// Whether any effect goes by the time of the readings.
@@ -178,6 +208,7 @@ fn assemble(
         effects: Vec::new(),
         effect_changes: Vec::new(),
         times_assumed: false,
+        levelled_um: None,
         joined: joined.map(|m| (m.name, Arc::clone(&m.effect))).collect(),
         knots,
         convergence: Convergence {

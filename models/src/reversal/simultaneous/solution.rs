@@ -176,6 +176,8 @@ pub struct Simultaneous {
     /// Whether an effect goes by time though not every reading has one: they are taken to follow each
     /// other evenly.
     pub times_assumed: bool,
+    /// The greatest height taken out of a trace, µm, where repeats that stand apart were brought to one height for the fit.
+    pub levelled_um: Option<f64>,
     pub(super) joined: Vec<(&'static str, Arc<dyn JoinedEffect>)>,
     /// The knots.
     pub knots: FittedKnots,

@@ -198,10 +198,7 @@ const MOST: f64 = std::f64::consts::FRAC_PI_4;
 /// [`NoSolution`] says what is missing.
 pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, NoSolution> {
     check(observations, options)?;
-    let traces = Channel::ALL
-        .into_iter()
-        .filter_map(|c| Trace::of(observations, c))
-        .collect::<Vec<_>>();
+    let traces = Trace::all(observations);
     let channels: Vec<Channel> = traces.iter().map(|t| t.channel).collect();
     let designs = Designs::of(&channels);
     let first = fit_lines(&traces)?;

@@ -57,7 +57,7 @@ impl Noise {
     }
 }
 
-/// A channel whose traces moved as a whole between their repeats.
+/// A channel whose traces drifted apart between their repeats, by more than their height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moved {
     /// Which channel.
@@ -70,22 +70,22 @@ pub struct Moved {
     pub p_value: f64,
 }
 
-/// The channel whose repeats differ most clearly by more than its neighbouring readings do, which
+/// The channel whose repeats, brought to one height, differ most clearly by more than its neighbouring readings do, which
 /// independent noise has alike. Channels are compared each with itself: their noise may differ.
 pub fn moved(observations: &Observations) -> Option<Moved> {
-    let channels = observations.channels();
-    let of = |channel: &Channel| {
-        let trace = [Trace::of(observations, *channel)?];
-        let (repeats, neighbours) = (from_repeats(&trace)?, from_neighbours(&trace)?);
-        let p_value = channels.len() as f64 * neighbours.exceeded_by(&repeats)?.p_value;
+    let traces = Trace::all(observations);
+    let of = |trace: &Trace| {
+        let trace = std::slice::from_ref(trace);
+        let (repeats, neighbours) = (from_repeats(trace)?, from_neighbours(trace)?);
+        let p_value = traces.len() as f64 * neighbours.exceeded_by(&repeats)?.p_value;
         (p_value < TOLD_BELOW).then_some(Moved {
-            channel: *channel,
+            channel: trace[0].channel,
             repeats: repeats.sigma,
             neighbours: neighbours.sigma,
             p_value,
         })
     };
-    let all = channels.iter().filter_map(of);
+    let all = traces.iter().filter_map(of);
     all.min_by(|a, b| a.p_value.total_cmp(&b.p_value))
 }
 

@@ -1,5 +1,7 @@
 //! One trace a channel: the mean reading at each position over repeats and directions.
 
+use crate::reversal::channel_noise::survey::Survey;
+use crate::reversal::simultaneous::ChannelReadings;
 use crate::reversal::{Channel, Direction, Observations};
 
 /// The mean readings of a channel at its positions, in growing order of position.
@@ -26,6 +28,31 @@ pub struct Trace {
 const SAME_PLACE: f64 = 1e-9;
 
 impl Trace {
+    /// The traces of all channels that were read; repeats of one direction that differ as a whole are brought to their
+    /// common height before.
+    pub fn all(observations: &Observations) -> Vec<Self> {
+        let channels = ChannelReadings::sort(observations);
+        let survey = Survey::new(&channels, |i| observations.taken(i));
+        let Some(level) = survey.levelled() else {
+            let of = channels
+                .iter()
+                .filter_map(|c| Self::of(observations, c.channel));
+            return of.collect();
+        };
+        let mut brought = observations.clone();
+        for (channel, values) in channels.iter().zip(level.values) {
+            for (i, value) in channel.source.iter().zip(values) {
+                brought.readings[*i as usize].value = value;
+            }
+        }
+        let of = |(channel, heights): (&ChannelReadings, usize)| {
+            let mut trace = Self::of(&brought, channel.channel)?;
+            trace.scatter_freedom = trace.scatter_freedom.saturating_sub(heights);
+            Some(trace)
+        };
+        channels.iter().zip(level.heights).filter_map(of).collect()
+    }
+
     /// The trace of one channel, or `None` where it has no reading.
     pub fn of(observations: &Observations, channel: Channel) -> Option<Self> {
         let mut readings = observations

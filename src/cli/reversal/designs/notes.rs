@@ -100,6 +100,10 @@ pub(super) fn warnings(
     options: &DesignOptions,
 ) -> Vec<String> {
     let mut warnings = presumed(fit, setup);
+    warnings.extend(
+        fit.levelled_um
+            .map(crate::cli::reversal::simultaneous::levelled),
+    );
     if !data.not_read.is_empty() {
         let names = data.not_read.join(", ");
         warnings.push(format!("channels of the set-up without a reading: {names}"));

@@ -23,6 +23,7 @@ mod machine;
 mod measured_reversals;
 mod packaging;
 mod parts_of_nistir;
+mod plan;
 mod plan_of_designs;
 mod plates;
 mod plates_named;

@@ -16,6 +16,7 @@ mod pairs;
 #[path = "../plate/mod.rs"]
 mod plate;
 mod plates;
+mod pontius;
 mod positions;
 #[path = "../realisations/mod.rs"]
 mod realisations;
@@ -28,4 +29,5 @@ mod sealing;
 mod several_ways;
 mod severity;
 mod single_effects;
+mod sizes;
 mod together;

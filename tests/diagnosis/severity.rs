@@ -3,7 +3,8 @@
 
 use errsep::diagnosis::{Confidence, Diagnosis, Options, agreement, diagnose};
 
-use crate::other_models::{MAKERS, Maker, calibration_line_made, seen_from};
+use crate::models::seen;
+use crate::other_models::{MAKERS, Maker, calibration_line_made};
 
 fn options(severity: usize) -> Options {
     Options {
@@ -29,7 +30,7 @@ fn calibration_line() -> &'static Maker {
 
 /// Four sets with a drift of a number of times the smallest that is seen.
 fn drifting(times: f64) -> [(&'static str, f64); 1] {
-    let smallest = seen_from(calibration_line(), "drift", &options(0));
+    let smallest = seen(calibration_line(), "drift");
     [("drift", times * smallest)]
 }
 
@@ -38,6 +39,25 @@ fn only(diagnosis: &Diagnosis) -> &errsep::diagnosis::Severity {
         [only] => only,
         several => panic!("{several:?}: {}", diagnosis.verdict.statement),
     }
+}
+
+/// With its rivals, the first measurement in which an effect that the catalogue lacks is taken for another; which that is
+/// tells a diagnosis without them.
+fn taken_for(
+    maker: &Maker,
+    put: &[(&str, f64); 1],
+    name: &str,
+    mut seeds: std::ops::Range<u64>,
+) -> Option<Diagnosis> {
+    let lacking = |severity| Options {
+        without: vec![put[0].0.to_owned()],
+        ..options(severity)
+    };
+    let seed = seeds.find(|seed| {
+        let verdict = maker.diagnosed(put, *seed, &lacking(0)).verdict;
+        verdict.causes() == [[name]]
+    });
+    seed.map(|seed| maker.diagnosed(put, seed, &lacking(256)))
 }
 
 #[test]
@@ -119,7 +139,7 @@ fn any_number_of_threads_gives_the_same_severity() {
 fn what_reads_the_same_has_no_rival_along_the_reading() {
     let mut makers = MAKERS.iter();
     let circle = makers.find(|m| m.model == "circle").unwrap();
-    let smallest = seen_from(circle, "lobes", &options(0));
+    let smallest = seen(circle, "lobes");
     let diagnosis = circle.diagnosed(&[("lobes", 4.0 * smallest)], 3, &options(64));
     let severity = only(&diagnosis);
     assert_eq!(severity.effect, "lobes");
@@ -134,24 +154,16 @@ fn what_reads_the_same_has_no_rival_along_the_reading() {
 #[test]
 fn a_drift_that_is_a_jump_is_weak_and_a_jump_is_strong() {
     let line = calibration_line();
-    let size = 3.0 * seen_from(line, "zero-jump", &options(0));
+    let size = 3.0 * seen(line, "zero-jump");
     let known = line.diagnosed(&[("zero-jump", size)], 3, &options(256));
     let severity = only(&known);
     assert_eq!(severity.effect, "zero-jump");
     assert_eq!(severity.confidence, Confidence::Strong, "{severity:?}");
 
-    let lacking = Options {
-        without: vec!["zero-jump".to_owned()],
-        ..options(256)
-    };
-    let mut taken = (2..12).map(|seed| line.diagnosed(&[("zero-jump", size)], seed, &lacking));
-    let named = taken.find(|diagnosis| diagnosis.verdict.causes() == [["drift"]]);
-    let severity = only(
-        named
-            .as_ref()
-            .expect("one of ten jumps is taken for a drift"),
-    )
-    .clone();
+    let put = [("zero-jump", size)];
+    let taken = taken_for(line, &put, "drift", 2..12);
+    let diagnosis = taken.expect("one of ten jumps is taken for a drift");
+    let severity = only(&diagnosis);
     assert_eq!(severity.confidence, Confidence::Weak);
     let steps = severity.rivals.iter().find(|r| r.name == "step in time");
     // Quantile: the share of a family from which on a name is weak.
@@ -188,16 +200,11 @@ fn a_name_for_what_the_catalogue_lacks_is_weak_by_what_the_model_knows() {
             "in proportion to the load",
         ),
     ];
-    for (model, effect, taken_for, along) in cases {
+    for (model, effect, name, along) in cases {
         let maker = MAKERS.iter().find(|m| m.model == model).unwrap();
-        let size = 2.0 * seen_from(maker, effect, &options(0));
-        let lacking = Options {
-            without: vec![effect.to_owned()],
-            ..options(256)
-        };
-        let mut taken = (2..22).map(|seed| maker.diagnosed(&[(effect, size)], seed, &lacking));
-        let named = taken.find(|diagnosis| diagnosis.verdict.causes() == [[taken_for]]);
-        let diagnosis = named.unwrap_or_else(|| panic!("{effect} is never taken for {taken_for}"));
+        let size = 2.0 * seen(maker, effect);
+        let taken = taken_for(maker, &[(effect, size)], name, 2..22);
+        let diagnosis = taken.unwrap_or_else(|| panic!("{effect} is never taken for {name}"));
         let severity = only(&diagnosis);
         assert_eq!(
             severity.confidence,
@@ -218,7 +225,7 @@ fn a_name_for_what_the_catalogue_lacks_is_weak_by_what_the_model_knows() {
 #[test]
 fn of_several_names_none_is_strong() {
     let line = calibration_line();
-    let smallest = |effect: &str| seen_from(line, effect, &options(0));
+    let smallest = |effect: &str| seen(line, effect);
     let put = [
         ("drift", 6.0 * smallest("drift")),
         ("quadratic", 6.0 * smallest("quadratic")),
@@ -259,7 +266,7 @@ fn a_name_that_leaves_something_is_weak() {
         without: bends.map(str::to_owned).to_vec(),
         ..options(256)
     };
-    let smallest = |effect: &str| seen_from(line, effect, &options(0));
+    let smallest = |effect: &str| seen(line, effect);
     let (drift, bend) = (6.0 * smallest("drift"), smallest("quadratic"));
     let with = |times: f64| {
         let put = [("drift", drift), ("quadratic", times * bend)];

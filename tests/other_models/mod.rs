@@ -309,9 +309,13 @@ pub fn seen_from(maker: &Maker, effect: &str, options: &Options) -> f64 {
 
 /// What data without an effect tell of it.
 pub fn told_of(maker: &Maker, effect: &str, options: &Options) -> Hidden {
-    let bare = maker.diagnosed(&[], 1, options);
-    let own = bare.hidden.into_iter().find(|h| h.effect == effect);
-    own.unwrap_or_else(|| panic!("{} shows {effect} with nothing there", maker.model))
+    told_by(&maker.diagnosed(&[], 1, options), effect)
+}
+
+/// What a diagnosis of data without an effect tells of it.
+pub fn told_by(bare: &Diagnosis, effect: &str) -> Hidden {
+    let own = bare.hidden.iter().find(|h| h.effect == effect).cloned();
+    own.unwrap_or_else(|| panic!("{effect} shows with nothing there"))
 }
 
 /// A verdict in one word against what was put in.

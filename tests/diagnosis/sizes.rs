@@ -1,0 +1,169 @@
+//! The size from which an effect is seen, as data without it tell it, and the moment of one that begins within a pass.
+
+use errsep::diagnosis::{Kind, diagnose};
+use errsep_models::circle::{self, CirclePoints, CircleSimulation, Point};
+use errsep_models::model::FittedModel;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::models::{maker, options, told};
+
+/// In the smallest size that readings are said to show with 80 % an effect is seen in as many. k·u: of 60, 48 are
+/// expected, with a standard deviation of 3.1; three of them either way.
+#[test]
+fn what_is_put_in_at_the_size_told_is_seen_in_four_cases_of_five() {
+    for (model, effect) in [("calibration-line", "cubic"), ("circle", "ovality")] {
+        let maker = maker(model);
+        let seen = (300..360).filter(|seed| {
+            let bare = maker.diagnosed(&[], *seed, &options(&[]));
+            // Readings that show it with nothing there, one in a hundred, tell no size.
+            let own = bare.hidden.iter().find(|h| h.effect == effect);
+            own.is_some_and(|own| {
+                let put = [(effect, own.detectable.unwrap())];
+                let with = maker.diagnosed(&put, *seed, &options(&[]));
+                with.verdict.kind != Kind::None
+            })
+        });
+        let seen = seen.count();
+        assert!((39..=57).contains(&seen), "{model} {effect}: {seen} of 60");
+    }
+}
+
+/// The greatest of the sizes by shape holds for a shape that shows badly: the maker's drift of a line fades with three
+/// tenths of the duration. k·u: 16 of 20 expected at the least at a size that is seen with 80 %; 12 is more
+/// than two standard deviations below. A drift of a laser does not show at all where it is soon over; what has one
+/// shape tells none.
+#[test]
+fn sizes_by_shape_hold_shapes_that_show_badly() {
+    let line = maker("calibration-line");
+    let drift = told(line, "drift");
+    let shapes = drift.by_shape.expect("shapes of a drift are not alike");
+    let greatest = shapes.to.expect("a plausible size");
+    let middling = drift.detectable.unwrap();
+    assert!(shapes.from <= middling && middling < greatest, "{drift:?}");
+    let seen = (400..420).filter(|seed| {
+        let diagnosis = line.diagnosed(&[("drift", greatest)], *seed, &options(&[]));
+        diagnosis.verdict.kind != Kind::None
+    });
+    let seen = seen.count();
+    assert!(seen >= 12, "{seen} of 20 at {greatest}");
+
+    let of = |model, effect| told(maker(model), effect).by_shape;
+    assert_eq!(of("step-diagonal", "drift").unwrap().to, None);
+    assert_eq!(of("circle", "ovality"), None);
+}
+
+/// What differs from repeat to repeat is taken for noise in part, and its size told as the least; what is the same in
+/// all is not, nor is noise that is stated swollen by anything.
+#[test]
+fn a_size_is_told_as_the_least_where_repeats_differ_by_it() {
+    let circle = maker("circle");
+    for (effect, differs) in [
+        ("part-moved", true),
+        ("zero-jump", true),
+        ("lobes", false),
+        ("ovality", false),
+    ] {
+        let told = told(circle, effect);
+        assert_eq!(told.at_least, differs, "{effect}");
+    }
+    let points = circle_points(4);
+    let stated = diagnose(
+        &CirclePoints::new(&points, Some(1.0)).unwrap(),
+        &options(&[]),
+    );
+    assert!(stated.hidden.iter().any(|h| h.detectable.is_some()));
+    assert!(stated.hidden.iter().all(|h| !h.at_least));
+}
+
+/// A part that slips in its clamping in the middle of a pass, and stays there, has moved; from a drift of the centre and
+/// from a pass that lies otherwise it is told, and what it does to the later passes does not pass for noise. k·u: four, of
+/// a normal law, and a reading for the moment. The noise is that of the same points without the slip, but for what is left
+/// of it by sizes known to 0.19 µm; where it passes for noise a part of 1 µm or more is correlated.
+#[test]
+fn a_part_that_slips_within_a_pass_is_told_with_its_moment() {
+    let mut points = circle_points(4);
+    for (point, _) in points.iter_mut().skip(100) {
+        point.x += 12e-3;
+        point.y -= 16e-3;
+    }
+    let model = CirclePoints::new(&points, None).unwrap();
+    // Passes are cut open where they began.
+    for pass in model.traces() {
+        assert!(model.places()[pass.clone()].is_sorted_by_key(|place| place.time));
+    }
+    let found = diagnose(&model, &options(&[]));
+    let verdict = &found.verdict;
+    assert_eq!(verdict.effects, ["part-moved"], "{}", verdict.statement);
+    let own = found.candidates.iter().find(|a| a.effect == "part-moved");
+    let told = |name: &str| {
+        let estimates = &own.unwrap().parameters;
+        estimates.iter().find(|e| e.name == name).unwrap()
+    };
+    for (name, true_value) in [("along-x", 12.0), ("along-y", -16.0)] {
+        let size = told(name);
+        assert!((size.value - true_value).abs() < 4.0 * size.std, "{size:?}");
+        assert!(size.std < 0.5, "{size:?}");
+    }
+    assert!(
+        (told("time").value - 99.5).abs() < 1.0,
+        "{:?}",
+        told("time")
+    );
+    let bare = CirclePoints::new(&circle_points(4), None).unwrap();
+    let bare = diagnose(&bare, &options(&[])).noise;
+    for (with, without) in [
+        (found.noise.white, bare.white),
+        (found.noise.correlated, bare.correlated),
+    ] {
+        assert!((with - without).abs() < 0.2, "{with} {without}");
+    }
+}
+
+/// *k·u*, two: of a part that slips at a moment and in a direction at random the moment lies within twice its printed
+/// uncertainty. Of thirty at 95 % fewer than 26 do in one case of a hundred; the spacing of the points alone held 19 of 28.
+#[test]
+fn the_moment_of_a_slip_is_as_sure_as_it_is_told() {
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let mut told = Vec::new();
+    for seed in 0..30 {
+        let mut points = circle_points_of(4, 1000 * (seed + 1));
+        let first = random.random_range(60..228);
+        let along = random.random_range(0.0..std::f64::consts::TAU);
+        for (point, _) in points.iter_mut().skip(first) {
+            point.x += 5e-3 * along.cos();
+            point.y += 5e-3 * along.sin();
+        }
+        let found = diagnose(&CirclePoints::new(&points, None).unwrap(), &options(&[]));
+        if found.verdict.effects != ["part-moved"] {
+            continue;
+        }
+        let own = found.candidates.iter().find(|c| c.effect == "part-moved");
+        let moment = own.and_then(|c| c.parameters.iter().find(|p| p.name == "time"));
+        told.extend(moment.map(|m| (m.value - (first as f64 - 0.5)).abs() <= 2.0 * m.std));
+    }
+    let within = told.iter().filter(|within| **within).count();
+    assert!(told.len() >= 24, "{} of 30 named", told.len());
+    assert!(within + 4 >= told.len(), "{within} of {}", told.len());
+}
+
+/// Passes of 72 points with 1 µm of noise.
+fn circle_points(passes: usize) -> Vec<(Point, u32)> {
+    circle_points_of(passes, 0)
+}
+
+/// The same of another seed.
+fn circle_points_of(passes: usize, seed: u64) -> Vec<(Point, u32)> {
+    let what = |pass| CircleSimulation {
+        count: 72,
+        noise_um: 1.0,
+        pass: (pass, passes),
+        ..CircleSimulation::default()
+    };
+    (0..passes)
+        .flat_map(|pass| {
+            let points = circle::simulate_disturbed(&what(pass), &[], seed + pass as u64).unwrap();
+            points.into_iter().map(move |p| (p, pass as u32 + 1))
+        })
+        .collect()
+}

@@ -177,6 +177,20 @@ fn several_plates_are_diagnosed_from_a_file_each() {
     );
 }
 
+/// *Limit*: up to 0.02 rad it is told along which axis an error acts; beyond, a plate is refused with its turn.
+#[test]
+fn a_plate_that_lies_turned_by_too_much_is_refused() {
+    let folder = Folder::with(&[("machine.toml", MACHINE), ("points.csv", &points())]);
+    let asked = "diagnose plate.csv --setup machine.toml --points points.csv";
+    let asked: Vec<&str> = asked.split(' ').collect();
+    folder.write("plate.csv", &tidy(&[("plate", 0.019)], ""));
+    let out = run(&folder, &asked);
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    folder.write("plate.csv", &tidy(&[("plate", 0.025)], ""));
+    let told = "part plate lies turned by 0.0250 rad against its nominal coordinates";
+    bad_input(&folder, &asked, &[told, "beyond 0.02 rad"]);
+}
+
 #[test]
 fn what_is_wrong_with_a_table_is_told_where() {
     let table = |rows: &str| format!("Report 7\n\nPoint  X nom  Y nom  X act  Y act\n{rows}");

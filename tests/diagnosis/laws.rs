@@ -183,6 +183,28 @@ fn what_is_no_law_is_not_told() {
     }
 }
 
+/// Beside a drift lies a lag that begins anew in each pass: it comes back along the travel, is no noise, and would excuse what
+/// the law leaves. Without it the same law is told.
+#[test]
+fn a_law_beside_what_is_no_noise_is_refused() {
+    let drifting = |lag: f64| {
+        reversal(3, move |p| {
+            let pass = f64::from(p.repeat) + 0.3 * p.direction + 0.17 * p.channel as f64;
+            let begun = 2.0 * std::f64::consts::PI * (p.x / 21.0 + 0.618 * 7.0 * pass);
+            let drift = match p.channel {
+                1 => 1.8 * (1.0 - (-p.time / 400.0).exp()),
+                _ => 0.0,
+            };
+            drift + lag * begun.sin()
+        })
+    };
+    assert_eq!(told(&drifting(0.0)).terms.len(), 1);
+    match law(&drifting(0.12), &options(), 0) {
+        Ok(LawFound::None(none)) => assert!(none.why.contains("is no noise"), "{none:?}"),
+        other => panic!("{other:?}"),
+    }
+}
+
 /// Where there is no law it is told how often one of that size would have been found: often if it is great, seldom if
 /// it is small.
 #[test]

@@ -2,7 +2,7 @@
 
 use errsep::diagnosis::{Kind, Options, diagnose};
 
-use crate::plate::{EXPANSION, Wrong, line, plate, plate_turned, warm_plates};
+use crate::plate::{EXPANSION, Wrong, line, plate, plate_turned, plates_read_to, warm_plates};
 
 fn options() -> Options {
     Options {
@@ -72,6 +72,20 @@ fn a_turned_plate_is_no_gap_and_hides_none() {
         };
         let found = diagnose(&plate_turned(scaled, 0.3, 5, turn), &options());
         assert_eq!(found.verdict.effects, ["scale-by-axis"], "{turn}");
+    }
+}
+
+/// *Definition* (GUM F.2.2.1): plates of which every repeat agrees to the last digit are no surer than that, also where they
+/// lie turned, which gives what is left of their readings other decimals; nothing is named. Tolerance: rounding.
+#[test]
+fn plates_that_repeat_to_the_last_digit_are_no_surer_than_it() {
+    for turn in [0.0, 3e-3] {
+        let found = diagnose(&plates_read_to(0.1, turn), &options());
+        let least = 0.1 / 12f64.sqrt();
+        let noise = found.noise.white;
+        assert!(noise >= least * (1.0 - 1e-9), "{turn}: {noise}");
+        let said = &found.verdict.statement;
+        assert!(found.verdict.effects.is_empty(), "{turn}: {said}");
     }
 }
 

@@ -82,6 +82,24 @@ pub fn warm_plates(wrong: Wrong, kelvins: &[f64], noise_um: f64, seed: u64) -> M
     aligned(plates.collect())
 }
 
+/// Two plates without noise, turned by so many rad, read to a step: their repeats agree to its last digit.
+pub fn plates_read_to(step_um: f64, turn: f64) -> MeasuredParts {
+    let of = |(name, seed): (&str, u64)| {
+        let readings = measured(Wrong::default(), 0.0, seed, turn, (name, 0.0)).into_iter();
+        let to_step = readings.map(|r| PartReading {
+            value: (r.value / step_um).round() * step_um,
+            ..r
+        });
+        to_step.collect::<Vec<_>>()
+    };
+    aligned(
+        [("first", 5), ("second", 7)]
+            .into_iter()
+            .flat_map(of)
+            .collect(),
+    )
+}
+
 /// The readings of one plate that lies turned by so many rad: its name, and by how many kelvins it is warm.
 fn measured(
     wrong: Wrong,

@@ -2,6 +2,7 @@
 
 mod bands;
 mod effects;
+mod few_positions;
 mod minimum;
 mod noise;
 mod plan;

@@ -1,7 +1,10 @@
 //! A gap told as a law, on a few machines; many are in `campaigns/law`.
 
 use errsep::diagnosis::{Law, LawFound, Options, Tabulated, TabulatedEffects, diagnose_with, law};
+use std::f64::consts::PI;
+
 use errsep_models::calibration_line::CalibrationLine;
+use errsep_models::calibration_line::simulate::{CalibrationSimulation, simulate};
 use errsep_models::model::{Effect, FittedModel, Place, Shape};
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use nalgebra::DVector;
@@ -21,7 +24,9 @@ fn options() -> Options {
 
 /// A small reversal with a change of its readings.
 fn reversal(seed: u64, change: impl Fn(&Place) -> f64) -> Linearised {
-    let observations = scene(seed, 20e-6).measured(seed);
+    let mut scene = scene(seed, 20e-6);
+    scene.repeats = 3;
+    let observations = scene.measured(seed);
     let model = Linearised::new(&observations, Assumptions::default()).unwrap();
     changed(&model, change)
 }
@@ -97,7 +102,9 @@ fn a_jump_of_one_of_two_channels_read_together_is_found() {
 /// A curved indicator: the readings that the law is sought along are changed by it, by a fifth of themselves.
 #[test]
 fn a_law_along_the_reading_is_found_though_it_changes_the_reading() {
-    let observations = scene(6, 400e-6).measured(6);
+    let mut scene = scene(6, 400e-6);
+    scene.repeats = 3;
+    let observations = scene.measured(6);
     let model = Linearised::new(&observations, Assumptions::default()).unwrap();
     let steepest = model.observed().iamax();
     let channel = model.places()[steepest].channel;
@@ -183,23 +190,28 @@ fn what_is_no_law_is_not_told() {
     }
 }
 
-/// Beside a drift lies a lag that begins anew in each pass: it comes back along the travel, is no noise, and would excuse what
+/// Beside a cosine lies a lag that begins anew in each set: it comes back along the loads, is no noise, and would excuse what
 /// the law leaves. Without it the same law is told.
 #[test]
 fn a_law_beside_what_is_no_noise_is_refused() {
-    let drifting = |lag: f64| {
-        reversal(3, move |p| {
-            let pass = f64::from(p.repeat) + 0.3 * p.direction + 0.17 * p.channel as f64;
-            let begun = 2.0 * std::f64::consts::PI * (p.x / 21.0 + 0.618 * 7.0 * pass);
-            let drift = match p.channel {
-                1 => 1.8 * (1.0 - (-p.time / 400.0).exp()),
-                _ => 0.0,
-            };
-            drift + lag * begun.sin()
+    let line = CalibrationSimulation {
+        line: [0.5, 2e-3],
+        full_scale: 1000.0,
+        loads: 60,
+        sets: 6,
+        both_directions: false,
+        noise: 1e-3,
+        disturbances: Vec::new(),
+    };
+    let line = CalibrationLine::new(&simulate(&line, 3).unwrap(), None).unwrap();
+    let waves = |lag: f64| {
+        changed(&line, move |p| {
+            let begun = 0.618 * 2.0 * PI * f64::from(p.repeat).powi(2);
+            0.01 * (2.0 * PI * p.x / 310.0).cos() + lag * (2.0 * PI * p.x / 83.0 + begun).sin()
         })
     };
-    assert_eq!(told(&drifting(0.0)).terms.len(), 1);
-    match law(&drifting(0.12), &options(), 0) {
+    assert_eq!(told(&waves(0.0)).terms[0].function, "cosine");
+    match law(&waves(1e-3), &options(), 0) {
         Ok(LawFound::None(none)) => assert!(none.why.contains("is no noise"), "{none:?}"),
         other => panic!("{other:?}"),
     }

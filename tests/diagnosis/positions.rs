@@ -45,7 +45,7 @@ fn different(trace: usize, _: &mut ChaCha8Rng) -> Vec<f64> {
 }
 
 fn long(_: usize, random: &mut ChaCha8Rng) -> Vec<f64> {
-    let mut x: Vec<f64> = (0..6000).map(|_| 240.0 * random.random::<f64>()).collect();
+    let mut x: Vec<f64> = (0..3000).map(|_| 240.0 * random.random::<f64>()).collect();
     x.sort_by(f64::total_cmp);
     x
 }
@@ -135,7 +135,7 @@ fn campaign(design: Positions, put: Put, seed: u64) -> Observations {
 fn diagnosed(observations: &Observations) -> Diagnosis {
     let model = Linearised::new(observations, Assumptions::default()).unwrap();
     let options = Options {
-        draws: 400,
+        draws: 200,
         ..Options::default()
     };
     diagnose(&model, &options)

@@ -36,16 +36,16 @@ fn told(waves: u32, seed: u64) -> (f64, f64) {
     (size.value, size.std)
 }
 
-/// *k·u*, 16 seeds each of two kinds: within two standard uncertainties in all but three, which the 95 % of a correct
-/// one would exceed with 0.5 %; those that are outside are hardly seen at all. On smooth forms nothing is added: the
+/// *k·u*, eight seeds each of two kinds: within two standard uncertainties in all but two, which the 95 % of a correct
+/// one would exceed with 0.6 %; those that are outside are hardly seen at all. On smooth forms nothing is added: the
 /// size is known to a seventh (seen: from an eighth to a twelfth).
 #[test]
 fn a_thickness_on_rough_forms_is_known_as_badly_as_it_is_told() {
     let is_off = |(size, std): &(f64, f64)| (size - THICKNESS).abs() > 2.0 * std;
     for waves in [50, 80] {
-        let all: Vec<(f64, f64)> = (0..16).map(|seed| told(waves, seed)).collect();
+        let all: Vec<(f64, f64)> = (0..8).map(|seed| told(waves, seed)).collect();
         let outside = all.iter().filter(|size| is_off(size)).count();
-        assert!(outside <= 3, "{waves} waves: {all:?}");
+        assert!(outside <= 2, "{waves} waves: {all:?}");
     }
     for seed in 1..4 {
         let size = told(9, seed);

@@ -206,7 +206,7 @@ fn what_the_model_absorbs_is_never_named() {
 /// all there; that they show a trace in the second makes no cause of them.
 #[test]
 fn what_shows_only_once_the_noise_is_clean_is_not_named() {
-    for seed in 0..4 {
+    for seed in 0..2 {
         let noise = SceneNoise {
             white: 0.05,
             ..SceneNoise::default()
@@ -261,20 +261,22 @@ fn a_place_is_told_only_where_there_is_one() {
 /// that belongs to its signature.
 #[test]
 fn sealed_effects_are_found_again() {
-    let readings = scene(12, 3e-5).measured(12);
+    let mut scene = scene(12, 3e-5);
+    scene.repeats = 3;
+    let readings = scene.measured(12);
     let model = Linearised::new(&readings, Assumptions::default()).unwrap();
     let options = Options {
         draws: 200,
         ..Options::default()
     };
-    let trials = prove(&model, model.effects(), &options, 40);
-    assert_eq!(trials.counts.iter().flatten().sum::<usize>(), 40);
-    // Nine or more of the eleven effects that can be seen, and none at all.
-    assert!(trials.truths.len() >= 10, "{:?}", trials.truths);
+    let trials = prove(&model, model.effects(), &options, 20);
+    assert_eq!(trials.counts.iter().flatten().sum::<usize>(), 20);
+    // Six or more of the eleven effects that can be seen, and none at all.
+    assert!(trials.truths.len() >= 7, "{:?}", trials.truths);
     assert!(trials.truths.contains(&"none".to_owned()));
-    // Lower limits of 97 % right and upper of 1 % wrong in 40: each is passed with 99.9 %.
-    assert!(trials.right >= 34, "{trials:?}");
-    assert!(trials.wrong <= 3, "{trials:?}");
+    // Lower limits of 97 % right and upper of 1 % wrong in 20: each is passed with 99.9 %; the campaign `blind` counts hundreds.
+    assert!(trials.right >= 16, "{trials:?}");
+    assert!(trials.wrong <= 2, "{trials:?}");
 }
 
 /// The order of the readings changes nothing.

@@ -8,25 +8,26 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::models::{maker, options, told};
 
-/// In the smallest size that readings are said to show with 80 % an effect is seen in as many. k·u: of 60, 48 are
-/// expected, with a standard deviation of 3.1; three of them either way.
+/// In the smallest size that readings are said to show with 80 % an effect is seen in as many. k·u: of 48, 38 are
+/// expected, with a standard deviation of 2.8; three of them either way. The campaign `other_models` counts every
+/// effect.
 #[test]
 fn what_is_put_in_at_the_size_told_is_seen_in_four_cases_of_five() {
-    for (model, effect) in [("calibration-line", "cubic"), ("circle", "ovality")] {
+    let seen = |model, effect, seeds: std::ops::Range<u64>| {
         let maker = maker(model);
-        let seen = (300..360).filter(|seed| {
-            let bare = maker.diagnosed(&[], *seed, &options(&[]));
-            // Readings that show it with nothing there, one in a hundred, tell no size.
-            let own = bare.hidden.iter().find(|h| h.effect == effect);
-            own.is_some_and(|own| {
-                let put = [(effect, own.detectable.unwrap())];
-                let with = maker.diagnosed(&put, *seed, &options(&[]));
-                with.verdict.kind != Kind::None
-            })
+        let put = [(effect, told(maker, effect).detectable.unwrap())];
+        let seen = seeds.filter(|seed| {
+            let diagnosis = maker.diagnosed(&put, *seed, &options(&[]));
+            diagnosis.verdict.kind != Kind::None
         });
-        let seen = seen.count();
-        assert!((39..=57).contains(&seen), "{model} {effect}: {seen} of 60");
-    }
+        seen.count()
+    };
+    let of = [
+        seen("calibration-line", "cubic", 300..324),
+        seen("circle", "ovality", 300..324),
+    ];
+    let both = of[0] + of[1];
+    assert!((30..=46).contains(&both), "{of:?} of 24 each");
 }
 
 /// The greatest of the sizes by shape holds for a shape that shows badly: the maker's drift of a line fades with three

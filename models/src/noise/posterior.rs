@@ -392,6 +392,22 @@ mod tests {
         assert!((mean.shift - 0.2).abs() < 0.2, "{mean:?}");
     }
 
+    /// Indicators zeroed anew by sixty times their noise.
+    #[test]
+    fn shifts_are_as_great_as_they_are() {
+        let law = Law {
+            white: 1.0,
+            correlated: 0.0,
+            length: 1.0,
+            shift: 3600.0,
+        };
+        let (_, contrasts) = contrasts(&law, 60, 5);
+        let mean = Posterior::of(&contrasts).unwrap().mean();
+        // k·u: of 24 contrasts the variance of the shift is known to 30 %; three of it.
+        assert!((mean.shift / law.shift - 1.0).abs() < 0.9, "{mean:?}");
+        assert!((mean.white - 1.0).abs() < 0.2, "{mean:?}");
+    }
+
     #[test]
     fn too_few_or_no_noise_give_no_law() {
         assert!(Posterior::of(&Contrasts::default()).is_none());

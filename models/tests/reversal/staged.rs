@@ -266,8 +266,9 @@ fn repeats_and_directions_are_averaged_and_give_the_noise() {
     let one = solve(&sheared_data(&t, &Channel::ALL, 0.05, 9), &shear()).unwrap();
     let six = solve(&all, &shear()).unwrap();
     assert_eq!(six.noise.source, NoiseSource::Repeats);
-    assert_eq!(six.noise.degrees_of_freedom, Some(4.0 * 101.0 * 4.0));
-    // k·u: 1616 degrees of freedom, 1.8 % of σ; 4 u.
+    // Each repeat but the first takes a height of its own.
+    assert_eq!(six.noise.degrees_of_freedom, Some(4.0 * 100.0 * 4.0));
+    // k·u: 1600 degrees of freedom, 1.8 % of σ; 4 u.
     assert!((six.noise.sigma / 0.05 - 1.0).abs() < 0.07);
     // Six times the readings: √6 smaller for the same noise (epsilons).
     let at_unit_noise = |s: &Staged| s.tilt(Contrast::Alpha).unwrap().std / s.noise.sigma;

@@ -19,7 +19,7 @@ use std::time::Instant;
 use clap::ValueEnum;
 use errsep_models::reversal::Channel;
 use errsep_models::reversal::simultaneous::Simultaneous;
-use errsep_models::reversal::staged::Removal;
+use errsep_models::reversal::staged::{Removal, moved};
 use serde_json::Value;
 
 use super::{Answer, ColumnArgs, CommonArgs};
@@ -126,9 +126,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let equal = still(&data);
     outcome.still = equal.len() == outcome.channels.len() && setup.noise.is_none();
     outcome.warnings.extend(still_in_words(&equal));
-    if let Some(moved) = staged::moved_traces(&data) {
-        outcome.disagree = Some(true);
-        outcome.warnings.push(moved);
+    let moved = moved(&data.observations);
+    if let Some(moved) = &moved {
+        if !moved.in_height {
+            outcome.disagree = Some(true);
+        }
+        outcome.warnings.push(staged::moved_in_words(moved));
     }
     let diagnosed = match fit.filter(|_| args.diagnose) {
         Some(fit) => Some(Diagnosed::of(
@@ -139,7 +142,9 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             args.common.seed,
         )?),
         None => {
-            outcome.warnings.extend(pointer(args, &outcome));
+            outcome
+                .warnings
+                .extend(pointer(args, &outcome, moved.is_some()));
             None
         }
     };
@@ -213,13 +218,14 @@ fn still_in_words(names: &[&str]) -> Option<String> {
 }
 
 /// Where to go from an answer whose model and readings disagree.
-fn pointer(args: &Args, o: &Outcome) -> Option<String> {
+fn pointer(args: &Args, o: &Outcome, moved: bool) -> Option<String> {
     let closes = o
         .closure
         .as_ref()
         .and_then(|c| c.slope)
         .is_none_or(|slope| !staged::does_not_close(slope));
-    if o.disagree != Some(true) && closes {
+    let disagree = o.disagree == Some(true) || !closes;
+    if !disagree && !moved {
         return None;
     }
     let mut command = format!("errsep diagnose {}", args.data.display());
@@ -229,7 +235,11 @@ fn pointer(args: &Args, o: &Outcome) -> Option<String> {
     if args.columns.are_given() {
         command += ", with the same --columns";
     }
-    Some(format!("to see where they disagree and why: {command}"))
+    let why = match disagree {
+        true => "where they disagree and why",
+        false => "whether a cause that is known moved them",
+    };
+    Some(format!("to see {why}: {command}"))
 }
 
 /// The outcome, and the fit where it is a simultaneous one.

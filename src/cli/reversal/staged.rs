@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use errsep_models::reversal::Convention;
-use errsep_models::reversal::staged::{self, Noise, NoiseSource, Options, Removal, Staged, Value};
+use errsep_models::reversal::staged::{
+    self, Moved, Noise, NoiseSource, Options, Removal, Staged, Value,
+};
 use errsep_models::uncertainty::DegreesOfFreedom;
 
 use super::outcome::{Angle, Closure, Convergence, Form, Outcome, Residual};
@@ -194,17 +196,26 @@ pub fn slope_warning(slope: Value, convention: Convention) -> Option<String> {
     })
 }
 
-/// Traces that moved as a whole between their repeats.
-pub fn moved_traces(data: &ReversalData) -> Option<String> {
-    let moved = staged::moved(&data.observations)?;
-    Some(format!(
-        "model and readings disagree: repeats of {} scatter by {} µm, neighbouring readings by {} µm only; \
-         whole traces drifted between the repeats, by more than their height, which the model does not have and the \
-         uncertainties take for noise",
-        moved.channel.name(),
+/// Traces that moved between their repeats, in words.
+pub fn moved_in_words(moved: &Moved) -> String {
+    let (repeats, neighbours) = (
         number::plain(moved.repeats, 3),
-        number::plain(moved.neighbours, 3)
-    ))
+        number::plain(moved.neighbours, 3),
+    );
+    let channel = moved.channel.name();
+    let scatter = format!(
+        "repeats of {channel} scatter by {repeats} µm, neighbouring readings by {neighbours} µm only"
+    );
+    match moved.in_height {
+        true => format!(
+            "{scatter}: they differ in height above all, as where an indicator is zeroed anew or jumps, and heights change \
+             neither tilts nor forms"
+        ),
+        false => format!(
+            "model and readings disagree: {scatter}; traces drifted between the repeats, by more than their height, which the \
+             model does not have and the uncertainties take for noise"
+        ),
+    }
 }
 
 /// Whether the closure profile is larger than the noise explains; absent where the noise is not known
@@ -230,7 +241,9 @@ fn noise_by(s: &Staged, source: NoiseSource) -> Option<&Noise> {
 }
 
 fn warnings(s: &Staged, setup: &ReversalSetup) -> Vec<String> {
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<String> = (s.levelled_um.map(super::simultaneous::levelled))
+        .into_iter()
+        .collect();
     if !s.one_grid {
         warnings.push(
             "the traces have different positions: they were interpolated onto the coarsest grid; \

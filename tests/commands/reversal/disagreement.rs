@@ -1,6 +1,7 @@
 //! Where model and readings disagree, and where they do not: by the misfit, by repeats, by the closure.
 
 use std::fs;
+use std::path::Path;
 
 use tempfile::TempDir;
 
@@ -49,7 +50,8 @@ fn a_misfit_is_told_and_the_diagnosis_named() {
 }
 
 /// Whole traces that moved between their repeats are no noise of a reading: the answer says so and names
-/// the diagnosis. Independent noise raises no alarm, whatever the channels' own noise.
+/// the diagnosis; they disagree with the model where they moved in more than height. Independent noise raises no alarm,
+/// whatever the channels' own noise.
 #[test]
 fn traces_that_moved_between_repeats_are_told() {
     let folder = TempDir::new().unwrap();
@@ -64,6 +66,14 @@ fn traces_that_moved_between_repeats_are_told() {
     );
     for args in methods {
         let (_, text, _) = run(folder.path(), args);
+        for said in ["differ in height", "errsep diagnose data.csv"] {
+            assert!(text.contains(said), "{said:?} is not in:\n{text}");
+        }
+    }
+    simulated(folder.path(), &both);
+    drift(&folder.path().join("data.csv"), 0.01);
+    for args in methods {
+        let (_, text, _) = run(folder.path(), args);
         for said in ["model and readings disagree", "errsep diagnose data.csv"] {
             assert!(text.contains(said), "{said:?} is not in:\n{text}");
         }
@@ -76,6 +86,23 @@ fn traces_that_moved_between_repeats_are_told() {
             assert!(!text.contains("disagree"), "{seed}: {text}");
         }
     }
+}
+
+/// Tilts the second repeat of all channels by so many µm/mm.
+fn drift(file: &Path, slope: f64) {
+    let text = fs::read_to_string(file).unwrap();
+    let tilted = text.lines().map(|line| {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let [_, repeat, .., x, reading] = &mut fields[..]
+            && repeat == "2"
+        {
+            let by = slope * x.parse::<f64>().unwrap();
+            *reading = (reading.parse::<f64>().unwrap() + by).to_string();
+        }
+        fields.join(",") + "\n"
+    });
+    let tilted: String = tilted.collect();
+    fs::write(file, tilted).unwrap();
 }
 
 /// By chance the closure of a few positions is half as large again as the noise explains: no alarm.

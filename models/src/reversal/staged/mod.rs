@@ -168,6 +168,8 @@ pub struct Staged {
     pub x: Vec<f64>,
     /// Whether that grid is the traces' own, or they were interpolated onto it.
     pub one_grid: bool,
+    /// The greatest height taken out of a trace, µm, where repeats stand apart of which some lack readings.
+    pub levelled_um: Option<f64>,
     /// Measured positions at which too few channels were read to tell the forms apart: the forms' lines
     /// are zero over the others, and the tilts count from those lines.
     pub left_out: usize,
@@ -198,7 +200,7 @@ const MOST: f64 = std::f64::consts::FRAC_PI_4;
 /// [`NoSolution`] says what is missing.
 pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, NoSolution> {
     check(observations, options)?;
-    let traces = Trace::all(observations);
+    let (traces, levelled_um) = Trace::all(observations);
     let channels: Vec<Channel> = traces.iter().map(|t| t.channel).collect();
     let designs = Designs::of(&channels);
     let first = fit_lines(&traces)?;
@@ -261,6 +263,7 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
         residual: residual_freedom(closure.as_ref()),
         lines,
         one_grid: grid.one_grid,
+        levelled_um,
         left_out,
         x: together.x,
         forms,

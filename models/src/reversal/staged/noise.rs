@@ -27,7 +27,7 @@ impl NoiseSource {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Declared => "declared in the set-up",
-            Self::Repeats => "from the scatter of repeats",
+            Self::Repeats => "from the scatter of repeats, each brought to one height",
             Self::Closure => "from the closure profile",
             Self::Neighbours => "from each reading against its neighbours (an upper bound)",
         }
@@ -57,7 +57,7 @@ impl Noise {
     }
 }
 
-/// A channel whose traces drifted apart between their repeats, by more than their height.
+/// A channel whose traces moved between their repeats.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moved {
     /// Which channel.
@@ -66,14 +66,25 @@ pub struct Moved {
     pub repeats: f64,
     /// The same by its neighbours, µm.
     pub neighbours: f64,
+    /// Whether they moved as a whole alone: brought to one height, repeats differ no more than neighbours.
+    pub in_height: bool,
     /// Probability that independent noise alone shows as much, in any channel.
     pub p_value: f64,
 }
 
-/// The channel whose repeats, brought to one height, differ most clearly by more than its neighbouring readings do, which
-/// independent noise has alike. Channels are compared each with itself: their noise may differ.
+/// The channel whose repeats differ most clearly by more than its neighbouring readings do, which independent noise has alike:
+/// brought to one height or, where none does then, as they are. Channels are compared each with itself: their noise may differ.
 pub fn moved(observations: &Observations) -> Option<Moved> {
-    let traces = Trace::all(observations);
+    let (level, _) = Trace::all(observations);
+    let read = || {
+        let all = Channel::ALL.into_iter();
+        all.filter_map(|c| Trace::of(observations, c))
+            .collect::<Vec<_>>()
+    };
+    most_moved(&level, false).or_else(|| most_moved(&read(), true))
+}
+
+fn most_moved(traces: &[Trace], in_height: bool) -> Option<Moved> {
     let of = |trace: &Trace| {
         let trace = std::slice::from_ref(trace);
         let (repeats, neighbours) = (from_repeats(trace)?, from_neighbours(trace)?);
@@ -82,6 +93,7 @@ pub fn moved(observations: &Observations) -> Option<Moved> {
             channel: trace[0].channel,
             repeats: repeats.sigma,
             neighbours: neighbours.sigma,
+            in_height,
             p_value,
         })
     };

@@ -28,16 +28,16 @@ pub struct Trace {
 const SAME_PLACE: f64 = 1e-9;
 
 impl Trace {
-    /// The traces of all channels that were read; repeats of one direction that differ as a whole are brought to their
-    /// common height before.
-    pub fn all(observations: &Observations) -> Vec<Self> {
+    /// The traces of all channels that were read, repeats of one direction brought to their common height before; and the
+    /// greatest height, µm, where that changes forms.
+    pub fn all(observations: &Observations) -> (Vec<Self>, Option<f64>) {
         let channels = ChannelReadings::sort(observations);
         let survey = Survey::new(&channels, |i| observations.taken(i));
         let Some(level) = survey.levelled() else {
             let of = channels
                 .iter()
                 .filter_map(|c| Self::of(observations, c.channel));
-            return of.collect();
+            return (of.collect(), None);
         };
         let mut brought = observations.clone();
         for (channel, values) in channels.iter().zip(level.values) {
@@ -50,7 +50,9 @@ impl Trace {
             trace.scatter_freedom = trace.scatter_freedom.saturating_sub(heights);
             Some(trace)
         };
-        channels.iter().zip(level.heights).filter_map(of).collect()
+        let greatest = level.matters.then_some(level.greatest);
+        let traces = channels.iter().zip(level.heights).filter_map(of);
+        (traces.collect(), greatest)
     }
 
     /// The trace of one channel, or `None` where it has no reading.

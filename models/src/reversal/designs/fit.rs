@@ -9,7 +9,7 @@ use errsep_solvers::structured::{Parameters, StructuredFit, fit_structured};
 use super::determined::{Determined, Zero};
 use super::error::DesignFitError;
 use super::ground::Ground;
-use super::knots;
+use super::knots::{self, Chosen};
 use super::options::DesignOptions;
 use super::problem::DesignProblem;
 use super::readings::{DesignObservations, Trace};
@@ -38,26 +38,24 @@ pub fn fit(
     options.check(observations)?;
     let read = Trace::sort(observations);
     let determined = Determined::of(&observations.design, options.zero);
+    let survey = Survey::new(&read, |i| observations.taken(i));
     // Zeros that are kept are told, and their repeats say how well.
     let kept = options.zero == Zero::Kept;
-    let level = Survey::new(&read, |i| observations.taken(i)).levelled();
-    let level = level.filter(|level| level.matters && !kept);
-    let greatest = level.as_ref().map(|level| level.greatest);
-    let traces = level.map_or_else(|| read.clone(), |level| with_values(&read, level.values));
-    let survey = Survey::new(&traces, |i| observations.taken(i));
+    let level = survey
+        .levelled()
+        .filter(|level| level.matters && !kept)
+        .map(|level| (with_values(&read, level.values), level.greatest));
+    let (traces, survey) = match &level {
+        None => (&read, survey),
+        Some((traces, _)) => {
+            let of = |i| observations.taken(i);
+            (traces, Survey::new(traces, of))
+        }
+    };
     let mut sigmas = survey.first_noise(options.noise);
     let weights = weights_of(&sigmas);
-    let ground = Ground::new(&observations.design, &determined, &traces, weights, options)?;
-    let chosen = matches!(options.knots, Knots::Chosen);
-    let alike = chosen
-        .then(|| survey.alike())
-        .flatten()
-        .map(|values| with_values(&traces, values));
-    let chosen = match &alike {
-        None => knots::breaks(&ground)?,
-        // Lines by which traces of a channel differ are no detail of a form.
-        Some(alike) => knots::breaks(&ground.of(alike))?,
-    };
+    let ground = Ground::new(&observations.design, &determined, traces, weights, options)?;
+    let chosen = breaks(&ground, &survey)?;
     let unknowns = ground.layout.on(&chosen.breaks).free_count();
     enough(&ground, unknowns)?;
     let (mut problem, mut start) = ground.problem(chosen.breaks)?;
@@ -86,17 +84,31 @@ pub fn fit(
         finer: chosen.forms,
     };
     let mut solution = DesignFit::new(observations, determined.clone(), reached);
-    if greatest.is_some() {
-        for (read, level) in read.iter().zip(&traces) {
-            let heights = read.value.iter().zip(&level.value).map(|(r, l)| r - l);
-            for (i, height) in read.source.iter().zip(heights) {
-                solution.residuals[*i] += height;
-            }
-        }
+    if let Some((level, greatest)) = &level {
+        solution.levelled_um = Some(*greatest);
+        put_back(&read, level, &mut solution.residuals);
     }
-    solution.levelled_um = greatest;
     solution.convergence.seconds = began.elapsed().as_secs_f64();
     Ok(solution)
+}
+
+/// The break points; where they are chosen, lines by which traces of a channel differ are no detail of a form.
+fn breaks(ground: &Ground, survey: &Survey) -> Result<Chosen, DesignFitError> {
+    let chosen = matches!(ground.options.knots, Knots::Chosen);
+    let Some(values) = chosen.then(|| survey.alike()).flatten() else {
+        return knots::breaks(ground);
+    };
+    knots::breaks(&ground.of(&with_values(ground.traces, values)))
+}
+
+/// Puts the heights that were taken out back into the residuals, which are those of the readings.
+fn put_back(read: &[Trace], level: &[Trace], residuals: &mut [f64]) {
+    for (read, level) in read.iter().zip(level) {
+        let heights = read.value.iter().zip(&level.value).map(|(r, l)| r - l);
+        for (i, height) in read.source.iter().zip(heights) {
+            residuals[*i] += height;
+        }
+    }
 }
 
 fn with_values(traces: &[Trace], values: Vec<Vec<f64>>) -> Vec<Trace> {

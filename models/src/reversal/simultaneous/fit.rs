@@ -15,6 +15,7 @@ use super::error::ReversalError;
 use super::fitted_knots::FittedKnots;
 use super::ground::{Begun, Breaks, Ground};
 use super::knots::{self, FEWEST_POSITIONS};
+use super::levelled::{Level, with_values};
 use super::options::{Knots, Noise, Options, Thickness};
 use super::problem::Reversal;
 use super::reached::Reached;
@@ -39,9 +40,15 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
     let began = Instant::now();
     check(observations, options)?;
     let read = ChannelReadings::sort(observations);
-    let level = level(&read, observations, options);
-    let channels = level.as_ref().map_or(&read, |l| &l.0);
-    let survey = Survey::new(channels, |i| observations.taken(i));
+    let survey = Survey::new(&read, |i| observations.taken(i));
+    let level = Level::of(&survey, &read, options);
+    let (channels, survey) = match &level {
+        None => (&read, survey),
+        Some(level) => {
+            let of = |i| observations.taken(i);
+            (&level.channels, Survey::new(&level.channels, of))
+        }
+    };
     let sigmas = survey.first_noise(options.noise);
     let chosen = matches!(options.knots, Knots::Chosen);
     let alike = chosen
@@ -66,40 +73,11 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         solution.times_assumed = !setting.timed && asks_for_time(options);
         solution
     };
-    if let Some((level, greatest)) = level {
-        for (read, level) in read.iter().zip(&level) {
-            let heights = read.value.iter().zip(&level.value).map(|(r, l)| r - l);
-            for (i, height) in read.source.iter().zip(heights) {
-                solution.residuals[*i as usize] += height;
-            }
-        }
-        solution.levelled_um = Some(greatest);
+    if let Some(level) = level {
+        level.tell(&read, &mut solution);
     }
     solution.convergence.seconds = began.elapsed().as_secs_f64();
     Ok(solution)
-}
-
-/// The readings with repeats brought to one height, and the greatest height, µm, where that changes the forms: a mean over repeats
-/// of which one ends before the others would have a step. Effects know readings as they are.
-fn level(
-    read: &[ChannelReadings],
-    observations: &Observations,
-    options: &Options,
-) -> Option<(Vec<ChannelReadings>, f64)> {
-    if !options.effects.is_empty() {
-        return None;
-    }
-    let level = Survey::new(read, |i| observations.taken(i)).levelled();
-    let level = level.filter(|level| level.matters)?;
-    Some((with_values(read, level.values), level.greatest))
-}
-
-fn with_values(channels: &[ChannelReadings], values: Vec<Vec<f64>>) -> Vec<ChannelReadings> {
-    let of = |(channel, value): (&ChannelReadings, _)| ChannelReadings {
-        value,
-        ..channel.clone()
-    };
-    channels.iter().zip(values).map(of).collect()
 }
 
 /// Whether any effect goes by the time of the readings.

@@ -19,6 +19,7 @@ pub(super) mod gauge;
 mod ground;
 mod joined;
 pub(super) mod knots;
+mod levelled;
 mod monte_carlo;
 mod options;
 mod placed;

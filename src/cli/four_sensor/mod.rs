@@ -120,9 +120,7 @@ fn how_well_known(
     if noise_stated || found.noise_estimated {
         return found.degrees_of_freedom;
     }
-    let further = measured.repeats.saturating_sub(1);
-    let readings = 4 * measured.outputs.readings().len();
-    DegreesOfFreedom::new((readings * further) as f64).ok()
+    DegreesOfFreedom::new(measured.freedom as f64).ok()
 }
 
 /// Separates the outputs.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use errsep_models::four_sensor::{Geometry, Outputs};
+use errsep_models::four_sensor::{Geometry, Outputs, Parabola};
 
 use super::setup::Setup;
 use crate::io::{ColumnMap, Message, TableReader};
@@ -18,6 +18,8 @@ pub(in crate::cli) struct Measured {
     pub repeats: usize,
     /// Standard deviation of the averaged reading from the scatter of the repeats, µm.
     pub noise: Option<f64>,
+    /// Degrees of freedom of that.
+    pub freedom: usize,
 }
 
 /// One reading and its line.
@@ -58,18 +60,9 @@ pub(in crate::cli) fn read(
         .iter()
         .map(|cell| std::array::from_fn(|sensor| mean(&cell[sensor])))
         .collect();
-    let noise = (repeats > 1).then(|| {
-        let squares: f64 = cells
-            .iter()
-            .flatten()
-            .map(|values| {
-                let mean = mean(values);
-                values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()
-            })
-            .sum();
-        let freedom = cells.len() * 4 * (repeats - 1);
-        (squares / freedom as f64 / repeats as f64).sqrt()
-    });
+    // A zero that is stated for all repeats is known no better than they agree.
+    let zeros = matches!(setup.settings.parabola, Parabola::ZeroAdjustment(_));
+    let scatter = scatter(&cells, repeats, !zeros);
     let outputs = Outputs::new(geometry, positions[0], rows)
         .map_err(|error| Message::bad_input(error.to_string()).in_file(path))?;
     let each = (0..repeats)
@@ -87,8 +80,32 @@ pub(in crate::cli) fn read(
         each,
         repeats,
         // Repeats that agree to the last digit say nothing of the noise.
-        noise: noise.filter(|noise| *noise > 0.0),
+        noise: scatter.map(|s| s.0).filter(|noise| *noise > 0.0),
+        freedom: scatter.map_or(0, |s| s.1),
     })
+}
+
+/// Standard deviation of the averaged reading by the scatter of the repeats, µm, and its degrees of freedom; where sensors may be
+/// zeroed anew before each repeat about the height of each.
+fn scatter(cells: &[Cell], repeats: usize, zeroed: bool) -> Option<(f64, usize)> {
+    let heights = usize::from(zeroed);
+    let freedom = 4 * repeats.saturating_sub(1) * (cells.len() - heights);
+    let mut squares = 0.0;
+    for sensor in 0..4 {
+        let apart = |cell: &Cell, repeat: usize| {
+            let mean = cell[sensor].iter().sum::<f64>() / repeats as f64;
+            cell[sensor][repeat] - mean
+        };
+        for repeat in 0..repeats {
+            let all = || cells.iter().map(|cell| apart(cell, repeat));
+            let height = match zeroed {
+                true => all().sum::<f64>() / cells.len() as f64,
+                false => 0.0,
+            };
+            squares += all().map(|a| (a - height).powi(2)).sum::<f64>();
+        }
+    }
+    (freedom > 0).then(|| ((squares / freedom as f64 / repeats as f64).sqrt(), freedom))
 }
 
 fn tidy(table: &mut TableReader) -> Result<Vec<Reading>, Message> {
@@ -210,7 +227,9 @@ fn cells(
 ) -> Result<(Vec<Cell>, usize), Message> {
     let mut cells: Vec<Cell> = vec![Default::default(); positions.len()];
     let mut seen = BTreeMap::new();
-    for reading in readings {
+    let mut by_repeat: Vec<&Reading> = readings.iter().collect();
+    by_repeat.sort_by_key(|r| r.repeat);
+    for reading in by_repeat {
         let Ok(place) = positions.binary_search_by(|x| x.total_cmp(&reading.x)) else {
             continue;
         };

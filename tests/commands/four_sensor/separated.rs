@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{answered, errsep, fixture, text};
+use super::{answered, errsep, fixture, simulated, text};
 
 /// Every key of docs/json/four-sensor.md is there, and S lies within four of its standard
 /// deviations and the bound of the penalty's pull from the truth of the fixture.
@@ -273,4 +273,48 @@ fn bad_input_is_named_with_its_place() {
         );
         assert!(out.stdout.is_empty() && !report.exists());
     }
+}
+
+/// Sensors zeroed anew before each repeat: the answer and its noise know nothing of it, in whatever order the rows come.
+#[test]
+fn zeros_of_repeats_are_no_noise() {
+    let folder = tempfile::TempDir::new().expect("a folder");
+    let options = ["--repeats", "4", "--noise", "0.05"];
+    let setup = "[sensors]\nspacing = [5.0, 5.0, 25.0]\n";
+    let (data, toml) = simulated(folder.path(), &options, setup);
+    let before = answered(&data, &toml);
+    let text = std::fs::read_to_string(&data).expect("readable");
+    let mut rows: Vec<String> = text.lines().map(str::to_owned).collect();
+    for row in &mut rows {
+        let mut fields: Vec<String> = row.split(',').map(str::to_owned).collect();
+        if let [_, outputs @ .., repeat] = &mut fields[..]
+            && let Ok(repeat) = repeat.parse::<f64>()
+        {
+            for (sensor, output) in outputs.iter_mut().enumerate() {
+                let zero = 3.0 * (7.0 * repeat + 5.0 * sensor as f64).sin();
+                *output = (output.parse::<f64>().expect("a number") + zero).to_string();
+            }
+        }
+        *row = fields.join(",");
+    }
+    let first = rows
+        .iter()
+        .position(|r| r.starts_with("x,"))
+        .expect("names");
+    rows[first + 1..].reverse();
+    std::fs::write(&data, rows.join("\n") + "\n").expect("written");
+    let after = answered(&data, &toml);
+    let noise = |answer: &serde_json::Value| answer["residual"]["noise"].as_f64().expect("a noise");
+    // Rounding.
+    assert!(
+        (noise(&after) / noise(&before) - 1.0).abs() < 1e-6,
+        "{}",
+        after["residual"]
+    );
+    // k·u: 4 × 61 × 3 degrees of freedom, 2.6 % of a mean of four; four of them.
+    assert!(
+        (noise(&after) / 0.025 - 1.0).abs() < 0.11,
+        "{}",
+        after["residual"]
+    );
 }

@@ -171,7 +171,7 @@ fn in_words(model: &AnyModel, law: &Law) -> String {
     let below = |p: f64| {
         let p = probability(p);
         p.strip_prefix('<')
-            .map_or(p.clone(), |p| format!("less than {p}"))
+            .map_or(p.clone(), |p| format!("less than {}", p.trim_start()))
     };
     let _ = write!(
         text,

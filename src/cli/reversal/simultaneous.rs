@@ -308,8 +308,8 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
 /// That repeats were brought to one height.
 pub(super) fn levelled(greatest_um: f64) -> String {
     format!(
-        "repeats differ as a whole, by up to {} µm from their mean, and some lack readings: they were brought to one height \
-         first, as without that the forms would have steps where a repeat begins or ends",
+        "repeats differ as a whole, by up to {} µm from their mean, and were not read at the same positions: they were brought to one height \
+         first, as without that the forms would have steps between their readings",
         number::plain(greatest_um, 3)
     )
 }

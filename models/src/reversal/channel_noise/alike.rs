@@ -26,7 +26,7 @@ pub struct Levelled {
     pub heights: Vec<usize>,
     /// The greatest height taken out, µm.
     pub greatest: f64,
-    /// Whether repeats stand apart of which some lack readings: elsewhere heights do not change a mean over repeats but for a
+    /// Whether repeats stand apart that were not read at the same positions: elsewhere heights change a mean over repeats by a
     /// constant.
     pub matters: bool,
 }
@@ -71,8 +71,8 @@ impl Survey<'_> {
             let means = group.means(traces, self.x[group.channel], own);
             let found = lines(group, None, &means);
             level.heights[group.channel] += found.iter().flatten().count().saturating_sub(1);
-            let lacking = group.complete().len() < group.positions.len();
-            level.matters |= lacking && stand_apart(&means, &found);
+            let apart = stand_apart(&means, &found);
+            level.matters |= apart && !group.is_on_one_grid(traces, self.x[group.channel]);
             for (t, line) in group.traces.iter().zip(found) {
                 let height = line.map_or(0.0, |l| l[0]);
                 level.greatest = level.greatest.max(height.abs());
@@ -107,6 +107,16 @@ impl Survey<'_> {
 }
 
 impl Group {
+    /// Whether all traces have the same positions.
+    fn is_on_one_grid(&self, traces: &[traces::Trace], x: &[f64]) -> bool {
+        let Some(first) = self.traces.first().map(|t| &traces[*t]) else {
+            return true;
+        };
+        self.traces.iter().map(|t| &traces[*t]).all(|own| {
+            own.len() == first.len() && (0..own.len()).all(|k| x[own.row(k)] == x[first.row(k)])
+        })
+    }
+
     /// By trace the cells with the mean of its readings, less the slope that the traces have in common: where traces have
     /// positions of their own, their readings of a cell lie apart along it.
     fn means(&self, traces: &[traces::Trace], x: &[f64], values: &[f64]) -> Vec<Vec<(usize, f64)>> {

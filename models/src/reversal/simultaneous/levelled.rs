@@ -13,7 +13,7 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// Where repeats stand apart of which some lack readings. Effects know readings as they are.
+    /// Where repeats stand apart that were not read at the same positions. Effects know readings as they are.
     pub(super) fn of(survey: &Survey, read: &[ChannelReadings], options: &Options) -> Option<Self> {
         if !options.effects.is_empty() {
             return None;

@@ -168,7 +168,7 @@ pub struct Staged {
     pub x: Vec<f64>,
     /// Whether that grid is the traces' own, or they were interpolated onto it.
     pub one_grid: bool,
-    /// The greatest height taken out of a trace, µm, where repeats stand apart of which some lack readings.
+    /// The greatest height taken out of a trace, µm, where repeats stand apart that were not read at the same positions.
     pub levelled_um: Option<f64>,
     /// Measured positions at which too few channels were read to tell the forms apart: the forms' lines
     /// are zero over the others, and the tilts count from those lines.

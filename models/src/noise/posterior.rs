@@ -392,14 +392,14 @@ mod tests {
         assert!((mean.shift - 0.2).abs() < 0.2, "{mean:?}");
     }
 
-    /// Indicators zeroed anew by sixty times their noise.
+    /// Indicators zeroed anew by three hundred times their noise.
     #[test]
     fn shifts_are_as_great_as_they_are() {
         let law = Law {
             white: 1.0,
             correlated: 0.0,
             length: 1.0,
-            shift: 3600.0,
+            shift: 1e5,
         };
         let (_, contrasts) = contrasts(&law, 60, 5);
         let mean = Posterior::of(&contrasts).unwrap().mean();

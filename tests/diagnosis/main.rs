@@ -6,6 +6,7 @@ mod command;
 mod designs;
 mod different_grids;
 mod effect_signatures;
+mod heights;
 mod invariance;
 mod laws;
 mod models;

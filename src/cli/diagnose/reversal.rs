@@ -48,7 +48,6 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     let model = Linearised::new(&data.observations, assumptions(&setup))
         .map_err(|why| refusal(&why).in_file(&args.data))?;
     let notes = notes(&model);
-    let gathered = readings_of_one(&model);
     let mut answer = Case {
         model: AnyModel::new(&model),
         readings: data.in_words(),
@@ -56,7 +55,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
         notes,
         inputs: Vec::new(),
     }
-    .answer_with(args, |plan| Some(planned(plan, &setup, gathered)))?;
+    .answer_with(args, |plan| Some(planned(plan, &setup, &model)))?;
     if let Some(command) = with_command(args, &answer.json) {
         told_command(&mut answer, command);
     }
@@ -66,7 +65,6 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
 fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<Answer, Message> {
     let model = design_model(setup, data, None).map_err(|why| refusal(&why).in_file(&args.data))?;
     let design = &data.observations.design;
-    let gathered = readings_of_one(&model);
     let case = Case {
         readings: format!(
             "{}; {} of {} in {} of the spindle",
@@ -80,7 +78,7 @@ fn of_design(args: &Args, setup: &ReversalSetup, data: &DesignData) -> Result<An
         along: ALONG,
         inputs: Vec::new(),
     };
-    let mut answer = case.answer_with(args, |plan| Some(planned(plan, setup, gathered)))?;
+    let mut answer = case.answer_with(args, |plan| Some(planned(plan, setup, &model)))?;
     let names = named(&answer.json);
     if args.with.is_empty() && !names.is_empty() {
         let mut command = format!("errsep reversal {}", args.data.display());
@@ -104,8 +102,9 @@ fn readings_of_one(model: &Linearised) -> f64 {
 /// Part by which these numbers of a plan and of a measurement may differ.
 const ALIKE: f64 = 0.1;
 
-/// The model of a plan; `gathered`: how many readings of the measurement stand for one.
-fn planned(plan: &Args, setup: &ReversalSetup, gathered: f64) -> Result<AnyModel, Message> {
+/// The model of a plan of a measurement like one that has been made.
+fn planned(plan: &Args, setup: &ReversalSetup, measured: &Linearised) -> Result<AnyModel, Message> {
+    let gathered = readings_of_one(measured);
     let model = match read_any(&plan.data, setup)? {
         Readings::Four(data) => Linearised::new(&data.observations, assumptions(setup)),
         Readings::Other(data) => design_model(setup, &data, None),
@@ -128,7 +127,7 @@ fn planned(plan: &Args, setup: &ReversalSetup, gathered: f64) -> Result<AnyModel
         .in_file(&plan.data)
         .remedy("plan the positions that were measured"));
     }
-    Ok(AnyModel::new(&model))
+    Ok(AnyModel::new(&model.with_heights_as(measured)))
 }
 
 /// The fitted model of a design, with the fit of its readings where there is one.
@@ -315,6 +314,12 @@ pub fn notes(model: &Linearised) -> Vec<String> {
     if filled > 0 {
         notes.push(format!(
             "{filled} readings that single traces lack at places which the others have were put in, by what the traces of their channel have in common; they bring nothing of their own, so the noise is told greater than the repeats show it, and uncertainties with it."
+        ));
+    }
+    if let Some(greatest) = model.levelled_um {
+        notes.push(format!(
+            "The repeats of a channel differ in height, by up to {} µm from their mean, as where an indicator is set to zero before each of them; their heights are unknowns of the fit, the gap is what is left beside them, and what shows in heights alone is not seen.",
+            number::plain(greatest, 2)
         ));
     }
     if model.left_out > 0 {

@@ -314,8 +314,22 @@ pub(super) fn levelled(greatest_um: f64) -> String {
     )
 }
 
+/// That the heights of repeats are unknowns beside effects.
+fn heights_beside(greatest_um: f64) -> String {
+    format!(
+        "repeats differ as a whole, by up to {} µm from their mean, as where an indicator is set to zero before each of them: their heights \
+         are unknowns of the fit beside the effects",
+        number::plain(greatest_um, 3)
+    )
+}
+
 fn warnings(fit: &Simultaneous, closure: Option<&Closure>, setup: &ReversalSetup) -> Vec<String> {
-    let mut warnings: Vec<String> = fit.levelled_um.map(levelled).into_iter().collect();
+    let heights = if fit.effects.is_empty() {
+        levelled
+    } else {
+        heights_beside
+    };
+    let mut warnings: Vec<String> = fit.levelled_um.map(heights).into_iter().collect();
     if fit.agreement.disagree == Some(true) && fit.agreement.missed > 0.0 {
         warnings.push(noise::disagreement(fit.agreement.missed));
     }

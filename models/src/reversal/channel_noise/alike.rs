@@ -32,7 +32,7 @@ pub struct Levelled {
 }
 
 /// Height, µm, and slope, µm per half the channel's travel, of what a trace lies above the others.
-type Line = [f64; 2];
+pub(super) type Line = [f64; 2];
 
 impl Survey<'_> {
     /// The readings of every channel, µm, less the lines by which its traces differ; the mean of these lines is left.
@@ -119,7 +119,12 @@ impl Group {
 
     /// By trace the cells with the mean of its readings, less the slope that the traces have in common: where traces have
     /// positions of their own, their readings of a cell lie apart along it.
-    fn means(&self, traces: &[traces::Trace], x: &[f64], values: &[f64]) -> Vec<Vec<(usize, f64)>> {
+    pub(super) fn means(
+        &self,
+        traces: &[traces::Trace],
+        x: &[f64],
+        values: &[f64],
+    ) -> Vec<Vec<(usize, f64)>> {
         let slope = common_slope(traces, x, values);
         let of = |(t, own): (&usize, &CellTrace)| {
             let level = |k: usize| {
@@ -155,7 +160,11 @@ fn common_slope(traces: &[traces::Trace], x: &[f64], values: &[f64]) -> f64 {
 
 /// By how much each trace lies above what all have in common, found in turns with it; slopes where the cells have a place ξ.
 /// `None` for a trace that shares too few of its cells with others.
-fn lines(group: &Group, xi: Option<&[f64]>, means: &[Vec<(usize, f64)>]) -> Vec<Option<Line>> {
+pub(super) fn lines(
+    group: &Group,
+    xi: Option<&[f64]>,
+    means: &[Vec<(usize, f64)>],
+) -> Vec<Option<Line>> {
     let mut count = vec![0.0; group.positions.len()];
     for (cell, _) in means.iter().flatten() {
         count[*cell] += 1.0;

@@ -7,6 +7,7 @@
 
 pub mod alike;
 pub mod along;
+pub mod heights;
 pub mod levels;
 pub mod scatter;
 pub mod settle;

@@ -17,6 +17,8 @@ const LEFT_OUT: f64 = 0.1;
 pub struct Trace {
     /// Whether the slide moved backward.
     pub backward: bool,
+    /// The number of its repeat.
+    pub repeat: u32,
     /// Its readings; all of the channel's where `None`.
     rows: Option<Vec<u32>>,
     count: usize,
@@ -51,6 +53,7 @@ pub fn of<C: SortedReadings>(
             if (0..count).all(|row| Some(key(row)) == first) {
                 return vec![Trace {
                     backward: first.is_some_and(|f| f.0),
+                    repeat: first.map_or(0, |f| f.1),
                     rows: None,
                     count,
                 }];
@@ -61,8 +64,9 @@ pub fn of<C: SortedReadings>(
             }
             traces
                 .into_iter()
-                .map(|((backward, _), rows)| Trace {
+                .map(|((backward, repeat), rows)| Trace {
                     backward,
+                    repeat,
                     count: rows.len(),
                     rows: Some(rows),
                 })

@@ -39,16 +39,12 @@ impl FittedModel for Linearised {
         let patterns = DMatrix::from_fn(self.trace_channels.len(), by_channel.ncols(), |t, k| {
             by_channel[(self.trace_channels[t], k)]
         });
-        let constants = self.constants();
-        let offsets = constants.ncols();
-        let beta = self.arrangement.has_beta();
-        let mut columns = DMatrix::zeros(self.record.places.len(), offsets + usize::from(beta));
-        for (k, place) in self.record.places.iter().enumerate() {
-            for j in 0..offsets {
-                columns[(k, j)] = constants[(place.channel, j)];
-            }
-            if beta {
-                columns[(k, offsets)] = self.seat(place).theta[0] * (place.x - mean_x);
+        let mut columns = self.zeros();
+        if self.arrangement.has_beta() {
+            let at = columns.ncols();
+            columns = columns.insert_column(at, 0.0);
+            for (to, place) in columns.column_mut(at).iter_mut().zip(&*self.record.places) {
+                *to = self.seat(place).theta[0] * (place.x - mean_x);
             }
         }
         let line = &self.gauge.slope;
@@ -165,11 +161,18 @@ impl FittedModel for Linearised {
 
     /// Of n readings of a mean a part f was put in: (1 − f)n tell it, and those put in add a remainder each,
     /// σ²(1/((1 − f)n) + f/n) in place of σ²/n.
+    ///
+    /// Of n positions the height of a trace has taken one.
     fn noise_allowance(&self) -> f64 {
-        self.gathered.as_ref().map_or(1.0, |gathered| {
+        let filled = self.gathered.as_ref().map_or(1.0, |gathered| {
             let share = gathered.filled() as f64 / self.record.places.len() as f64;
             1.0 / (1.0 - share) + share
-        })
+        });
+        let n = self.positions.len() as f64;
+        match self.heights {
+            Some(_) => filled * n / (n - 1.0),
+            None => filled,
+        }
     }
 
     fn repeats_are_alike(&self) -> bool {
@@ -222,22 +225,17 @@ impl FittedModel for Linearised {
 
     /// The indicators' zeros, and how the artefact lies: γ, and β where it is fitted.
     fn set_anew(&self) -> Option<DMatrix<f64>> {
-        let constants = self.constants();
         let slopes: [fn(&Seat) -> f64; 3] = [|s| s.psi[0], |s| s.psi[1], |s| s.theta[0]];
         let fitted = if self.arrangement.has_beta() { 3 } else { 2 };
-        let slopes = &slopes[..fitted];
-        let zeros = constants.ncols();
-        Some(DMatrix::from_fn(
-            self.record.places.len(),
-            zeros + slopes.len(),
-            |k, j| {
-                let place = &self.record.places[k];
-                match j.checked_sub(zeros) {
-                    None => constants[(place.channel, j)],
-                    Some(j) => slopes[j](self.seat(place)) * (place.x - self.middle),
-                }
-            },
-        ))
+        let mut anew = self.zeros();
+        for slope in &slopes[..fitted] {
+            let at = anew.ncols();
+            anew = anew.insert_column(at, 0.0);
+            for (to, place) in anew.column_mut(at).iter_mut().zip(&*self.record.places) {
+                *to = slope(self.seat(place)) * (place.x - self.middle);
+            }
+        }
+        Some(anew)
     }
 
     fn beneath(mut self, change: &DVector<f64>) -> Self {
@@ -251,12 +249,19 @@ impl FittedModel for Linearised {
 }
 
 impl Linearised {
-    /// How the zeros enter, channels × zeros.
-    fn constants(&self) -> DMatrix<f64> {
-        match self.arrangement.zero() {
+    /// How the indicators' zeros enter, readings × zeros: one for every channel, or for every repeat whose height is an
+    /// unknown, or what the channels have in common where zeros are kept.
+    fn zeros(&self) -> DMatrix<f64> {
+        if let Some(heights) = &self.heights {
+            return heights.columns(&self.record.traces);
+        }
+        let constants = match self.arrangement.zero() {
             Zero::Reset => DMatrix::identity(self.present().len(), self.present().len()),
             Zero::Kept => self.arrangement.constants(),
-        }
+        };
+        DMatrix::from_fn(self.record.places.len(), constants.ncols(), |k, j| {
+            constants[(self.record.places[k].channel, j)]
+        })
     }
 
     /// A slope as a linear function of the readings, by the weights of the channels on it.

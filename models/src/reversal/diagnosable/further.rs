@@ -36,7 +36,7 @@ impl Linearised {
         let mut model = Self::beside(&observations, arrangement, self.assumptions, None).ok()?;
         // Each of its readings is the mean of as many; the moments of these are not planned.
         model.gathered = self.gathered.clone().map(Gathered::planned);
-        Some(model)
+        Some(model.with_heights_as(self))
     }
 
     /// Further measurements that a shop can make, in words and as the model fitted to each.

@@ -19,6 +19,7 @@ mod filling;
 mod fitted;
 mod further;
 mod gathering;
+mod heights;
 mod means;
 mod sorting;
 mod state;
@@ -39,6 +40,7 @@ use crate::model::{Column, FittedModel, Place, Record};
 pub use arrangement::{Arrangement, Seat, indicator_name};
 use carrier::Carrier;
 pub use gathering::Gathered;
+use heights::Heights;
 use sorting::Sorted;
 use state::ChannelLine;
 
@@ -70,6 +72,14 @@ pub enum NotDiagnosable {
         /// Number of readings.
         readings: usize,
     },
+}
+
+/// The heights of repeats where they are unknowns: not where the indicators keep their zeros.
+fn free_heights(sorted: &Sorted, arrangement: &Arrangement) -> Option<Heights> {
+    match arrangement.zero() {
+        Zero::Reset => Heights::of(sorted),
+        Zero::Kept => None,
+    }
 }
 
 /// Fewest places of a trace.
@@ -109,6 +119,10 @@ pub struct Linearised {
     pub gathered: Option<Gathered>,
     /// What the forms differ by from channel to channel, where these are read at positions of their own.
     scatter: Arc<[Column]>,
+    /// The heights of repeats, where they are unknowns of the fit.
+    heights: Option<Heights>,
+    /// The greatest of them, µm.
+    pub levelled_um: Option<f64>,
 }
 
 impl Linearised {
@@ -193,11 +207,22 @@ impl Linearised {
             Some(fit) => fit,
             None => Carrier::new(observations, &arrangement, assumptions)?,
         };
-        let (made, gathered) =
-            gathering::gather(observations, traces, fit, &arrangement, assumptions)?;
-        let shared = sorting::shared(&made, gathering::traces_of(&made).len());
-        let sorted = Sorted::new(&made, &positions, &shared);
-        Self::sorted(sorted, arrangement, assumptions, Some(gathered))
+        let gather = |observations: &DesignObservations, traces, fit| {
+            let (made, gathered) =
+                gathering::gather(observations, traces, fit, &arrangement, assumptions)?;
+            let shared = sorting::shared(&made, gathering::traces_of(&made).len());
+            Ok((Sorted::new(&made, &positions, &shared), gathered))
+        };
+        let (sorted, gathered) = gather(observations, traces.clone(), fit)?;
+        let Some(heights) = free_heights(&sorted, &arrangement) else {
+            return Self::sorted(sorted, arrangement, assumptions, Some(gathered));
+        };
+        // Whether finer forms carry the readings better shows beside heights least of all.
+        let (level, greatest) = heights.taken_from(observations, &sorted);
+        let fit = Carrier::new(&level, &arrangement, assumptions)?;
+        let (sorted, gathered) = gather(&level, traces, fit)?;
+        let model = Self::sorted(sorted, arrangement, assumptions, Some(gathered))?;
+        Ok(model.with_heights(heights, greatest))
     }
 
     fn sorted(
@@ -239,7 +264,9 @@ impl Linearised {
             || StraightLine::of(&sorted.positions),
             |gathered| gathered.gauge.clone(),
         );
-        Ok(Self {
+        let heights = free_heights(&sorted, &arrangement);
+        let values = sorted.values;
+        let model = Self {
             span: 1.0,
             reach: 1.0,
             duration: last.max(f64::MIN_POSITIVE),
@@ -261,8 +288,38 @@ impl Linearised {
             left_out: (gathered.as_ref()).map_or(sorted.left_out, |gathered| gathered.beyond),
             gathered,
             scatter: scatter.into(),
+            heights: None,
+            levelled_um: None,
+        };
+        let observed = DVector::from_vec(values);
+        Ok(match heights {
+            None => model.refit(observed),
+            Some(heights) => model.refit(observed).with_heights(heights, 0.0),
+        })
+    }
+
+    /// The same model with the heights of its repeats as unknowns, of which `greatest` (µm) has been taken out already.
+    fn with_heights(mut self, heights: Heights, greatest: f64) -> Self {
+        let traces = &self.record.traces;
+        let above = heights.above(&self.record.observed, traces, &self.trace_channels);
+        let level = heights::levelled(&self.record.observed, traces, &above);
+        let greatest = above.iter().fold(greatest, |most, h| most.max(h.abs()));
+        self.heights = Some(heights);
+        self.levelled_um = Some(greatest);
+        self.refit(level)
+    }
+
+    /// The same model with heights that are unknowns where another's are.
+    #[must_use]
+    pub fn with_heights_as(self, other: &Self) -> Self {
+        match (&self.heights, &other.heights) {
+            (None, Some(known)) => {
+                let (places, traces) = (&self.record.places, &self.record.traces);
+                let heights = Heights::free(places, traces, known.by_pass());
+                self.with_heights(heights, 0.0)
+            }
+            _ => self,
         }
-        .refit(DVector::from_vec(sorted.values)))
     }
 
     /// Positions at which every trace was read, mm.

@@ -10,7 +10,7 @@ use errsep_solvers::structured::{Parameters, StructuredFit, fit_structured};
 
 use super::closure;
 use super::descent::{approach, minimise};
-use super::effects::{CATALOGUE, Setting, times};
+use super::effects::{CATALOGUE, HEIGHTS, Heights, Setting, times};
 use super::error::ReversalError;
 use super::fitted_knots::FittedKnots;
 use super::ground::{Begun, Breaks, Ground};
@@ -67,7 +67,13 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
             options.convention,
             ground.thickness_free,
         );
-        let found = search(&ground, &times, &setting)?;
+        let time = |channel: usize, row: usize| times[channels[channel].source[row] as usize];
+        let heights = survey.free_heights(time).map(|by_pass| {
+            let heights = Heights::of(observations, by_pass);
+            let none = vec![0.0; heights.unknowns().len()];
+            (HEIGHTS, heights, none)
+        });
+        let found = search(&ground, &times, &setting, heights)?;
         let begun = Begun::new(observations, &times, &found);
         let mut solution = solve(&ground, &survey, sigmas, Some(&begun))?;
         solution.times_assumed = !setting.timed && asks_for_time(options);
@@ -138,6 +144,7 @@ fn solve(
     if problem.joined.is_some() {
         solution.effects = told::effects(&solution, &problem)?;
         solution.effect_changes = told::changes(&solution, &problem)?;
+        solution.levelled_um = told::greatest_height(&solution, &problem);
     }
     Ok(solution)
 }
@@ -205,7 +212,8 @@ pub(super) fn not_converged(problem: &Reversal, fit: &StructuredFit) -> Reversal
     match &problem.joined {
         None => ReversalError::NotConverged { ending, reached },
         Some(joined) => {
-            let names: Vec<&str> = joined.members().iter().map(|m| m.name).collect();
+            let members = joined.members().iter().map(|m| m.name);
+            let names: Vec<&str> = members.filter(|name| *name != HEIGHTS).collect();
             ReversalError::EffectsNotConverged {
                 effects: names.join(" and "),
                 ending,

@@ -2,6 +2,7 @@
 
 use errsep_solvers::structured::StructuredFit;
 
+use super::effects::HEIGHTS;
 use super::problem::Reversal;
 
 /// An unknown of an effect: its name, value and unit.
@@ -41,7 +42,10 @@ impl Reached {
         for member in problem.joined.iter().flat_map(|j| j.members()) {
             let own = member.unknowns.iter().zip(&mut values);
             let own = own.map(|(u, value)| (u.name.to_string(), value, u.unit));
-            effects.push((member.name, own.collect()));
+            let own = own.collect();
+            if member.name != HEIGHTS {
+                effects.push((member.name, own));
+            }
         }
         let residuals = problem.residuals(&fit.parameters).ok();
         Self {

@@ -35,7 +35,7 @@ const TAKEN_UP: f64 = 1e-8;
 /// Gains closer than this share of them differ by rounding.
 const SAME_GAIN: f64 = 1e-9;
 
-/// The effects that are asked for, with their values to begin with.
+/// The effects that are asked for, with their values to begin with, and behind them what is there in any case.
 ///
 /// # Errors
 /// [`ReversalError`]: an effect that is not known, is asked for twice, or cannot join.
@@ -43,6 +43,7 @@ pub fn search(
     ground: &Ground,
     times: &[f64],
     setting: &Setting,
+    beside: Option<Found>,
 ) -> Result<Vec<Found>, ReversalError> {
     let wanted = entries(&ground.options.effects, setting)?;
     let search = Search::new(ground, times, setting)?;
@@ -53,19 +54,19 @@ pub fn search(
         .collect();
     order.sort_unstable();
     for (_, k) in &order {
-        let present: Vec<Found> = found.iter().flatten().cloned().collect();
-        found[*k] = Some(search.best(&wanted[*k], &present)?);
+        let present = found.iter().flatten().chain(&beside).cloned();
+        found[*k] = Some(search.best(&wanted[*k], &present.collect::<Vec<_>>())?);
     }
     let several = order.iter().filter(|(starts, _)| *starts > 1).count();
     if wanted.len() > 1 && several > 0 {
         // Once more beside all others.
         for (_, k) in order.iter().filter(|(starts, _)| *starts > 1) {
             found[*k] = None;
-            let present: Vec<Found> = found.iter().flatten().cloned().collect();
-            found[*k] = Some(search.best(&wanted[*k], &present)?);
+            let present = found.iter().flatten().chain(&beside).cloned();
+            found[*k] = Some(search.best(&wanted[*k], &present.collect::<Vec<_>>())?);
         }
     }
-    Ok(found.into_iter().flatten().collect())
+    Ok(found.into_iter().flatten().chain(beside).collect())
 }
 
 /// The entries of the catalogue that are asked for.

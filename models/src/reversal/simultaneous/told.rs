@@ -1,7 +1,7 @@
 //! What a solution tells of the effects in it.
 
 use super::descent;
-use super::effects::Kind;
+use super::effects::{HEIGHTS, Kind};
 use super::error::ReversalError;
 use super::problem::Reversal;
 use super::solution::Simultaneous;
@@ -55,7 +55,7 @@ pub fn effects(
     let steps = descent::steps(problem, &solution.parameters)?;
     let is_held = |k: usize| problem.is_held(unknowns.effect(k));
     let mut effects = Vec::new();
-    for member in joined.members() {
+    for member in joined.members().iter().filter(|m| m.name != HEIGHTS) {
         for (k, unknown) in member.unknowns.iter().enumerate() {
             if unknown.kind == Kind::Amplitude && !is_held(member.from + k) {
                 let mut weights = vec![0.0; border.len()];
@@ -128,7 +128,7 @@ fn is_plausible(
 }
 
 /// What the effects change in each reading, µm, in the order of the observations: the model with them less
-/// the same without, nothing else changed.
+/// the same without, nothing else changed. Heights of repeats are none of them.
 ///
 /// # Errors
 /// [`ReversalError::NoStart`] where the model is not defined.
@@ -139,12 +139,41 @@ pub fn changes(solution: &Simultaneous, problem: &Reversal) -> Result<Vec<f64>, 
     at.border.truncate(problem.unknowns.effect(0));
     let with = problem.residuals(&solution.parameters)?;
     let without = without.residuals(&at)?;
+    let heights = heights(solution, problem);
     let count = problem.channels.iter().map(|c| c.len()).sum();
     let mut changes = vec![0.0; count];
     for ((channel, with), without) in problem.channels.iter().zip(&with).zip(&without) {
         for ((i, with), without) in channel.source.iter().zip(with).zip(without) {
-            changes[*i as usize] = without - with;
+            let height = heights.as_ref().map_or(0.0, |all| all[*i as usize]);
+            changes[*i as usize] = without - with - height;
         }
     }
     Ok(changes)
+}
+
+/// The height of each reading's repeat, µm, in the order of the observations, where heights are unknowns of the fit.
+fn heights(solution: &Simultaneous, problem: &Reversal) -> Option<Vec<f64>> {
+    let joined = problem.joined.as_ref()?;
+    let member = joined.members().iter().find(|m| m.name == HEIGHTS)?;
+    let values = problem.unknowns.effect_values(&solution.parameters.border);
+    let own = &values[member.from..member.from + member.unknowns.len()];
+    let mut by = vec![0.0; own.len()];
+    let readings = 0..joined.observations.readings.len() as u32;
+    let height = |i| {
+        (member
+            .effect
+            .shown(&joined.circumstances(i), 0.0, own, &mut by))
+        .0
+    };
+    Some(readings.map(height).collect())
+}
+
+/// The greatest of the heights of repeats that are unknowns of the fit, µm.
+pub fn greatest_height(solution: &Simultaneous, problem: &Reversal) -> Option<f64> {
+    let heights = heights(solution, problem)?;
+    Some(
+        heights
+            .into_iter()
+            .fold(0.0, |most: f64, h| most.max(h.abs())),
+    )
 }

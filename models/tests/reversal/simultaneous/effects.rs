@@ -411,3 +411,52 @@ fn the_closure_is_the_tapers() {
     // k·u: what is left of the profile is noise of 4 × 4 readings a position, less the unknowns.
     assert!(closure.rms < 1.3 * NOISE / 4.0, "{}", closure.rms);
 }
+
+/// Readings with each repeat at a height of its own, within 3 µm.
+fn zeroed_anew(mut observations: Observations, seed: u64) -> Observations {
+    use rand::{RngExt, SeedableRng};
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let mut heights = std::collections::HashMap::new();
+    for reading in &mut observations.readings {
+        let height = heights
+            .entry((reading.channel, reading.repeat))
+            .or_insert_with(|| random.random_range(-3.0..3.0));
+        reading.value += *height;
+    }
+    observations
+}
+
+/// Zeros set anew before every repeat change neither an effect's size nor tilts nor what effects change: whichever they are.
+#[test]
+fn heights_of_repeats_are_unknowns_beside_effects() {
+    let machine = Machine::random(3, CELLS, 76, 4, NOISE);
+    let dirt = Fault::Bump(0.8, 113.0, 6.0, Channel::C1B, false);
+    let readings = machine.measured(&[dirt], 11);
+    let of = |seed| {
+        fitted(
+            &zeroed_anew(readings.clone(), seed),
+            &["local-contamination"],
+        )
+    };
+    let (first, second) = (of(1), of(2));
+    assert!(first.levelled_um.is_some_and(|h| h > 1.0));
+    assert_eq!(first.effects.len(), 1);
+    let (height, std) = parameter(&first, "local-contamination", "height");
+    let std = std.unwrap();
+    assert!(
+        (height - 0.8).abs() < TIMES * std && std < 0.1,
+        "{height} ± {std}"
+    );
+    tilts_are_right(&machine, &first, "zeroed anew");
+    // Rounding and the end of the descent, in standard uncertainties.
+    for (a, b) in first.tilts().iter().zip(second.tilts()) {
+        assert!(
+            (a.angle.value - b.angle.value).abs() < 1e-4 * a.angle.std,
+            "{}",
+            a.name
+        );
+    }
+    for (a, b) in first.effect_changes.iter().zip(&second.effect_changes) {
+        assert!((a - b).abs() < 1e-4 * NOISE && a.abs() < 1.0, "{a} {b}");
+    }
+}

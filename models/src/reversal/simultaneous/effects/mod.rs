@@ -10,6 +10,7 @@ mod ambient_cycle;
 mod axis_backlash;
 mod cyclic_error;
 mod gain_mismatch;
+mod heights;
 mod hysteresis;
 mod indicator_nonlinearity;
 mod lateral_backlash;
@@ -28,6 +29,7 @@ use std::sync::Arc;
 
 use crate::reversal::Channel;
 
+pub use heights::{HEIGHTS, Heights};
 pub use setting::{Circumstances, Indicator, Setting, times};
 
 /// An effect that the fit can take in, or why it cannot.

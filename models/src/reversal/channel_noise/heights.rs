@@ -57,9 +57,15 @@ impl Repeats {
 /// A trace's repeat and its height, µm.
 pub type Height = (u32, f64);
 
-/// Whether heights are unknowns, and if so whether both directions of a repeat have heights of their own; `courses`: of each
-/// channel the heights of all its traces in the order of their times.
-pub fn are_free(repeats: &[Repeats], courses: &[Vec<Height>]) -> Option<bool> {
+/// The heights of all traces of a channel in the order of their times.
+pub struct Course {
+    /// Which indicator reads the channel.
+    pub indicator: usize,
+    pub heights: Vec<Height>,
+}
+
+/// Whether heights are unknowns, and if so whether both directions of a repeat have heights of their own.
+pub fn are_free(repeats: &[Repeats], courses: &[Course]) -> Option<bool> {
     let by_pass = are_by_pass(repeats);
     (stand_apart(repeats) && follow_none(courses, by_pass)).then_some(by_pass)
 }
@@ -78,13 +84,18 @@ fn stand_apart(repeats: &[Repeats]) -> bool {
     !channels.is_empty() && apart.count() as f64 >= SHARE * channels.len() as f64
 }
 
-/// Whether heights jump from each to the next as independent ones do, where enough of them follow each other.
-fn follow_none(courses: &[Vec<Height>], by_pass: bool) -> bool {
+/// Whether heights jump from each to the next as independent ones do, where enough of them follow each other; of two a
+/// channel, whether an indicator's rise in one channel and fall in another.
+fn follow_none(courses: &[Course], by_pass: bool) -> bool {
     let (mut steps, mut least) = (0.0, 0.0);
-    for traces in courses {
+    let mut rises: BTreeMap<usize, [bool; 2]> = BTreeMap::new();
+    for course in courses {
         let of_one = |a: &Height, b: &Height| !by_pass && a.0 == b.0;
         let mean = |own: &[Height]| own.iter().map(|(_, h)| h).sum::<f64>() / own.len() as f64;
-        let own: Vec<f64> = traces.chunk_by(of_one).map(mean).collect();
+        let own: Vec<f64> = course.heights.chunk_by(of_one).map(mean).collect();
+        if let [first, second] = own[..] {
+            rises.entry(course.indicator).or_default()[usize::from(second > first)] = true;
+        }
         let middle = own.iter().sum::<f64>() / own.len().max(1) as f64;
         let squares: f64 = own.iter().map(|h| (h - middle).powi(2)).sum();
         if own.len() >= FEWEST && squares > 0.0 {
@@ -93,7 +104,11 @@ fn follow_none(courses: &[Vec<Height>], by_pass: bool) -> bool {
             least += least_steps(own.len());
         }
     }
-    least > 0.0 && steps >= least
+    if least > 0.0 {
+        steps >= least
+    } else {
+        rises.values().any(|both| *both == [true; 2])
+    }
 }
 
 /// Whether the two directions of a repeat stand apart from each other too, by other amounts in each repeat.
@@ -118,8 +133,12 @@ fn are_by_pass(repeats: &[Repeats]) -> bool {
 
 impl Survey<'_> {
     /// Whether the heights of the repeats are unknowns, and if so whether both directions of a repeat have heights of their
-    /// own; `time` is that of a channel's reading.
-    pub fn free_heights(&self, time: impl Fn(usize, usize) -> f64) -> Option<bool> {
+    /// own; `indicator` is that of a channel, `time` that of one of its readings.
+    pub fn free_heights(
+        &self,
+        indicator: impl Fn(usize) -> usize,
+        time: impl Fn(usize, usize) -> f64,
+    ) -> Option<bool> {
         let repeats: Vec<Repeats> = (self.repeats.iter())
             .map(|group| {
                 let traces = &self.traces[group.channel];
@@ -147,8 +166,11 @@ impl Survey<'_> {
                 Repeats::new(group.channel, &known().map(left).collect::<Vec<_>>())
             })
             .collect();
-        let courses: Vec<Vec<Height>> = (0..self.channels())
-            .map(|c| self.course(c, |row| time(c, row)))
+        let courses: Vec<Course> = (0..self.channels())
+            .map(|c| Course {
+                indicator: indicator(c),
+                heights: self.course(c, |row| time(c, row)),
+            })
             .collect();
         are_free(&repeats, &courses)
     }

@@ -5,9 +5,10 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::arrangement::Seat;
 use super::sorting::{Sorted, TraceKey, trace_key};
 use crate::model::Place;
-use crate::reversal::channel_noise::heights::{Height, Repeats, are_free};
+use crate::reversal::channel_noise::heights::{Course, Height, Repeats, are_free};
 use crate::reversal::designs::DesignObservations;
 
 /// The heights of a model.
@@ -20,8 +21,8 @@ pub(super) struct Heights {
 
 impl Heights {
     /// The heights of readings, where they are to be free.
-    pub fn of(sorted: &Sorted) -> Option<Self> {
-        let by_pass = are_free(&repeated(sorted), &courses(sorted))?;
+    pub fn of(sorted: &Sorted, seats: &[Seat]) -> Option<Self> {
+        let by_pass = are_free(&repeated(sorted), &courses(sorted, seats))?;
         Some(Self::free(&sorted.places, &sorted.traces, by_pass))
     }
 
@@ -156,7 +157,7 @@ fn repeated(sorted: &Sorted) -> Vec<Repeats> {
 }
 
 /// Of each channel the heights of its traces in the order of their times.
-fn courses(sorted: &Sorted) -> Vec<Vec<Height>> {
+fn courses(sorted: &Sorted, seats: &[Seat]) -> Vec<Course> {
     let mut channels: BTreeMap<usize, Vec<(f64, Height)>> = BTreeMap::new();
     for (trace, channel) in sorted.traces.iter().zip(&sorted.trace_channels) {
         let (n, places) = (trace.len() as f64, &sorted.places[trace.clone()]);
@@ -165,9 +166,12 @@ fn courses(sorted: &Sorted) -> Vec<Vec<Height>> {
         let own = channels.entry(*channel).or_default();
         own.push((time, (places[0].repeat, height)));
     }
-    let in_order = |mut own: Vec<(f64, Height)>| {
+    let in_order = |(channel, mut own): (usize, Vec<(f64, Height)>)| {
         own.sort_by(|a, b| a.0.total_cmp(&b.0));
-        own.into_iter().map(|(_, height)| height).collect()
+        Course {
+            indicator: seats[channel].indicator,
+            heights: own.into_iter().map(|(_, height)| height).collect(),
+        }
     };
-    channels.into_values().map(in_order).collect()
+    channels.into_iter().map(in_order).collect()
 }

@@ -77,7 +77,7 @@ pub enum NotDiagnosable {
 /// The heights of repeats where they are unknowns: not where the indicators keep their zeros.
 fn free_heights(sorted: &Sorted, arrangement: &Arrangement) -> Option<Heights> {
     match arrangement.zero() {
-        Zero::Reset => Heights::of(sorted),
+        Zero::Reset => Heights::of(sorted, arrangement.seats()),
         Zero::Kept => None,
     }
 }

@@ -79,7 +79,7 @@ impl GapMeter {
         let estimate = 2.0 * expected * expected / law.freedom.max(1.0);
         let shared = match law.source {
             NoiseSource::Repeats => {
-                let contrasts = Contrasts::new(model.places(), model.traces(), model.observed());
+                let contrasts = Contrasts::of(model, model.observed());
                 (law.freedom.min(contrasts.count() as f64) / freedom).min(1.0)
             }
             NoiseSource::Stated | NoiseSource::Neighbours => 0.0,

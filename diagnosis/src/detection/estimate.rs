@@ -68,7 +68,7 @@ fn without_jumps(model: &AnyModel, level: DVector<f64>, floor: f64) -> (DVector<
 
 /// The law as the differences of repeats show it, or neighbours where there are none.
 fn of_repeats(model: &AnyModel, readings: &DVector<f64>, floor: f64) -> NoiseLaw {
-    let contrasts = Contrasts::new(model.places(), model.traces(), readings);
+    let contrasts = Contrasts::of(model, readings);
     if contrasts.count() < FEWEST_CONTRASTS {
         return neighbours(model, readings, floor);
     }

@@ -110,7 +110,7 @@ pub(crate) fn smallest(
 /// Whether an effect of a size changes what the differences between repeats tell of the noise.
 fn swells(model: &AnyModel, law: &NoiseLaw, signature: &Column, size: f64) -> bool {
     let full = signature.dense(model.places().len());
-    let contrasts = Contrasts::new(model.places(), model.traces(), &full);
+    let contrasts = Contrasts::of(model, &full);
     if contrasts.count() == 0 {
         return false;
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use errsep_models::model::Place;
+use errsep_models::model::{AnyModel, FittedModel, Place};
 use nalgebra::DVector;
 
 use crate::levels::LONG_TRACE;
@@ -46,6 +46,11 @@ pub(crate) struct Likelihood {
 }
 
 impl Contrasts {
+    /// Of a model's readings, or of what is left of them.
+    pub fn of(model: &AnyModel, readings: &DVector<f64>) -> Self {
+        Self::new(model.places(), model.traces(), &model.levelled(readings))
+    }
+
     pub fn new(places: &[Place], traces: &[Range<usize>], readings: &DVector<f64>) -> Self {
         let mut contrasts = Self { groups: Vec::new() };
         for alike in repeated(places, traces) {

@@ -69,8 +69,8 @@ impl Dependence {
         if law.source != NoiseSource::Repeats || !model.repeats_are_alike() {
             return Self::default();
         }
-        let contrasts = Contrasts::new(model.places(), model.traces(), clean);
-        let course = course(model.places(), model.traces(), clean);
+        let contrasts = Contrasts::of(model, clean);
+        let course = course(model.places(), model.traces(), &model.levelled(clean));
         let course = course.filter(|found| is_told(found.p_value));
         let uneven = uneven(&contrasts).filter(|found| is_told(found.p_value));
         let lasting = (course.is_some() || uneven.is_some()) && show_whole();

@@ -20,7 +20,7 @@ pub(crate) fn without_jump(
         return None;
     }
     let likelihood = |readings: &DVector<f64>| {
-        let contrasts = Contrasts::new(model.places(), model.traces(), readings);
+        let contrasts = Contrasts::of(model, readings);
         let (correlated, shift) = (law.correlated / law.white, law.shift / law.white);
         -contrasts
             .likelihood(correlated, law.length, shift)

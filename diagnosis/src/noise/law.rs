@@ -293,7 +293,7 @@ pub(crate) fn draw_scatter(model: &AnyModel, random: &mut ChaCha8Rng) -> DVector
 /// What the repeats say of a single reading's noise where it is stated: standard deviation and
 /// degrees of freedom.
 pub(crate) fn of_repeats(model: &AnyModel, readings: &DVector<f64>) -> Option<(f64, f64)> {
-    let contrasts = Contrasts::new(model.places(), model.traces(), readings);
+    let contrasts = Contrasts::of(model, readings);
     (contrasts.count() >= FEWEST_CONTRASTS).then(|| {
         let (variance, freedom) = contrasts.scatter();
         (variance.sqrt(), freedom)

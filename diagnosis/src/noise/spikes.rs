@@ -127,7 +127,7 @@ impl Spikes {
         let mut noise = DVector::from_fn(model.places().len(), |_, _| law.sample(&mut random));
         let weight = self.weight(&noise)?;
         self.pull_in(&mut noise);
-        let (variance, _) = Contrasts::new(model.places(), model.traces(), &noise).scatter();
+        let (variance, _) = Contrasts::of(model, &noise).scatter();
         Some((
             (weight.ratio / seen.ratio).ln().abs(),
             Tails { freedom, variance },

@@ -2,6 +2,7 @@
 //! once, whatever it is a model of.
 
 use std::any::Any;
+use std::borrow::Cow;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -79,6 +80,7 @@ trait Behind: Send + Sync {
     fn stated_noise(&self) -> Option<f64>;
     fn readings_in_each(&self) -> f64;
     fn noise_allowance(&self) -> f64;
+    fn levelled<'v>(&self, readings: &'v DVector<f64>) -> Cow<'v, DVector<f64>>;
     fn repeats_are_alike(&self) -> bool;
     fn refit(&self, observed: DVector<f64>) -> Box<dyn Behind>;
     fn refit_as_smooth(&self, observed: DVector<f64>) -> Box<dyn Behind>;
@@ -161,6 +163,9 @@ impl<M: FittedModel + 'static> Behind for M {
     }
     fn noise_allowance(&self) -> f64 {
         FittedModel::noise_allowance(self)
+    }
+    fn levelled<'v>(&self, readings: &'v DVector<f64>) -> Cow<'v, DVector<f64>> {
+        FittedModel::levelled(self, readings)
     }
     fn repeats_are_alike(&self) -> bool {
         FittedModel::repeats_are_alike(self)
@@ -262,6 +267,10 @@ impl FittedModel for AnyModel {
     fn noise_allowance(&self) -> f64 {
         self.0.noise_allowance()
     }
+    fn levelled<'v>(&self, readings: &'v DVector<f64>) -> Cow<'v, DVector<f64>> {
+        self.0.levelled(readings)
+    }
+
     fn repeats_are_alike(&self) -> bool {
         self.0.repeats_are_alike()
     }

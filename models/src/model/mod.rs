@@ -8,6 +8,7 @@ mod any;
 mod effect;
 mod moments;
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -337,6 +338,11 @@ pub trait FittedModel: Clone + Send + Sync {
     /// more than one where readings are not each of their own.
     fn noise_allowance(&self) -> f64 {
         1.0
+    }
+
+    /// Readings, or what is left of them, without the heights of repeats where these are unknowns of the fit, each by itself.
+    fn levelled<'v>(&self, readings: &'v DVector<f64>) -> Cow<'v, DVector<f64>> {
+        Cow::Borrowed(readings)
     }
 
     /// Whether repeats of a trace were read at the same places, so that nothing but noise is in their differences.

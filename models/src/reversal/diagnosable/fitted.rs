@@ -1,9 +1,12 @@
 //! What the diagnosis asks of the fitted model.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::Linearised;
 use super::arrangement::Seat;
+use super::heights;
 use super::state::Smoothing;
 use crate::model::{
     Column, Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record,
@@ -173,6 +176,15 @@ impl FittedModel for Linearised {
             Some(_) => filled * n / (n - 1.0),
             None => filled,
         }
+    }
+
+    fn levelled<'v>(&self, readings: &'v DVector<f64>) -> Cow<'v, DVector<f64>> {
+        let Some(heights) = &self.heights else {
+            return Cow::Borrowed(readings);
+        };
+        let traces = &self.record.traces;
+        let above = heights.above(readings, traces, &self.trace_channels);
+        Cow::Owned(heights::levelled(readings, traces, &above))
     }
 
     fn repeats_are_alike(&self) -> bool {

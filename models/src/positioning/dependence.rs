@@ -1,7 +1,7 @@
 //! How one reading scatters: pooled over all targets and directions, whether it scatters alike
 //! everywhere, and whether readings of a run are independent.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal};
 
 use super::readings::Deviations;
 
@@ -18,6 +18,9 @@ pub struct Scatter {
     /// Probability of neighbouring readings of the same runs as alike as these where all are
     /// independent; none where nothing scatters.
     pub independent: Option<f64>,
+    /// Probability of runs at heights as different as these where all readings are independent; none where
+    /// nothing scatters within the runs.
+    pub level: Option<f64>,
 }
 
 /// Below this probability scatter is taken to differ, or readings to depend on each other.
@@ -44,6 +47,7 @@ impl Scatter {
             degrees_of_freedom: count * (deviations.runs - 1),
             equal: bartlett(&variances, pooled, freedom),
             independent: alike(&left, deviations.runs),
+            level: level(&left, deviations.runs),
         })
     }
 
@@ -51,6 +55,12 @@ impl Scatter {
     #[must_use]
     pub fn differs(&self) -> bool {
         self.equal.is_some_and(|p| p < LEVEL)
+    }
+
+    /// Whether whole runs lie at heights of their own.
+    #[must_use]
+    pub fn runs_differ(&self) -> bool {
+        self.level.is_some_and(|p| p < LEVEL)
     }
 
     /// Whether neighbouring readings of a run are alike.
@@ -85,6 +95,28 @@ fn bartlett(variances: &[f64], pooled: f64, freedom: f64) -> Option<f64> {
     let correction = 1.0 + (count + 1.0) / (3.0 * count * freedom);
     let law = ChiSquared::new(count - 1.0).ok()?;
     Some(law.sf((-freedom * logs / correction).max(0.0)))
+}
+
+/// F of the heights of the runs against what is left beside them.
+fn level(left: &[Vec<Vec<f64>>], runs: usize) -> Option<f64> {
+    let rows = || left.iter().flatten();
+    let count = rows().count() as f64;
+    let all: f64 = rows().flatten().map(|v| v * v).sum();
+    let heights: f64 = (0..runs)
+        .map(|run| {
+            let sum: f64 = rows().filter_map(|row| row.get(run)).sum();
+            sum * sum / count
+        })
+        .sum();
+    let between = (runs - 1) as f64;
+    let within = (count - 1.0) * between;
+    let rest = all - heights;
+    // Less than rounding leaves of the squares is no scatter.
+    if !(within > 0.0) || !(rest > 1e-14 * all) {
+        return None;
+    }
+    let law = FisherSnedecor::new(between, within).ok()?;
+    Some(law.sf(heights / between / (rest / within)))
 }
 
 /// Correlations over the runs between a target and its neighbour, and between both directions of a

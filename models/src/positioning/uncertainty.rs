@@ -84,6 +84,17 @@ pub enum NoUncertainty {
     /// A drift with time.
     #[error("the readings drift with time, so that they do not scatter independently")]
     Drifts,
+    /// Runs at heights of their own.
+    #[error(
+        "whole runs lie at heights of their own, as zeroing anew or a drift leaves them, so that their readings do \
+         not scatter independently"
+    )]
+    RunsDiffer,
+    /// The same with times that do not exclude a drift, which shifts one direction against the other.
+    #[error(
+        "whole runs lie at heights of their own that may be a drift, which shifts one direction against the other"
+    )]
+    MayDrift,
     /// Readings of a run that are alike.
     #[error(
         "neighbouring readings of a run are alike, so that the targets do not tell the scatter independently"
@@ -110,8 +121,13 @@ pub(super) fn expanded(
     if deviations.targets.len() > MOST_TARGETS {
         return none(NoUncertainty::TooManyTargets);
     }
+    let shifts = |drift: &Drift| drift.shows() || drift.may;
     let why = [
         (drift.is_some_and(Drift::shows), NoUncertainty::Drifts),
+        (
+            scatter.runs_differ() || drift.is_some_and(|d| d.may),
+            NoUncertainty::RunsDiffer,
+        ),
         (scatter.depends(), NoUncertainty::ReadingsAlike),
         (scatter.differs(), NoUncertainty::ScatterDiffers),
     ];
@@ -131,8 +147,12 @@ pub(super) fn expanded(
         .map(|figure| match why {
             Some(why) if figure.rests_on_scatter() => (figure, Err(why)),
             // A drift shifts one direction against the other, and their mean difference most clearly.
-            Some(NoUncertainty::Drifts) if matches!(figure, Figure::BMean | Figure::UMean) => {
-                (figure, Err(NoUncertainty::Drifts))
+            Some(why)
+                if matches!(figure, Figure::BMean | Figure::UMean) && drift.is_some_and(shifts) =>
+            {
+                let shows = why == NoUncertainty::Drifts;
+                let why = if shows { why } else { NoUncertainty::MayDrift };
+                (figure, Err(why))
             }
             _ => {
                 let own = found.iter().find(|(f, _)| *f == figure);

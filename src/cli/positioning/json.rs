@@ -44,6 +44,7 @@ pub(super) fn as_json(found: &Found) -> Result<Value, Message> {
             "degrees_of_freedom": s.degrees_of_freedom,
             "equal": {"p_value": s.equal, "differs": s.differs()},
             "independent": {"p_value": s.independent, "depends": s.depends()},
+            "runs": {"p_value": s.level, "differ": s.runs_differ()},
         })),
         "points": points(found),
         "drift": drift(found)?,

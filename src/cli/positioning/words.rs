@@ -167,6 +167,8 @@ pub(super) fn drift(found: &Found) -> Result<Option<String>, Message> {
         format!(
             "over the test {change} {unit}, which the standard deviations hold: let the machine warm up and measure again"
         )
+    } else if drift.may || found.result.scatter.is_some_and(|s| s.runs_differ()) {
+        "none that shows beside the heights of the runs, which differ as if each had been zeroed anew".to_owned()
     } else {
         "none that shows".to_owned()
     };

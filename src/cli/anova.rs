@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use errsep_models::anova::recipe::{self, Recipe, Summary};
-use errsep_models::anova::{AnovaError, Group, Groups, OneWay, analyse};
+use errsep_models::anova::{AnovaError, Group, Groups, OneWay, Repeats, analyse_repeats};
 use serde_json::{Value, json};
 
 use super::quantity::{expanded_words, with_expanded};
@@ -69,10 +69,36 @@ struct Analysed {
     feature: Replicates,
     groups: Groups,
     result: OneWay,
+    repeats: Option<Repeats>,
     summary: Option<Summary>,
 }
 
 impl Analysed {
+    /// Repeats that differ over all parts.
+    fn of_repeats(&self) -> Option<String> {
+        let found = self.repeats.as_ref().filter(|r| r.differ)?;
+        let unit = symbol(&self.feature.unit);
+        let percent = per_cent(self.result.components.confidence);
+        Some(format!(
+            "the repeats differ as a whole, as if the instrument had been zeroed anew for each (F({}, {}) {}, p {}): \
+             standard deviation {} {unit}, {percent} % from {} to {}, which the mean and a future reading hold; \
+             one measurement is the scatter beside parts and repeats",
+            found.between.degrees_of_freedom,
+            self.result.within.degrees_of_freedom,
+            number::plain(found.f, 4),
+            number::probability(found.p_value),
+            number::plain(found.component.standard_deviation, 3),
+            number::plain(found.component.lower.sqrt(), 3),
+            number::plain(found.component.upper.sqrt(), 3),
+        ))
+    }
+
+    /// What the reader has to weigh.
+    fn remarks(&self) -> Vec<String> {
+        let own = self.remark().map(str::to_owned);
+        own.into_iter().chain(self.of_repeats()).collect()
+    }
+
     /// Repeats that agree to the last digit, which hides their scatter.
     fn remark(&self) -> Option<&'static str> {
         let groups = self.groups.groups();
@@ -134,7 +160,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             groups: &a.groups,
             result: &a.result,
             summary: a.summary.as_ref(),
-            remark: a.remark(),
+            remark: a.remarks().into_iter().reduce(|a, b| format!("{a}; {b}")),
         })
         .collect();
     Ok(Answer {
@@ -178,7 +204,9 @@ fn analyse_feature(feature: Replicates, args: &Args) -> Result<Analysed, Message
         })
         .collect();
     let groups = Groups::new(groups).map_err(wrong)?;
-    let result = analyse(&groups, &feature.unit, args.confidence).map_err(wrong)?;
+    let (result, repeats) =
+        analyse_repeats(&groups, &feature.repeats, &feature.unit, args.confidence)
+            .map_err(wrong)?;
     let summary = match args.recipe {
         Some(name) => Some(recipe::summarise(&groups, name.into()).map_err(wrong)?),
         None => None,
@@ -187,6 +215,7 @@ fn analyse_feature(feature: Replicates, args: &Args) -> Result<Analysed, Message
         feature,
         groups,
         result,
+        repeats,
         summary,
     })
 }
@@ -208,6 +237,9 @@ fn describe(text: &mut String, one: &Analysed) -> Result<(), Message> {
             );
             return Ok(());
         }
+    }
+    if let Some(of_repeats) = one.of_repeats() {
+        let _ = writeln!(text, "  repeats           {of_repeats}");
     }
     let mean = number::measured(r.mean.value, Some(r.mean.standard_uncertainty));
     let _ = writeln!(
@@ -298,7 +330,8 @@ fn as_json(one: &Analysed) -> Result<Value, Message> {
         "keys": keys,
         "unit": one.feature.unit,
         "analysis": analysis,
-        "remarks": one.remark().into_iter().collect::<Vec<_>>(),
+        "repeats": one.repeats,
+        "remarks": one.remarks(),
         "parts": parts,
     });
     if let (Value::Object(object), Some(summary)) = (&mut value, &one.summary) {

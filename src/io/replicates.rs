@@ -21,6 +21,8 @@ pub struct Replicates {
     pub unit: String,
     /// Parts in the order of their first reading, each with its readings.
     pub parts: Vec<(String, Vec<f64>)>,
+    /// The number of the repeat of each of these readings; empty where the table has none.
+    pub repeats: Vec<Vec<u32>>,
 }
 
 /// Reads a table with the columns `part` and `value`, and where they are known `replicate`, `unit`
@@ -69,6 +71,7 @@ pub fn read_replicates(path: &Path, map: &ColumnMap) -> Result<Vec<Replicates>, 
                     .collect(),
                 unit: unit_name.to_owned(),
                 parts: Vec::new(),
+                repeats: Vec::new(),
             });
             features.len() - 1
         });
@@ -84,6 +87,7 @@ pub fn read_replicates(path: &Path, map: &ColumnMap) -> Result<Vec<Replicates>, 
                 .error(unit.as_ref().unwrap_or(&part), what)
                 .remedy("convert the readings of a feature to one unit"));
         }
+        let mut repeat = None;
         if let Some(column) = &replicate {
             let number = row.count(column)?;
             if let Some(line) = seen.insert((at, part_name.to_owned(), number), row.line()) {
@@ -92,6 +96,7 @@ pub fn read_replicates(path: &Path, map: &ColumnMap) -> Result<Vec<Replicates>, 
                     .error(column, what)
                     .remedy("number the repeats of a part 1, 2, 3, …, or remove one of the rows"));
             }
+            repeat = Some(number);
         }
         let group = *part_of
             .entry((at, part_name.to_owned()))
@@ -101,6 +106,12 @@ pub fn read_replicates(path: &Path, map: &ColumnMap) -> Result<Vec<Replicates>, 
             });
         if let Some((_, readings)) = feature.parts.get_mut(group) {
             readings.push(reading);
+        }
+        if let Some(number) = repeat {
+            feature.repeats.resize(feature.parts.len(), Vec::new());
+            if let Some(numbers) = feature.repeats.get_mut(group) {
+                numbers.push(number);
+            }
         }
     }
     if features.is_empty() {

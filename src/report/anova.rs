@@ -9,7 +9,7 @@ use super::plot::{Axis, Bar, Bars, Chart, Series};
 use super::{Cell, Figure, Page, Section, Standing, Table, number};
 
 /// One feature as the page shows it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct FeatureView<'a> {
     /// Name of the feature.
     pub name: &'a str,
@@ -22,7 +22,7 @@ pub struct FeatureView<'a> {
     /// The figures of NISTIR 6868, where they were asked for.
     pub summary: Option<&'a Summary>,
     /// Why its readings say less than they seem to.
-    pub remark: Option<&'a str>,
+    pub remark: Option<String>,
 }
 
 /// The page of all features; `open` names those whose components are not determined.
@@ -63,7 +63,11 @@ fn verdict(features: &[FeatureView], open: &[&str]) -> (Standing, String) {
         );
         return (Standing::Bad, sentence);
     }
-    let doubtful = |f: &FeatureView| f.remark.map(|remark| format!("{}: {remark}", f.name));
+    let doubtful = |f: &FeatureView| {
+        f.remark
+            .as_ref()
+            .map(|remark| format!("{}: {remark}", f.name))
+    };
     let doubts: Vec<String> = features.iter().filter_map(doubtful).collect();
     if !doubts.is_empty() {
         return (Standing::Caution, format!("{}.", doubts.join("; ")));

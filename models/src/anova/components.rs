@@ -101,19 +101,30 @@ fn between_limits(
         return Ok((0.0, f64::INFINITY));
     };
     let (nu, h) = (spread.degrees, spread.harmonic_count);
-    let square = h * spread.variance;
+    let within = (within_square, within.degrees_of_freedom as f64);
+    limits((h * spread.variance, nu), within, h, tail)
+}
+
+/// The interval of Williams and Tukey of a component whose mean square counts it `count` times beside
+/// another mean square, both with their degrees of freedom.
+pub(super) fn limits(
+    (square, nu): (f64, f64),
+    (within_square, within_nu): (f64, f64),
+    count: f64,
+    tail: f64,
+) -> Result<(f64, f64), AnovaError> {
     let chi = chi_squared(nu)?;
-    let f = FisherSnedecor::new(nu, within.degrees_of_freedom as f64)
+    let f = FisherSnedecor::new(nu, within_nu)
         .map_err(|_| UncertaintyError::BadDegreesOfFreedom { found: nu })?;
     let limit = |p: f64| {
         let excess = square - within_square * f.inverse_cdf(p);
-        (nu * excess / (h * chi.inverse_cdf(p))).max(0.0)
+        (nu * excess / (count * chi.inverse_cdf(p))).max(0.0)
     };
     Ok((limit(1.0 - tail), limit(tail)))
 }
 
 /// Satterthwaite's degrees of freedom of the difference of two mean squares; at least one.
-fn difference_degrees(
+pub(super) fn difference_degrees(
     between_square: f64,
     between: &MeanSquare,
     within_square: f64,

@@ -9,11 +9,13 @@ mod components;
 mod groups;
 mod one_way;
 pub mod recipe;
+mod repeats;
 mod simulate;
 
 pub use components::{Components, Interval};
 pub use groups::{Group, Groups};
 pub use one_way::{MeanSquare, OneWay, analyse};
+pub use repeats::{Repeats, analyse_repeats};
 pub use simulate::{Truth, simulate};
 
 use crate::uncertainty::UncertaintyError;

@@ -19,7 +19,7 @@ pub struct MeanSquare {
 }
 
 impl MeanSquare {
-    fn new(sum_of_squares: f64, degrees_of_freedom: usize) -> Self {
+    pub(super) fn new(sum_of_squares: f64, degrees_of_freedom: usize) -> Self {
         let mean_square =
             (degrees_of_freedom > 0).then(|| sum_of_squares / degrees_of_freedom as f64);
         Self {
@@ -64,6 +64,16 @@ pub struct OneWay {
 /// # Errors
 /// A confidence outside 0..1.
 pub fn analyse(groups: &Groups, unit: &str, confidence: f64) -> Result<OneWay, AnovaError> {
+    analyse_with(groups, None, unit, confidence)
+}
+
+/// The analysis with a scatter within the groups that has fewer degrees of freedom than their readings have.
+pub(super) fn analyse_with(
+    groups: &Groups,
+    within: Option<MeanSquare>,
+    unit: &str,
+    confidence: f64,
+) -> Result<OneWay, AnovaError> {
     let grand = groups.weighted_mean();
     let list = groups.groups();
     let k = list.len();
@@ -72,9 +82,11 @@ pub fn analyse(groups: &Groups, unit: &str, confidence: f64) -> Result<OneWay, A
         .iter()
         .map(|g| g.readings.len() as f64 * (g.mean() - grand).powi(2))
         .sum();
-    let within = list.iter().map(|g| g.sum_of_squares().max(0.0)).sum();
     let between = MeanSquare::new(if k > 1 { between } else { 0.0 }, k - 1);
-    let within = MeanSquare::new(within, n - k);
+    let within = within.unwrap_or_else(|| {
+        let squares = list.iter().map(|g| g.sum_of_squares().max(0.0)).sum();
+        MeanSquare::new(squares, n - k)
+    });
     let f = match (between.mean_square, within.mean_square) {
         (Some(b), Some(w)) if w > 0.0 => Some(b / w),
         _ => None,
@@ -117,7 +129,10 @@ fn mean(
     let n = groups.readings() as f64;
     let list = groups.groups();
     let (variance, degrees) = if list.len() == 1 {
-        (within.mean_square.unwrap_or(0.0) / n, n - 1.0)
+        (
+            within.mean_square.unwrap_or(0.0) / n,
+            within.degrees_of_freedom as f64,
+        )
     } else {
         let sigma_b = components.between.map_or(1.0, |b| b.variance.max(0.0));
         let sigma_w = within.mean_square.unwrap_or(0.0);
@@ -199,7 +214,12 @@ fn future_reading(
     Ok(Some(budget))
 }
 
-fn influence(label: &str, variance: f64, degrees: f64, unit: &str) -> Result<Quantity, AnovaError> {
+pub(super) fn influence(
+    label: &str,
+    variance: f64,
+    degrees: f64,
+    unit: &str,
+) -> Result<Quantity, AnovaError> {
     Ok(Quantity::new(label, 0.0, variance.sqrt(), unit)?
         .with_degrees_of_freedom(DegreesOfFreedom::new(degrees)?))
 }

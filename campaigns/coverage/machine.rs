@@ -65,6 +65,7 @@ fn measured(truth: &[True], normal: Normal) -> Option<Machine> {
                 readings.push(Observation {
                     position: *position,
                     value,
+                    repeat: 0,
                 });
             }
         }

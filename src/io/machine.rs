@@ -288,6 +288,7 @@ fn component_error(
             .map(|&value| Observation {
                 position: 0.0,
                 value,
+                repeat: 0,
             })
             .collect();
         return fitted(&data, 0);
@@ -375,6 +376,7 @@ fn read_components(path: &Path) -> Result<BTreeMap<usize, Vec<Observation>>, Mes
     table.only(&["component", "position", "value", "repeat"])?;
     let (name, value) = (table.column("component")?, table.column("value")?);
     let position = table.column("position")?;
+    let repeat = table.optional("repeat");
     let mut readings: BTreeMap<usize, Vec<Observation>> = BTreeMap::new();
     while let Some(row) = table.next_row()? {
         let component: Component = row.text(&name).parse().map_err(|error: MachineError| {
@@ -384,6 +386,7 @@ fn read_components(path: &Path) -> Result<BTreeMap<usize, Vec<Observation>>, Mes
         let observation = Observation {
             position: row.number(&position)?,
             value: row.number(&value)?,
+            repeat: repeat.as_ref().map_or(Ok(0), |column| row.count(column))?,
         };
         readings
             .entry(component.index())

@@ -22,6 +22,7 @@ mod monte_carlo;
 mod parts;
 mod propagation;
 mod regression;
+mod repeats;
 mod simulate;
 mod turn;
 

@@ -6,6 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::repeats::Repeats;
 use super::{
     Component, ComponentError, ErrorFunction, Kind, MachineError, PolynomialBasis, Spread,
 };
@@ -18,6 +19,8 @@ pub struct Observation {
     pub position: f64,
     /// Reading, um or rad.
     pub value: f64,
+    /// Number of the repeat that it belongs to; zero where that is not told.
+    pub repeat: u32,
 }
 
 /// Why a regression cannot be made.
@@ -61,7 +64,8 @@ pub enum RegressionError {
 /// Fits a polynomial of the given degree; an error of location takes degree 0.
 ///
 /// The scatter about it becomes the variance of a future reading, and the covariance of the
-/// coefficients that of the function.
+/// coefficients that of the function. Where the repeats differ as a whole (each zeroed anew, or drifting),
+/// they are what is independent, not their readings: see [`Repeats`].
 ///
 /// # Errors
 /// Readings that do not determine the polynomial and its scatter.
@@ -127,7 +131,14 @@ pub fn fit_component(
         .solve_upper_triangular(&DMatrix::identity(terms, terms))
         .ok_or_else(unsolvable)?;
     let degrees = (n - terms) as f64;
-    let scatter = (&values - design * &coefficients).norm_squared() / degrees;
+    let left = &values - &design * &coefficients;
+    let scatter = left.norm_squared() / degrees;
+    let inverse = &inverse * inverse.transpose();
+    let repeats = Repeats::of(observations, &design, &left);
+    let (covariance, degrees) = match repeats.filter(Repeats::differ) {
+        Some(repeats) => (repeats.covariance(&inverse), repeats.count() - 1.0),
+        None => (inverse * scatter, degrees),
+    };
     Ok(ComponentError {
         component,
         function: ErrorFunction::Polynomial {
@@ -136,7 +147,7 @@ pub fn fit_component(
         },
         spread: Spread {
             basis,
-            covariance: &inverse * inverse.transpose() * scatter,
+            covariance,
             scatter,
             degrees: DegreesOfFreedom::new(degrees)?,
         },

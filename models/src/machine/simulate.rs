@@ -41,10 +41,17 @@ pub fn simulate_characterization(
         for &station in stations {
             let position = coordinate(error.component, &Position::repeat(station));
             let value = error.function.value(error.component, position)?;
-            for _ in 0..plan.repeats {
+            for repeat in 1..=plan.repeats {
                 let noise: f64 = StandardNormal.sample(&mut generator);
                 let value = value + error.spread.scatter.sqrt() * noise;
-                readings.push((error.component, Observation { position, value }));
+                readings.push((
+                    error.component,
+                    Observation {
+                        position,
+                        value,
+                        repeat: repeat as u32,
+                    },
+                ));
             }
         }
     }

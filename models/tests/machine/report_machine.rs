@@ -20,6 +20,7 @@ pub fn angle() -> ComponentError {
         .map(|row| Observation {
             position: 0.0,
             value: row.number("error_arcsec") * ARCSEC,
+            repeat: 0,
         })
         .collect();
     fit_component("C0Y".parse().unwrap(), &readings, 0).unwrap()

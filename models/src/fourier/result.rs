@@ -125,6 +125,8 @@ pub struct Separation {
     pub steps: Vec<JointStep>,
     /// Standard deviation of one reading, µm, and where it came from.
     pub noise: (f64, NoiseSource),
+    /// By how much a reading of P1 differs from scan to scan, µm; none with one scan.
+    pub first_scatter: Option<f64>,
     /// How well that is known: infinite where it was given.
     pub degrees_of_freedom: DegreesOfFreedom,
     /// Form finer than the orders kept, where the readings show any.

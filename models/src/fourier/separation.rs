@@ -88,6 +88,7 @@ pub fn separate(
         spread: profiled.spread,
         through_first: profiled.through_first,
         scans: same_length(&joined.joints, samples).count(),
+        first: first_scatter(&joined.joints, samples).map_or(1.0, |s| s / sigma),
     };
     let straightness_std = scaled(straightness_std);
     let rise = mean(joined.joints.iter().filter_map(|j| j.rise));
@@ -118,6 +119,7 @@ pub fn separate(
         orders,
         errors,
         noise: (sigma, source),
+        first_scatter: first_scatter(&joined.joints, samples),
         degrees_of_freedom,
         beyond_orders,
         disagreement: found.apart_from(source).and_then(|scatter| {
@@ -141,6 +143,28 @@ fn terms(
 /// The scans that have as many readings on the section as the profile.
 fn same_length(joints: &[Joint], samples: usize) -> impl Iterator<Item = &Joint> {
     joints.iter().filter(move |j| j.first.len() == samples)
+}
+
+/// By how much a reading of P1 differs from scan to scan, µm, each scan about its height: P1 passes the same
+/// places of workpiece and slide whatever the spacing. None with one scan.
+fn first_scatter(joints: &[Joint], samples: usize) -> Option<f64> {
+    let scans: Vec<&[f64]> = same_length(joints, samples).map(|j| &j.first[..]).collect();
+    let n = samples as f64;
+    let freedom = (scans.len().checked_sub(1)? * samples.checked_sub(1)?) as f64;
+    let heights: Vec<f64> = scans.iter().map(|s| s.iter().sum::<f64>() / n).collect();
+    let squares: f64 = (0..samples)
+        .map(|k| {
+            let left = || {
+                scans
+                    .iter()
+                    .zip(&heights)
+                    .map(|(scan, height)| scan[k] - height)
+            };
+            let mean = left().sum::<f64>() / scans.len() as f64;
+            left().map(|v| (v - mean).powi(2)).sum::<f64>()
+        })
+        .sum();
+    (freedom > 0.0 && squares > 0.0).then(|| (squares / freedom).sqrt())
 }
 
 fn slide_of(joints: &[Joint], workpiece: &[f64]) -> Vec<f64> {

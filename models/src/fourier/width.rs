@@ -30,23 +30,44 @@ pub(super) struct Errors {
     pub through_first: Vec<Complex64>,
     /// Scans whose P1 is averaged for the slide.
     pub scans: usize,
+    /// By how much P1 scatters from scan to scan, over the noise of a reading; 1 with one scan, which does
+    /// not tell it.
+    pub first: f64,
 }
+
+/// Variance of what P1 passes into the workpiece at most: the difference of two probes whose variances are
+/// 1 on average is all of P1's then.
+const ALL_OF_FIRST: f64 = 2.0;
 
 impl Errors {
     /// An error of the workpiece and of the slide, for unit noise.
     fn draw(&self, random: &mut impl Rng, samples: usize) -> [Vec<f64>; 2] {
-        let scale = 1.0 / (self.scans as f64).sqrt();
-        let first: Vec<f64> = (0..samples).map(|_| scale * normal(random)).collect();
+        let scans = self.scans as f64;
+        let (passed, own) = self.of_first();
+        let mut white = |variance: f64| -> Vec<f64> {
+            let scale = (variance / scans).sqrt();
+            (0..samples).map(|_| scale * normal(random)).collect()
+        };
+        let (first, alone) = (white(passed), white(own));
         let series = self.spread.draw(
             random,
             &coefficients(&first, self.through_first.len()),
             // Of a part of an order of the mean of n scans of N readings.
-            0.5 / (self.scans * samples) as f64,
+            0.5 * passed / (scans * samples as f64),
             &self.through_first,
         );
         let workpiece = profile(&series, samples);
-        let slide = first.iter().zip(&workpiece).map(|(f, w)| f - w).collect();
+        let first = first.iter().zip(&alone).map(|(first, own)| first + own);
+        let slide = first.zip(&workpiece).map(|(f, w)| f - w).collect();
         [workpiece, slide]
+    }
+
+    /// Variance of P1 that passes into the workpiece, and the rest: what makes P1 scatter more than the
+    /// difference signal allows is of the slide.
+    fn of_first(&self) -> (f64, f64) {
+        let variance = self.first * self.first;
+        let passed = variance.min(ALL_OF_FIRST);
+        (passed, variance - passed)
     }
 
     /// Standard uncertainty of a point of the slide less its line beside that of the workpiece less its
@@ -55,8 +76,10 @@ impl Errors {
     pub fn slide_std(&self, sigma: f64, straightness_std: &[f64]) -> Vec<f64> {
         let of_mean = sigma * sigma / self.scans as f64;
         let samples = straightness_std.len() as f64;
-        let passed: f64 = self.through_first.iter().map(|c| c.re).sum();
-        let own = of_mean * (1.0 - (1.0 + 4.0 * passed) / samples);
+        let (of_first, alone) = self.of_first();
+        let passed: f64 = of_first * self.through_first.iter().map(|c| c.re).sum::<f64>();
+        let first = of_first + alone;
+        let own = of_mean * (first - (first + 4.0 * passed) / samples);
         let variance = |w: &f64| (own + w * w).max(0.0);
         straightness_std
             .iter()

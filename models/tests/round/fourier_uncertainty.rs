@@ -5,6 +5,9 @@ use errsep_models::fourier::{
     ScanReading, Section, Separation, mean_deviation, separate, simulate, simulate_disturbed,
     straightness,
 };
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
 const SECTION: Section = Section {
@@ -359,4 +362,42 @@ fn equal_tiny_and_huge_readings_give_finite_numbers() {
             }
         }
     }
+}
+
+/// A slide that is read by a quiet P1 beside a noisy P2: three spacings tell how much P1 scatters. Kind: k·u.
+#[test]
+fn a_quiet_first_probe_leaves_the_slide_as_well_known_as_it_is() {
+    let quiet = FourierSimulation {
+        samples: 200,
+        noise: 0.0,
+        ..FourierSimulation::default()
+    };
+    let (mut z, mut held) = (Squares::default(), 0);
+    for seed in 0..40 {
+        let (mut scans, truth) = simulate(&quiet, seed).unwrap();
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        for reading in scans.iter_mut().flat_map(|scan| &mut scan.readings) {
+            reading.m1 += 0.5 * normal();
+            for m in [&mut reading.m2, &mut reading.m3].into_iter().flatten() {
+                *m += 3.0 * normal();
+            }
+        }
+        let found = solve(&scans, Compensation::Fitted, None);
+        let true_slide = straightness(&found.x, &truth.slide);
+        let slide = straightness(&found.x, &found.slide);
+        for k in (5..200).step_by(19) {
+            z.add(slide[k] - true_slide[k], found.slide_std[k]);
+        }
+        let span = |v: &[f64]| {
+            v.iter().copied().fold(f64::MIN, f64::max) - v.iter().copied().fold(f64::MAX, f64::min)
+        };
+        let (low, high) = found.slide_error().interval(0.95).unwrap();
+        held += usize::from(low <= span(&true_slide) && span(&true_slide) <= high);
+    }
+    assert!(
+        (z.rms() - 1.0).abs() < 0.15 && held >= 33,
+        "{} {held}",
+        z.rms()
+    );
 }

@@ -335,7 +335,7 @@ fn as_json(
             "readings": scan.readings.len(),
             "probes": if scan.has_third_probe() { 3 } else { 2 },
         })).collect::<Vec<_>>(),
-        "noise": {"value": s.noise.0, "unit": "um", "source": s.noise.1},
+        "noise": {"value": s.noise.0, "unit": "um", "source": s.noise.1, "first_probe": s.first_scatter},
         "uncertainty": coverage_json(Some(s.degrees_of_freedom))?,
         "steps": s.steps.iter().map(|j| json!({
             "spacing": j.spacing,

@@ -23,6 +23,13 @@ pub(super) struct Settled {
     pub curvature: f64,
 }
 
+impl Settled {
+    /// f, S and γ.
+    pub(super) fn profiles(self) -> [DVector<f64>; 3] {
+        [self.surface, self.straightness, self.tilt]
+    }
+}
+
 impl<'a> Frame<'a> {
     pub(super) fn new(outputs: &'a Outputs, line: Line, parabola: Parabola) -> Self {
         let geometry = outputs.geometry();

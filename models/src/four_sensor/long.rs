@@ -12,7 +12,7 @@ use super::separation::{degrees_of_freedom, normal, random_readings};
 use super::zone::minimum_zone;
 use super::{
     FourSensorError, Geometry, Line, MinimumZone, Outputs, Parabola, Penalised, Profile,
-    Separation, Settings, choice, direct, scatter,
+    Separation, Settings, choice, direct, repeats, scatter,
 };
 use crate::uncertainty::DegreesOfFreedom;
 use crate::units::UM_PER_MM;
@@ -169,7 +169,28 @@ impl<'a> LongSeparator<'a> {
             noise_estimated: settings.noise.is_none(),
             degrees_of_freedom: degrees_of_freedom(settings, &chosen, rows),
             chosen,
+            excess: None,
         })
+    }
+
+    /// Errors of f, S and γ that white noise gives, with the λ that was chosen.
+    ///
+    /// # Errors
+    /// As [`separate`](Self::separate).
+    pub fn noise_errors(&self, found: &Separation) -> Result<Vec<repeats::Found>, FourSensorError> {
+        let geometry = self.outputs.geometry();
+        let factored = self.system.factor(found.chosen.point.lambda)?;
+        let frame = Frame::new(self.outputs, self.line, self.settings.parabola);
+        let truth = vec![0.0; self.system.penalty_rows()];
+        (0..repeats::DRAWS)
+            .map(|draw| {
+                let count = self.outputs.readings().len();
+                let noise = random_readings(&mut repeats::random(draw), found.noise, count);
+                let seen = direct::slide_free_part(geometry, &noise);
+                let error = DVector::from_vec(factored.change(seen.as_slice(), &truth)?);
+                Ok(frame.error(&error, &noise).profiles())
+            })
+            .collect()
     }
 
     /// The minimum-zone straightness of S that was found, the noise known to `degrees` of freedom
@@ -187,7 +208,7 @@ impl<'a> LongSeparator<'a> {
         let frame = Frame::new(self.outputs, self.line, self.settings.parabola);
         let positions = self.outputs.slide_positions();
         minimum_zone(&positions, &found.straightness.values, degrees, |random| {
-            let noise = random_readings(random, found.noise, positions.len());
+            let noise = random_readings(random, found.noise_of_straightness(), positions.len());
             let truth: Vec<f64> = (0..self.system.penalty_rows())
                 .map(|_| found.scatter.held_back * normal(random))
                 .collect();

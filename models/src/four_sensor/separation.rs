@@ -9,8 +9,8 @@ use super::frame::Frame;
 use super::gauge::section;
 use super::zone::minimum_zone;
 use super::{
-    Choice, Chosen, FourSensorError, Geometry, Line, MinimumZone, Outputs, Parabola, Penalised,
-    Scatter, choice, direct, scatter,
+    Choice, Chosen, Excess, FourSensorError, Geometry, Line, MinimumZone, Outputs, Parabola,
+    Penalised, Scatter, choice, direct, repeats, scatter,
 };
 use crate::uncertainty::DegreesOfFreedom;
 
@@ -77,6 +77,15 @@ pub struct Separation {
     pub chosen: Chosen,
     /// Coefficient of x² that was given to the surface, µm/mm².
     pub curvature: f64,
+    /// What repeats scatter by beyond the noise, where they were compared and do.
+    pub excess: Option<Excess>,
+}
+
+impl Separation {
+    /// Standard deviation of white noise that would let S err as the noise does, µm.
+    pub(super) fn noise_of_straightness(&self) -> f64 {
+        self.noise * self.excess.map_or(1.0, |excess| excess.factors[1])
+    }
 }
 
 /// The direct system of one geometry, decomposed once for any number of outputs.
@@ -176,7 +185,32 @@ impl Separator {
             noise_estimated: settings.noise.is_none(),
             degrees_of_freedom: degrees_of_freedom(settings, &chosen, data.len()),
             chosen,
+            excess: None,
         })
+    }
+
+    /// Errors of f, S and γ that white noise gives, with the λ that was chosen.
+    ///
+    /// # Errors
+    /// As [`separate`](Self::separate).
+    pub fn noise_errors(
+        &self,
+        outputs: &Outputs,
+        settings: &Settings,
+        found: &Separation,
+    ) -> Result<Vec<repeats::Found>, FourSensorError> {
+        self.check(outputs)?;
+        let lambda = found.chosen.point.lambda;
+        let frame = Frame::new(outputs, self.line, settings.parabola);
+        let count = outputs.readings().len();
+        (0..repeats::DRAWS)
+            .map(|draw| {
+                let noise = random_readings(&mut repeats::random(draw), found.noise, count);
+                let seen = direct::slide_free_part(&self.geometry, &noise);
+                let error = self.decomposition.with_data(&seen)?.solution(lambda)?;
+                Ok(frame.error(&(&self.section * error), &noise).profiles())
+            })
+            .collect()
     }
 
     /// The minimum-zone straightness of S that was found of these outputs, the noise known to `degrees`
@@ -198,7 +232,7 @@ impl Separator {
         let frame = Frame::new(outputs, self.line, settings.parabola);
         let positions = outputs.slide_positions();
         minimum_zone(&positions, &found.straightness.values, degrees, |random| {
-            let noise = random_readings(random, found.noise, positions.len());
+            let noise = random_readings(random, found.noise_of_straightness(), positions.len());
             let seen = self
                 .decomposition
                 .with_data(&direct::slide_free_part(&self.geometry, &noise))?;

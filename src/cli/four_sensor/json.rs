@@ -5,8 +5,8 @@ use serde_json::{Value, json};
 
 use super::Found;
 use super::words::{
-    ENDS_OFF, ZONE_NOTE, averaged, counted_from_ends, discrepancy_key, ends, not_determined,
-    refuted, status_key,
+    ENDS_OFF, ZONE_NOTE, averaged, counted_from_ends, discrepancy_key, ends, excess,
+    not_determined, refuted, status_key,
 };
 use crate::cli::disagreement;
 use crate::cli::quantity::{COVERAGE, coverage_json, unexpandable};
@@ -101,7 +101,11 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
             "degrees_of_freedom": s.chosen.point.residual_degrees_of_freedom(rows),
         },
         "disagreement": disagreement::as_json(found.disagreement()),
-        "remarks": refuted(found).into_iter().collect::<Vec<_>>(),
+        "repeats": s.excess.map(|excess| json!({
+            "factors": {"f": excess.factors[0], "S": excess.factors[1], "gamma": excess.factors[2]},
+            "p_value": excess.p_value,
+        })),
+        "remarks": excess(found).into_iter().chain(refuted(found)).collect::<Vec<_>>(),
         "uncertainty": coverage_json(found.degrees_of_freedom())?,
         "published": found.published.as_ref().map(|way| json!({
             "lambda": way.chosen.as_ref().map(|chosen| chosen.point.lambda),

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 use errsep_models::four_sensor::{
     Choice, Ends, FourSensorError, LongSeparator, MinimumZone, Parabola, Penalised,
-    PublishedSeparation, PublishedSeparator, Separation, Separator,
+    PublishedSeparation, PublishedSeparator, Separation, Separator, Settings,
 };
 use errsep_models::uncertainty::{DegreesOfFreedom, Disagreement};
 
@@ -100,7 +100,7 @@ impl Found {
         let found = &self.separation;
         // Four outputs a slide position less its S and gamma.
         let rows = 2 * self.measured.outputs.readings().len();
-        let degrees = self.degrees_of_freedom()?;
+        let degrees = noise_known(found, self.noise_stated, &self.measured)?;
         let test = || found.chosen.disagreement(rows, found.noise, degrees);
         (!found.noise_estimated).then(test).flatten()
     }
@@ -111,8 +111,30 @@ impl Found {
     }
 }
 
-/// Degrees of freedom of the noise: of the scatter of the repeats where it was taken from there.
+/// The settings with the λ that was chosen, for one repeat.
+fn fixed(setup: &Setup, found: &Separation) -> Settings {
+    Settings {
+        choice: Choice::Fixed(found.chosen.point.lambda),
+        // Of one output of the average; a repeat by itself states nothing of its uncertainty.
+        noise: Some(found.noise),
+        ..setup.settings
+    }
+}
+
+/// Degrees of freedom of the noise: of what the repeats scatter by beyond it, of the scatter of the repeats where it was taken from there.
 fn how_well_known(
+    found: &Separation,
+    noise_stated: bool,
+    measured: &Measured,
+) -> Option<DegreesOfFreedom> {
+    found.excess.map_or_else(
+        || noise_known(found, noise_stated, measured),
+        |excess| Some(excess.degrees),
+    )
+}
+
+/// The same of the noise of a reading alone.
+fn noise_known(
     found: &Separation,
     noise_stated: bool,
     measured: &Measured,
@@ -158,7 +180,19 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         }
         separator
             .separate(outputs, &setup.settings)
-            .and_then(|found| {
+            .and_then(|mut found| {
+                if measured.each.len() > 1 {
+                    let settings = fixed(&setup, &found);
+                    let each = measured
+                        .each
+                        .iter()
+                        .map(|one| separator.separate(one, &settings));
+                    let each = each
+                        .map(|one| Ok(one?.found()))
+                        .collect::<Result<Vec<_>, FourSensorError>>()?;
+                    let draws = separator.noise_errors(outputs, &setup.settings, &found)?;
+                    found.count_repeats(&each, &draws, degrees(&found), setup.settings.parabola);
+                }
                 let degrees = degrees(&found);
                 let error =
                     separator.straightness_error(outputs, &setup.settings, &found, degrees)?;
@@ -167,7 +201,17 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     } else {
         LongSeparator::new(outputs, setup.penalised, setup.line, &setup.settings).and_then(
             |separator| {
-                let found = separator.separate()?;
+                let mut found = separator.separate()?;
+                if measured.each.len() > 1 {
+                    let settings = fixed(&setup, &found);
+                    let each = measured.each.iter().map(|one| {
+                        let one = LongSeparator::new(one, setup.penalised, setup.line, &settings)?;
+                        Ok(one.separate()?.found())
+                    });
+                    let each = each.collect::<Result<Vec<_>, FourSensorError>>()?;
+                    let draws = separator.noise_errors(&found)?;
+                    found.count_repeats(&each, &draws, degrees(&found), setup.settings.parabola);
+                }
                 let error = separator.straightness_error(&found, degrees(&found))?;
                 Ok((found, error))
             },

@@ -10,8 +10,8 @@ use nalgebra::DVector;
 use super::Found;
 use super::json::residual_rms;
 use super::words::{
-    ENDS_OFF, ZONE_NOTE, counted_from_ends, ends, noise_source, not_determined, refuted, span,
-    status, straightness, uneven,
+    ENDS_OFF, ZONE_NOTE, counted_from_ends, ends, excess, noise_source, not_determined, refuted,
+    span, status, straightness, uneven,
 };
 use crate::cli::quantity::COVERAGE;
 use crate::io::Message;
@@ -28,6 +28,7 @@ pub(super) fn page(found: &Found, data: &Path) -> Result<Page, Message> {
     );
     let doubtful = s.chosen.instead.is_some()
         || s.scatter.is_uneven()
+        || s.excess.is_some()
         || refuted(found).is_some()
         || (counted_from_ends(found).is_some()
             && found.ends.is_some_and(|e| e.contradict(ENDS_OFF)));
@@ -179,6 +180,9 @@ fn regularization(found: &Found) -> Section {
     }
     if let Some(note) = counted_from_ends(found) {
         section = section.warning(format!("About this penalty: {note}."));
+    }
+    if let Some(warning) = excess(found) {
+        section = section.warning(format!("Repeats: {warning}."));
     }
     if let Some(warning) = uneven(found) {
         section = section.warning(warning);

@@ -95,6 +95,9 @@ pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
     if let Some(warning) = uneven(found) {
         let _ = writeln!(text, "  warning          {warning}");
     }
+    if let Some(warning) = excess(found) {
+        let _ = writeln!(text, "  warning          {warning}");
+    }
     if let Some(remark) = refuted(found) {
         let _ = writeln!(text, "  {remark}");
     }
@@ -188,6 +191,17 @@ pub(super) fn uneven(found: &Found) -> Option<String> {
             scatter.even
         )
     })
+}
+
+/// Repeats that scatter by more than the noise of their readings, once each is separated by itself.
+pub(super) fn excess(found: &Found) -> Option<String> {
+    let excess = found.separation.excess?;
+    Some(format!(
+        "separated one by one, the repeats scatter {} times as much in S as the noise of their readings gives: a \
+         sensor drifts within a repeat, is noisier than the others, or the positions do not repeat; the \
+         uncertainties count it",
+        number::plain(excess.factors[1], 2)
+    ))
 }
 
 /// Outputs that the noise does not explain.

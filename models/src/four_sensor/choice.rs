@@ -26,6 +26,9 @@ pub enum Penalised {
 }
 
 impl Penalised {
+    /// Those among which outputs can choose: the line through the ends has to be known.
+    pub const CANDIDATES: [Self; 3] = [Self::Profile, Self::Slope, Self::Curvature];
+
     /// All, in the order of the list above.
     pub const ALL: [Self; 4] = [
         Self::Profile,

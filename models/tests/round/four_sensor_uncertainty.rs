@@ -2,7 +2,8 @@
 
 use errsep_models::four_sensor::simulate::{Disturbances, Example, Truth, simulate};
 use errsep_models::four_sensor::{
-    Choice, Geometry, Line, Outputs, Parabola, Penalised, Separator, Settings,
+    Choice, Geometry, Likeliest, Line, Outputs, Parabola, Penalised, Separator, Settings,
+    separate_long,
 };
 use errsep_models::straightness::{ReferenceLine, straightness};
 use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
@@ -320,4 +321,63 @@ fn sensors_that_drift_within_a_repeat_are_in_the_uncertainty() {
     }
     let z = f64::sqrt(sum / count);
     assert!(told >= 18 && z < 1.3, "{told} {z}");
+}
+
+/// A surface whose long waves are the largest: of the penalties that on the curvature is the likeliest by far, through
+/// the decomposition and through the band, which agree to what the sampling of λ leaves; and S errs by less than half
+/// as much as with the penalty on the profile.
+#[test]
+fn the_likeliest_penalty_is_that_which_errs_least() {
+    let geometry = Geometry::new(5.0, [1, 1, 5], 62).unwrap();
+    let (mut by_profile, mut by_likeliest) = (0.0, 0.0);
+    for seed in 0..10 {
+        let truth = Rough::new(&geometry, 1.5, seed);
+        let outputs = simulate(&geometry, &truth, &Disturbances::noise(0.1), seed).unwrap();
+        let likeliest = Likeliest::of(&outputs, true).unwrap().unwrap();
+        assert_eq!(likeliest.penalised, Penalised::Curvature, "{likeliest:?}");
+        let long = Likeliest::of(&outputs, false).unwrap().unwrap();
+        assert_eq!(long.penalised, Penalised::Curvature, "{long:?}");
+        let slope = |found: &Likeliest| {
+            let of = |(penalised, _): &&(Penalised, f64)| *penalised == Penalised::Slope;
+            found.against.iter().find(of).unwrap().1
+        };
+        assert!(
+            (slope(&likeliest) - slope(&long)).abs() < 1.0,
+            "{likeliest:?} {long:?}"
+        );
+        let expected = stated(&geometry, &truth).straightness;
+        let square = |penalised| {
+            let separator = Separator::new(&geometry, penalised, Line::EndPoints).unwrap();
+            let found = separator.separate(&outputs, &Settings::default()).unwrap();
+            (found.straightness.values - &expected).norm_squared()
+        };
+        by_likeliest += square(likeliest.penalised);
+        by_profile += square(Penalised::Profile);
+    }
+    assert!(
+        by_likeliest < 0.25 * by_profile,
+        "{by_likeliest} {by_profile}"
+    );
+}
+
+/// Through the band differences find a λ as through the decomposition: the range of λ reaches as far as the long waves
+/// ask for, where it ended at the norms of the rows.
+#[test]
+fn long_records_find_a_lambda_with_differences() {
+    let geometry = Geometry::new(1.0, [5, 7, 25], 100).unwrap();
+    let truth = Rough::new(&geometry, 1.5, 3);
+    let outputs = simulate(&geometry, &truth, &Disturbances::noise(0.1), 3).unwrap();
+    let settings = Settings {
+        choice: Choice::Likelihood,
+        ..Settings::default()
+    };
+    for penalised in [Penalised::Slope, Penalised::Curvature] {
+        let line = Line::EndPoints;
+        let dense = Separator::new(&geometry, penalised, line).unwrap();
+        let dense = dense.separate(&outputs, &settings).unwrap();
+        let long = separate_long(&outputs, penalised, line, &settings).unwrap();
+        let ratio = long.chosen.point.lambda / dense.chosen.point.lambda;
+        // Both roots of one slope to 1e-9 of λ; the rounding of two ways to it.
+        assert!((ratio - 1.0).abs() < 1e-5, "{ratio}");
+    }
 }

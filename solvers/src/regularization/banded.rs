@@ -1,6 +1,8 @@
 //! Regularization through the band: A with a few neighbouring nonzeros a row and a few columns that
 //! every row may see. Each λ costs one orthogonal factorisation of [A; λL], linear in the rows.
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 
 use super::error::checked_lambda;
@@ -23,6 +25,8 @@ pub struct BandedSystem {
     pub(super) stencil: &'static [f64],
     pub(super) conditions: Vec<Vec<f64>>,
     pub(super) held: Vec<usize>,
+    /// The large end of the range, once it was looked for.
+    largest: OnceLock<f64>,
 }
 
 impl BandedSystem {
@@ -58,6 +62,7 @@ impl BandedSystem {
             stencil,
             conditions: Vec::new(),
             held: Vec::new(),
+            largest: OnceLock::new(),
         })
     }
 
@@ -102,6 +107,7 @@ impl BandedSystem {
         {
             return Err(RegularizationError::NotFinite { what: "a row" });
         }
+        self.largest = OnceLock::new();
         self.firsts.push(first);
         self.values.extend_from_slice(band);
         self.values.extend_from_slice(border);
@@ -145,6 +151,7 @@ impl BandedSystem {
                 found: weights.len(),
             });
         }
+        self.largest = OnceLock::new();
         self.conditions.push(weights);
         Ok(())
     }
@@ -186,23 +193,27 @@ impl Family for BandedSystem {
         self.firsts.len() - self.held.len()
     }
 
-    /// Five decades below the largest column norm of A over that of L.
+    /// From five decades below the largest column norm of A over that of L to that, or to where differences
+    /// let half a parameter through: waves longer than the rows reach have far smaller differences than values,
+    /// and pass a λ that is many times that quotient of norms.
     fn range(&self) -> (f64, f64) {
-        let mut squares = vec![0.0; self.band];
-        for index in 0..self.firsts.len() {
-            let (first, band, _, _) = self.row(index);
-            for (square, value) in squares[first..].iter_mut().zip(band) {
-                *square += value * value;
-            }
+        let norms = self.of_norms();
+        if self.stencil.len() < 2 {
+            return (1e-5 * norms, norms);
         }
-        let of_a = squares.into_iter().fold(0.0, f64::max).sqrt();
-        let of_l = self.stencil.iter().map(|s| s * s).sum::<f64>().sqrt();
-        let largest = of_a / of_l;
-        (1e-5 * largest, largest)
+        let largest = *self
+            .largest
+            .get_or_init(|| self.half_let_through(norms).unwrap_or(norms));
+        (1e-5 * norms, largest)
     }
 
     fn samples(&self) -> usize {
-        48
+        // Over five decades; as dense over more.
+        const FEWEST: f64 = 48.0;
+        let (smallest, largest) = self.range();
+        (FEWEST * (largest / smallest).log10() / 5.0)
+            .round()
+            .max(FEWEST) as usize
     }
 
     fn points(&self, lambdas: &[f64]) -> Result<Vec<Point>, RegularizationError> {
@@ -214,5 +225,42 @@ impl Family for BandedSystem {
 
     fn point(&self, lambda: f64) -> Result<Point, RegularizationError> {
         Ok(self.factor(lambda)?.point())
+    }
+}
+
+impl BandedSystem {
+    /// λ from `norms` on at which half a parameter of those that L sees is let through, to some per cent.
+    fn half_let_through(&self, norms: f64) -> Option<f64> {
+        // Beyond these decades nothing is.
+        const DECADES: f64 = 5.0;
+        let parameters = |lambda| Some(self.point(lambda).ok()?.effective_parameters);
+        let (mut low, mut high) = (norms, norms * 10_f64.powf(DECADES));
+        let free = parameters(high)?.round();
+        if parameters(low)? - free < 0.5 {
+            return Some(norms);
+        }
+        while high > 1.05 * low {
+            let middle = (low * high).sqrt();
+            if parameters(middle)? - free < 0.5 {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        Some(high)
+    }
+
+    /// The largest column norm of A over that of L.
+    fn of_norms(&self) -> f64 {
+        let mut squares = vec![0.0; self.band];
+        for index in 0..self.firsts.len() {
+            let (first, band, _, _) = self.row(index);
+            for (square, value) in squares[first..].iter_mut().zip(band) {
+                *square += value * value;
+            }
+        }
+        let of_a = squares.into_iter().fold(0.0, f64::max).sqrt();
+        let of_l = self.stencil.iter().map(|s| s * s).sum::<f64>().sqrt();
+        of_a / of_l
     }
 }

@@ -10,10 +10,16 @@ pub struct Likelihood {
     pub point: Point,
     /// Standard deviation of one row's noise, σ.
     pub noise: f64,
+    /// −2 ln of the restricted likelihood there, up to a constant that depends on the rows alone: what
+    /// penalties that leave the same parameters free can be compared by.
+    pub criterion: f64,
     /// The likelihood is greatest at an end of the range: at its large end the data show nothing but
     /// noise, at its small end no noise. `point` is that end.
     pub at_edge: bool,
 }
+
+/// λ looked at above the range, over three decades.
+const BEYOND: usize = 30;
 
 /// λ = σ/s of the likeliest σ and s, if the noise is white with standard deviation σ and the entries of
 /// Lx are independent with standard deviation s (H. D. Patterson, R. Thompson, *Biometrika* 58 (1971)
@@ -23,7 +29,7 @@ pub struct Likelihood {
 /// With γ the generalized singular values, n₀ the parameters that L leaves free, e = Σ γ²/(γ² + λ²) and
 /// q = ‖Ax − b‖² + λ²‖Lx‖² the criterion is Σ ln(1 + γ²/λ²) + (m − n₀) ln q. Its slope in ln λ,
 /// 2 [(m − n₀) λ²‖Lx‖²/q − e], needs only what every family tells; the criterion itself is the integral
-/// of it. Compared with generalized cross-validation its λ scatters less; an x that is smoother than L
+/// of it, and Σ ln(1 + γ²/λ²) that of 2 e from λ on. Compared with generalized cross-validation its λ scatters less; an x that is smoother than L
 /// says (smooth where L is the identity) is under-smoothed.
 ///
 /// # Errors
@@ -66,10 +72,25 @@ pub fn likelihood_among<F: Family + ?Sized>(
             least = (height, k + 1);
         }
     }
-    let ends = |p: &Point, at_edge| Likelihood {
-        point: *p,
-        noise: (total(p) / rows).max(0.0).sqrt(),
-        at_edge,
+    // e from the largest λ known to where nothing is let through.
+    let beyond = sample(family, last.lambda, 1e3 * last.lambda, BEYOND)?;
+    let parameters = |p: &Point| (p.effective_parameters - free).max(0.0);
+    let ends = |p: &Point, at_edge| {
+        let mut from = *p;
+        let mut let_through = 0.0;
+        for next in points.iter().chain(&beyond) {
+            if next.lambda > from.lambda {
+                let step = (next.lambda / from.lambda).ln();
+                let_through += step * (parameters(&from) + parameters(next));
+                from = *next;
+            }
+        }
+        Likelihood {
+            point: *p,
+            noise: (total(p) / rows).max(0.0).sqrt(),
+            criterion: let_through + rows * total(p).ln(),
+            at_edge,
+        }
     };
     let best = least.1;
     let (low, high) = (

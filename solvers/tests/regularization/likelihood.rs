@@ -109,3 +109,34 @@ fn pure_noise_wants_the_largest_penalty_and_exact_data_the_smallest() {
     // Rounding of the grid over ln λ.
     assert!((found.point.lambda / spectrum.range().1 - 1.0).abs() < 1e-12);
 }
+
+/// The criterion is −2 ln of the density of b, noise and x drawn with the σ and s found, but for
+/// (m) ln 2π and what profiling σ leaves: m − m ln m.
+#[test]
+fn the_criterion_is_the_density_of_the_data() {
+    let (m, n) = (14, 9);
+    let a = DMatrix::from_fn(m, n, |i, j| {
+        ((i * j) as f64 * 0.7).sin() + f64::from(i == j)
+    });
+    let b = DVector::from_fn(m, |i, _| {
+        (i as f64 * 1.3).cos() + 0.3 * (i as f64 * 5.1).sin()
+    });
+    let decomposition = Decomposition::general(&a, &Penalty::Identity).unwrap();
+    let spectrum = decomposition.with_data(&b).unwrap();
+    let found = likelihood(&spectrum).unwrap();
+    let variance = found.noise.powi(2);
+    let ratio = found.point.lambda.powi(-2);
+    let v = (DMatrix::identity(m, m) + &a * a.transpose() * ratio) * variance;
+    let factor = v.clone().cholesky().unwrap();
+    let density = b.dot(&factor.solve(&b)) + factor.determinant().ln();
+    let rows = m as f64;
+    let expected = density - rows + rows * rows.ln();
+    // Truncation of the trapezoidal rule, h²/12 times the change of the slope of 2 e, at most one a parameter, over
+    // steps of h = 3 ln 10/29 above the range.
+    let truncation = (3.0 * 10_f64.ln() / 29.0).powi(2) / 12.0 * n as f64;
+    assert!(
+        (found.criterion - expected).abs() < truncation,
+        "{} {expected}",
+        found.criterion
+    );
+}

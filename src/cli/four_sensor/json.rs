@@ -1,6 +1,6 @@
 //! The answer as JSON, schema `errsep.four-sensor/1` (docs/json/four-sensor.md).
 
-use errsep_models::four_sensor::{Parabola, Profile};
+use errsep_models::four_sensor::{Parabola, Penalised, Profile};
 use serde_json::{Value, json};
 
 use super::Found;
@@ -71,6 +71,10 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
         })),
         "regularization": {
             "penalty": found.setup.penalised.name(),
+            "penalties": found.likeliest.as_ref().map(|likeliest| {
+                let of = |(penalised, against): &(Penalised, f64)| (penalised.name().to_owned(), json!(against));
+                likeliest.against.iter().map(of).collect::<serde_json::Map<_, _>>()
+            }),
             "lambda": s.chosen.point.lambda,
             "rule": s.chosen.rule,
             "instead": s.chosen.instead,

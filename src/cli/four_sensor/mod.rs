@@ -9,7 +9,7 @@ mod words;
 use std::path::PathBuf;
 
 use errsep_models::four_sensor::{
-    Choice, Ends, FourSensorError, LongSeparator, MinimumZone, Parabola, Penalised,
+    Choice, Ends, FourSensorError, Likeliest, LongSeparator, MinimumZone, Parabola, Penalised,
     PublishedSeparation, PublishedSeparator, Separation, Separator, Settings,
 };
 use errsep_models::uncertainty::{DegreesOfFreedom, Disagreement};
@@ -36,7 +36,7 @@ each sensor to the one before and, if known, the noise of one reading:
     spacing = [5.0, 5.0, 25.0]   # mm, multiples of the step
     noise = 0.1                  # um, of one reading of one repeat
     [separation]                 # all optional
-    penalty = \"profile\"          # or profile-from-ends, slope, curvature
+    penalty = \"curvature\"        # or profile, slope, profile-from-ends; absent: the likeliest of the first three
     choice = \"l-curve\"           # or likelihood, gcv, discrepancy; or lambda = 0.02
     line = \"end-points\"          # or least-squares: what surface and straightness are counted from
     [parabola]                   # optional, one of
@@ -69,6 +69,8 @@ struct Found {
     measured: Measured,
     setup: Setup,
     noise_stated: bool,
+    /// Where the set-up does not name the penalty.
+    likeliest: Option<Likeliest>,
     separation: Separation,
     straightness_error: MinimumZone,
     published: Option<PublishedSeparation>,
@@ -158,17 +160,25 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     if let Choice::Discrepancy { noise } = &mut setup.settings.choice {
         *noise = of_mean(*noise);
     }
+    let dense = measured.outputs.geometry().point_count() <= LONGEST_DENSE;
     let unsolved =
         |error: FourSensorError| Message::not_determined(error.to_string()).in_file(&args.data);
     let geometry = measured.outputs.geometry();
     let outputs = &measured.outputs;
+    let likeliest = match setup.penalty_stated {
+        true => None,
+        false => Likeliest::of(outputs, dense).map_err(unsolved)?,
+    };
+    if let Some(likeliest) = &likeliest {
+        setup.penalised = likeliest.penalised;
+    }
     let mut published = None;
     let mut condition_number = None;
     let mut ends = None;
     let degrees = |found: &Separation| {
         how_well_known(found, noise_stated, &measured).unwrap_or(DegreesOfFreedom::Infinite)
     };
-    let (separation, straightness_error) = if geometry.point_count() <= LONGEST_DENSE {
+    let (separation, straightness_error) = if dense {
         let separator = Separator::new(geometry, setup.penalised, setup.line).map_err(unsolved)?;
         let way = PublishedSeparator::new(geometry).map_err(unsolved)?;
         published = Some(way.separate(outputs, Choice::LCurve).map_err(unsolved)?);
@@ -226,6 +236,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         straightness_error,
         noise_stated,
         measured,
+        likeliest,
         setup,
     };
     let answer = Answer {

@@ -26,8 +26,7 @@ struct Sensors {
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Separation {
-    #[serde(default)]
-    penalty: Penalised,
+    penalty: Option<Penalised>,
     #[serde(default)]
     choice: Rule,
     lambda: Option<Spanned<f64>>,
@@ -60,6 +59,8 @@ pub(in crate::cli) struct Setup {
     /// D2, D3, D4, mm, and where they stand in the file.
     pub spacing: Spanned<Numbers<3>>,
     pub penalised: Penalised,
+    /// Whether the set-up names the penalty.
+    pub penalty_stated: bool,
     pub line: Line,
     pub settings: Settings,
 }
@@ -120,7 +121,8 @@ impl Setup {
         };
         Ok(Self {
             spacing: sensors.spacing,
-            penalised: separation.penalty,
+            penalised: separation.penalty.unwrap_or_default(),
+            penalty_stated: separation.penalty.is_some(),
             line: separation.line,
             settings: Settings {
                 choice,

@@ -66,10 +66,15 @@ pub(super) fn text(found: &Found, data: &Path) -> Result<String, Message> {
     }
     let _ = writeln!(
         text,
-        "  lambda           {:.3e} by {}; penalty on the {}; {}",
+        "  lambda           {:.3e} by {}; penalty on the {}{}; {}",
         s.chosen.point.lambda,
         s.chosen.rule,
         found.setup.penalised.name(),
+        if found.likeliest.is_some() {
+            ", the likeliest"
+        } else {
+            ""
+        },
         status(s.chosen.curve.status)
     );
     if let Some(reason) = s.chosen.instead {
@@ -178,6 +183,7 @@ pub(super) fn uneven(found: &Found) -> Option<String> {
     let scatter = &found.separation.scatter;
     let penalised = found.setup.penalised;
     let remedy = match penalised {
+        _ if found.likeliest.is_some() => "space the sensors wider",
         Penalised::ProfileFromEnds => "choose penalty = \"profile\"",
         Penalised::Profile | Penalised::Slope => "choose penalty = \"curvature\"",
         Penalised::Curvature => "space the sensors wider",

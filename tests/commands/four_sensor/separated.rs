@@ -61,6 +61,7 @@ fn the_fixture_is_separated_and_answered_as_documented() {
             "regularization",
             &[
                 "penalty",
+                "penalties",
                 "lambda",
                 "rule",
                 "instead",

@@ -365,7 +365,7 @@ fn the_likeliest_penalty_is_that_which_errs_least() {
 #[test]
 fn long_records_find_a_lambda_with_differences() {
     let geometry = Geometry::new(1.0, [5, 7, 25], 100).unwrap();
-    let truth = Rough::new(&geometry, 1.5, 3);
+    let truth = Rough::new(&geometry, 3.0, 3);
     let outputs = simulate(&geometry, &truth, &Disturbances::noise(0.1), 3).unwrap();
     let settings = Settings {
         choice: Choice::Likelihood,

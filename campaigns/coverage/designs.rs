@@ -264,6 +264,7 @@ impl Case {
             correlated: correlated * correlated,
             length: CORRELATED_MM,
             shift: shift * shift,
+            drift: 0.0,
         };
         let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x6e6f_6973);
         let traces = observations

@@ -387,6 +387,7 @@ impl Case {
             correlated,
             length: 15.0,
             shift,
+            drift: 0.0,
         };
         for channel in self.read {
             let factor = self.channels[channel.index()];

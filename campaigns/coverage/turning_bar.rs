@@ -129,6 +129,7 @@ fn one(seed: u64, share: f64, readings: f64, stray: f64) -> Option<Found> {
             // 24 turns at 3 a minute: a third of a second from reading to reading.
             length: readings / 3.0,
             shift: 0.0,
+            drift: 0.0,
         },
         seed,
         ..TurningPlan::default()

@@ -1,7 +1,8 @@
 //! Differences between repeats of a trace, and how likely a law of noise makes them.
 
-use super::law::decays;
-use super::posterior::NoiseValues;
+use super::law::{about_middle, decays};
+use super::posterior::{NoiseValues, OfWhole};
+use nalgebra::{Matrix2, Vector2};
 
 /// A trace of this many readings can show what is correlated along it.
 const LONG: usize = 20;
@@ -17,6 +18,8 @@ pub struct Contrasts {
 #[derive(Debug, Clone)]
 struct Group {
     positions: Vec<f64>,
+    /// In the unit of the values: a shift or a drift of one.
+    one: f64,
     rows: Vec<Vec<f64>>,
 }
 
@@ -33,8 +36,8 @@ pub struct Likelihood {
 struct Step {
     decay: f64,
     gain: f64,
-    /// Innovation of a trace of ones over its variance.
-    ones: f64,
+    /// Innovations of a trace of ones and of one that drifts over their variance.
+    slow: [f64; 2],
     /// 1/variance of the innovation.
     weight: f64,
 }
@@ -42,7 +45,8 @@ struct Step {
 impl Contrasts {
     /// Adds the contrasts of repeats that were read at the same positions (not decreasing): one less
     /// than there are repeats, after Helmert.
-    pub fn add(&mut self, positions: &[f64], repeats: &[Vec<f64>]) {
+    /// Values may be weighted: `one` is what a shift of one is in them, the same shift in traces of any weight.
+    pub fn add(&mut self, positions: &[f64], repeats: &[Vec<f64>], one: f64) {
         if positions.is_empty() || repeats.len() < 2 {
             return;
         }
@@ -59,10 +63,12 @@ impl Contrasts {
                 *s += y;
             }
         }
-        match self.groups.iter_mut().find(|g| g.positions == positions) {
+        let alike = |g: &&mut Group| g.positions == positions && g.one == one;
+        match self.groups.iter_mut().find(alike) {
             Some(group) => group.rows.extend(rows),
             None => self.groups.push(Group {
                 positions: positions.to_vec(),
+                one,
                 rows,
             }),
         }
@@ -98,53 +104,69 @@ impl NoiseValues for Contrasts {
     }
 
     /// The correlated part is Markov, so one pass of the Kalman filter gives determinant and quadratic
-    /// form; a shift is an update of rank one.
+    /// form; shift and drift are an update of rank two: with U the traces of ones and of a drift, D their variances and
+    /// G = UᵀV⁻¹U
+    ///
+    /// ```text
+    ///     r'(V + UDUᵀ)⁻¹r = r'V⁻¹r − vᵀ(I + DG)⁻¹Dv,   v = UᵀV⁻¹r,      |V + UDUᵀ| = |V| |I + DG|
+    /// ```
     fn likelihoods(
         &self,
         white: f64,
         correlated: f64,
         length: f64,
-        shifts: &[f64],
+        whole: &[OfWhole],
     ) -> Vec<Likelihood> {
-        let mut quadratics = vec![0.0; shifts.len()];
-        let mut log_determinants = vec![0.0; shifts.len()];
+        let mut quadratics = vec![0.0; whole.len()];
+        let mut log_determinants = vec![0.0; whole.len()];
         let mut steps: Vec<Step> = Vec::new();
         for group in &self.groups {
             steps.clear();
-            let (mut ones, mut variance) = (0.0, correlated);
-            let (mut ones_squared, mut log_totals) = (0.0, 0.0);
+            let places = about_middle(&group.positions);
+            let (mut slow, mut variance) = ([0.0; 2], correlated);
+            let (mut gram, mut log_totals) = (Matrix2::zeros(), 0.0);
             for (k, decay) in decays(&group.positions, length).into_iter().enumerate() {
                 if k > 0 {
-                    ones *= decay;
+                    slow = slow.map(|s| s * decay);
                     variance = decay * decay * variance + correlated * (1.0 - decay * decay);
                 }
                 let total = variance + white;
-                let innovation = 1.0 - ones;
-                ones_squared += innovation * innovation / total;
+                let ones = [group.one, group.one * places[k]];
+                let innovation = Vector2::new(ones[0] - slow[0], ones[1] - slow[1]);
+                gram += innovation * innovation.transpose() / total;
                 log_totals += total.ln();
                 let gain = variance / total;
-                ones += gain * innovation;
+                slow = [0, 1].map(|l| slow[l] + gain * innovation[l]);
                 variance *= 1.0 - gain;
                 steps.push(Step {
                     decay,
                     gain,
-                    ones: innovation / total,
+                    slow: [innovation[0] / total, innovation[1] / total],
                     weight: 1.0 / total,
                 });
             }
+            // Over all rows: r'V⁻¹r and vvᵀ.
+            let (mut own, mut together) = (0.0, Matrix2::zeros());
             for row in &group.rows {
-                let (mut state, mut own, mut along) = (0.0, 0.0, 0.0);
+                let (mut state, mut along) = (0.0, Vector2::zeros());
                 for (step, value) in steps.iter().zip(row) {
                     state *= step.decay;
                     let innovation = value - state;
                     own += innovation * innovation * step.weight;
-                    along += innovation * step.ones;
+                    along += Vector2::from(step.slow) * innovation;
                     state += step.gain * innovation;
                 }
-                for (s, shift) in shifts.iter().enumerate() {
-                    quadratics[s] += own - shift * along * along / (1.0 + shift * ones_squared);
-                    log_determinants[s] += log_totals + (shift * ones_squared).ln_1p();
-                }
+                together += along * along.transpose();
+            }
+            let rows = group.rows.len() as f64;
+            for (k, of) in whole.iter().enumerate() {
+                let sizes = Matrix2::from_diagonal(&Vector2::new(of.shift, of.drift));
+                let grown = Matrix2::identity() + sizes * gram;
+                let taken = grown
+                    .try_inverse()
+                    .map_or_else(Matrix2::zeros, |i| i * sizes);
+                quadratics[k] += own - (taken * together).trace();
+                log_determinants[k] += rows * (log_totals + grown.determinant().ln());
             }
         }
         let count = self.count() as f64;
@@ -173,7 +195,7 @@ mod tests {
         #[test]
         fn the_likelihood_is_the_dense_one(
             white in 0.2f64..1.0, correlated in 0.0f64..3.0, length in 0.5f64..20.0,
-            shift in 0.0f64..2.0, steps in prop::collection::vec(0.1f64..4.0, 5..12),
+            shift in 0.0f64..2.0, drift in 0.0f64..1.0, steps in prop::collection::vec(0.1f64..4.0, 5..12),
             values in prop::collection::vec(-2.0f64..2.0, 36),
         ) {
             let mut x = vec![0.0];
@@ -183,11 +205,13 @@ mod tests {
             let n = x.len();
             let repeats: Vec<Vec<f64>> = (0..3).map(|r| values[r * n..(r + 1) * n].to_vec()).collect();
             let mut contrasts = Contrasts::default();
-            contrasts.add(&x, &repeats);
+            contrasts.add(&x, &repeats, 1.0);
             prop_assert_eq!(contrasts.count(), 2 * n);
+            let places = about_middle(&x);
             let covariance = DMatrix::from_fn(n, n, |i, j| {
                 let own = if i == j { white } else { 0.0 };
-                own + correlated * (-(x[i] - x[j]).abs() / length).exp() + shift
+                let lines = drift * places[i] * places[j];
+                own + correlated * (-(x[i] - x[j]).abs() / length).exp() + shift + lines
             });
             let factor = covariance.cholesky().unwrap();
             let log_determinant = 2.0 * factor.l().diagonal().map(f64::ln).sum();
@@ -204,8 +228,8 @@ mod tests {
             }
             let count = 2.0 * n as f64;
             let dense = 0.5 * (count * (quadratic / count).ln() + 2.0 * log_determinant);
-            let found = contrasts.likelihoods(white, correlated, length, &[0.0, shift])[1];
-            // Epsilons: twelve readings a row, condition of the covariance below 500.
+            let found = contrasts.likelihoods(white, correlated, length, &[OfWhole::default(), OfWhole { shift, drift }])[1];
+            // Epsilons: twelve readings a row, condition of the covariance below 10 000.
             prop_assert!((found.minus_log - dense).abs() < 1e-9 * (1.0 + dense.abs()));
             prop_assert!((found.quadratic / quadratic - 1.0).abs() < 1e-9);
         }

@@ -14,6 +14,8 @@ pub struct Law {
     pub length: f64,
     /// Of the shift of a whole trace.
     pub shift: f64,
+    /// Of the slope by which a whole trace drifts about its middle, in the square of the unit over that of the positions.
+    pub drift: f64,
 }
 
 impl Law {
@@ -24,10 +26,11 @@ impl Law {
             correlated: 0.0,
             length: 1.0,
             shift: 0.0,
+            drift: 0.0,
         }
     }
 
-    /// Variance of one reading.
+    /// Variance of one reading in the middle of its trace.
     pub fn variance(&self) -> f64 {
         self.white + self.correlated + self.shift
     }
@@ -39,8 +42,24 @@ impl Law {
             white: factor * self.white,
             correlated: factor * self.correlated,
             shift: factor * self.shift,
+            drift: factor * self.drift,
             ..self
         }
+    }
+
+    /// The law of values in which a shift or a drift of one is `one`.
+    #[must_use]
+    pub fn where_whole_is(self, one: f64) -> Self {
+        Self {
+            shift: one * one * self.shift,
+            drift: one * one * self.drift,
+            ..self
+        }
+    }
+
+    /// Variance of the white and the correlated part of one reading.
+    pub fn of_readings(&self) -> f64 {
+        self.white + self.correlated
     }
 
     /// Draws the noise of one trace, readings in the order in which they were taken.
@@ -48,17 +67,23 @@ impl Law {
         let mut normal = || -> f64 { StandardNormal.sample(random) };
         let (white, markov) = (self.white.sqrt(), self.correlated.sqrt());
         let shift = self.shift.sqrt() * normal();
+        let slope = if self.drift > 0.0 {
+            self.drift.sqrt() * normal()
+        } else {
+            0.0
+        };
+        let places = about_middle(positions);
         let mut state = markov * normal();
         let decays = decays(positions, self.length);
         for (k, (value, decay)) in noise.iter_mut().zip(&decays).enumerate() {
             if k > 0 {
                 state = decay * state + markov * (1.0 - decay * decay).sqrt() * normal();
             }
-            *value = shift + state + white * normal();
+            *value = shift + slope * places[k] + state + white * normal();
         }
     }
 
-    /// aᵀVb, V the covariance of the readings of a trace, by one pass.
+    /// aᵀVb, V the covariance of the readings of a trace without drift, by one pass; see [`drift_form`].
     pub fn form(&self, decays: &[f64], a: &[f64], b: &[f64]) -> f64 {
         let white: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
         let mut sum = self.white * white;
@@ -71,7 +96,7 @@ impl Law {
         sum
     }
 
-    /// Variance of the sum of squares of n readings of a trace, over 2: the sum of the squares of all
+    /// Variance of the sum of squares of n readings of a trace without drift, over 2: the sum of the squares of all
     /// elements of V. `double` are the decays of half the length.
     pub fn squares(&self, decays: &[f64], double: &[f64]) -> f64 {
         let ones = vec![1.0; decays.len()];
@@ -83,6 +108,18 @@ impl Law {
             + 2.0 * self.correlated * self.shift * apart
             + self.shift.powi(2) * n * (n - 1.0)
     }
+}
+
+/// Positions of a trace counted from their mean: its middle.
+pub fn about_middle(positions: &[f64]) -> Vec<f64> {
+    let middle = positions.iter().sum::<f64>() / positions.len().max(1) as f64;
+    positions.iter().map(|x| x - middle).collect()
+}
+
+/// Σ aᵢ bⱼ ξᵢ ξⱼ over all pairs of a trace, ξ the positions from its middle: what a drift of unit slope makes of aᵀVb.
+pub fn drift_form(places: &[f64], a: &[f64], b: &[f64]) -> f64 {
+    let along = |of: &[f64]| -> f64 { places.iter().zip(of).map(|(x, v)| x * v).sum() };
+    along(a) * along(b)
 }
 
 /// What is left of the correlated part from the reading before: exp(−|Δx|/ℓ); zero at the first.
@@ -136,7 +173,7 @@ mod tests {
                 x.push(x[x.len() - 1] + step);
             }
             let n = x.len();
-            let law = Law { white, correlated, length, shift };
+            let law = Law { white, correlated, length, shift, drift: 0.0 };
             let (a, b) = (&values[..n], &values[n..2 * n]);
             let v = dense(&law, &x);
             let expected = DVector::from_column_slice(a).dot(&(&v * DVector::from_column_slice(b)));
@@ -156,6 +193,7 @@ mod tests {
             correlated: 2.0,
             length: 3.0,
             shift: 0.5,
+            drift: 0.3,
         };
         let x = [0.0, 1.0, 1.5, 4.0];
         let w = [1.0, -2.0, 0.5, 0.7];
@@ -172,7 +210,8 @@ mod tests {
                 .sum::<f64>()
                 .powi(2);
         }
-        let expected = law.form(&decays(&x, law.length), &w, &w);
+        let expected = law.form(&decays(&x, law.length), &w, &w)
+            + law.drift * drift_form(&about_middle(&x), &w, &w);
         // k·u: the mean of 40 000 squares is known to √(2/40 000); four of them.
         assert!((sum / f64::from(count) / expected - 1.0).abs() < 0.029);
     }

@@ -1,8 +1,8 @@
 //! The noise of readings that are taken along traces, and what repeats tell of it.
 //!
 //! One reading = white noise + a part that is correlated along its trace (Ornstein–Uhlenbeck: a Markov
-//! process of variance o and correlation exp(−|Δx|/ℓ)) + a shift of the whole trace. [`Law`] holds the
-//! variances, [`Contrasts`] what differs between repeats of a trace, and [`Posterior`] which laws
+//! process of variance o and correlation exp(−|Δx|/ℓ)) + a shift of the whole trace + a line by
+//! which the whole trace drifts about its middle. [`Law`] holds the variances, [`Contrasts`] what differs between repeats of a trace, and [`Posterior`] which laws
 //! these, or other [values](NoiseValues) that hold nothing but noise, allow. Nothing here needs a matrix of
 //! readings × readings: every product with a covariance is one pass along the trace, at any spacing.
 
@@ -11,5 +11,5 @@ mod law;
 mod posterior;
 
 pub use contrasts::{Contrasts, Likelihood};
-pub use law::{Law, decays, markov_form};
-pub use posterior::{NoiseValues, Possible, Posterior};
+pub use law::{Law, about_middle, decays, drift_form, markov_form};
+pub use posterior::{NoiseValues, OfWhole, Possible, Posterior};

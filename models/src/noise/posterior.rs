@@ -1,20 +1,20 @@
 //! Which laws of noise the readings allow, each with its probability.
 //!
-//! Four kinds of law are weighed: white alone, with shifts, with a correlated part, with both; each a
-//! quarter beforehand (where shifts are not seen there are two kinds, each a half). Beforehand, too, the
-//! correlated part's share of the standard deviation beside the white one, the shift's share of the whole
-//! and the logarithm of the correlation length are uniform, and that of the scale everywhere. The scale is integrated in closed form; the others on a grid that
-//! closes in on where the probability lies.
+//! Eight kinds of law are weighed: white alone or with a correlated part, each without more, with shifts, with drifts of whole
+//! traces, with both; all alike beforehand (where shifts are not seen there are two kinds). Beforehand, too, the
+//! correlated part's share of the standard deviation beside the white one, those of shift and of drift (at the ends of the
+//! travel) of the whole and the logarithm of the correlation length are uniform, and that of the scale everywhere. The
+//! scale is integrated in closed form; the others on a grid that closes in on where the probability lies.
 
 use super::contrasts::Likelihood;
 use super::law::Law;
 
 /// Fewest values in contrasts from which a law can be told.
 const FEWEST: usize = 8;
-/// Points of the grid along the share of the correlated part and along its length.
-const POINTS: usize = 9;
-/// Points along the shift, which cost no further pass.
-const SHIFTS: usize = 15;
+/// Sides of the grid: the share of the correlated part, the logarithm of its length, the shares of shift and drift.
+const SIDES: usize = 4;
+/// Points along each; those of shift and drift cost no further pass.
+const COUNTS: [usize; SIDES] = [9, 9, 15, 11];
 /// Rounds in which the grid closes in.
 const MOST_ROUNDS: usize = 8;
 /// The grid closes in on what has more than this share of the greatest probability.
@@ -25,6 +25,8 @@ const CLOSE: f64 = 0.7;
 const MOST: f64 = 0.999;
 /// Greatest share of the shift, two thousand times the rest.
 const MOST_SHIFT: f64 = 1.0 - 1e-7;
+/// Greatest share of the drift at the ends of the travel, seven hundred times the rest.
+const MOST_DRIFT: f64 = 1.0 - 1e-6;
 
 /// A law, its scale left open, that the contrasts allow.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +50,15 @@ pub struct Posterior {
 /// A side of the grid: from, to.
 type Side = (f64, f64);
 
+/// Variances of what a whole trace does.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OfWhole {
+    /// Of its shift.
+    pub shift: f64,
+    /// Of the slope of its drift.
+    pub drift: f64,
+}
+
 /// Values that hold noise and nothing else, and how likely a law makes them.
 pub trait NoiseValues {
     /// Number of values.
@@ -57,16 +68,16 @@ pub trait NoiseValues {
     /// they show no more than white noise.
     fn reach(&self) -> Option<(f64, f64)>;
 
-    /// Whether a shift of a whole trace is seen in them.
+    /// Whether a shift and a drift of a whole trace are seen in them.
     fn has_shifts(&self) -> bool;
 
-    /// The likelihood of a law of a white and a correlated part with each of some shifts.
+    /// The likelihood of a law of a white and a correlated part with each of some shifts and drifts of whole traces.
     fn likelihoods(
         &self,
         white: f64,
         correlated: f64,
         length: f64,
-        shifts: &[f64],
+        whole: &[OfWhole],
     ) -> Vec<Likelihood>;
 }
 
@@ -76,7 +87,7 @@ impl Posterior {
         if values.count() < FEWEST {
             return None;
         }
-        let plain = values.likelihoods(1.0, 0.0, 1.0, &[0.0])[0];
+        let plain = values.likelihoods(1.0, 0.0, 1.0, &[OfWhole::default()])[0];
         if !(plain.quadratic > f64::MIN_POSITIVE && plain.quadratic.is_finite()) {
             return None;
         }
@@ -84,14 +95,17 @@ impl Posterior {
         let lengths = values
             .reach()
             .map(|(spacing, travel)| (spacing.ln(), travel.max(2.0 * spacing).ln()));
-        let shifts = [false, true];
-        for shift in shifts
-            .into_iter()
-            .take(1 + usize::from(values.has_shifts()))
-        {
-            explore(values, None, shift, plain.minus_log, &mut possible);
-            if let Some(lengths) = lengths {
-                explore(values, Some(lengths), shift, plain.minus_log, &mut possible);
+        let kinds = [(false, false), (true, false), (false, true), (true, true)];
+        // A drift is told from what is correlated where traces are long enough to show that.
+        let kinds = match (values.has_shifts(), lengths) {
+            (false, _) => &kinds[..1],
+            (true, None) => &kinds[..2],
+            (true, Some(_)) => &kinds[..],
+        };
+        for of_whole in kinds {
+            explore(values, None, *of_whole, plain.minus_log, &mut possible);
+            if lengths.is_some() {
+                explore(values, lengths, *of_whole, plain.minus_log, &mut possible);
             }
         }
         let top = possible
@@ -149,6 +163,7 @@ impl Posterior {
             correlated,
             length,
             shift: mean(|l| l.shift),
+            drift: mean(|l| l.drift),
         }
     }
 
@@ -177,7 +192,7 @@ impl Posterior {
 fn explore(
     values: &impl NoiseValues,
     lengths: Option<Side>,
-    shift: bool,
+    (shift, drift): (bool, bool),
     reference: f64,
     possible: &mut Vec<Possible>,
 ) {
@@ -186,10 +201,12 @@ fn explore(
         whole(lengths.map(|_| (0.0, MOST))),
         whole(lengths),
         whole(shift.then_some((0.0, MOST_SHIFT))),
+        whole(drift.then_some((0.0, MOST_DRIFT))),
     ];
+    let half_travel = values.reach().map_or(1.0, |(_, travel)| 0.5 * travel);
     let mut sides = limits;
     for round in 0..MOST_ROUNDS {
-        let points = on_grid(values, lengths.is_some(), &sides, reference);
+        let points = on_grid(values, lengths.is_some(), half_travel, &sides, reference);
         let next = closer(&points, &sides, &limits);
         let shortens = next
             .iter()
@@ -235,30 +252,46 @@ fn middles(side: Side, count: usize) -> Vec<f64> {
 fn on_grid(
     values: &impl NoiseValues,
     correlated: bool,
-    sides: &[Side; 3],
+    half_travel: f64,
+    sides: &[Side; SIDES],
     reference: f64,
-) -> Vec<([f64; 3], Possible)> {
-    let shares = middles(sides[2], SHIFTS);
-    let shifts: Vec<f64> = shares.iter().map(|c| c * c / (1.0 - c * c)).collect();
+) -> Vec<([f64; SIDES], Possible)> {
+    let beside = |share: f64| share * share / (1.0 - share * share);
+    let mut shares = Vec::new();
+    for shift in middles(sides[2], COUNTS[2]) {
+        shares.extend(
+            middles(sides[3], COUNTS[3])
+                .into_iter()
+                .map(|drift| [shift, drift]),
+        );
+    }
+    let whole: Vec<OfWhole> = shares
+        .iter()
+        .map(|[shift, drift]| OfWhole {
+            shift: beside(*shift),
+            drift: beside(*drift) / (half_travel * half_travel),
+        })
+        .collect();
     let mut points = Vec::new();
-    for a in middles(sides[0], POINTS) {
-        for b in middles(sides[1], POINTS) {
+    for a in middles(sides[0], COUNTS[0]) {
+        for b in middles(sides[1], COUNTS[1]) {
             let own = a * a;
             let length = if correlated { b.exp() } else { 1.0 };
-            let found = values.likelihoods(1.0 - own, own, length, &shifts);
-            for ((likelihood, share), shift) in found.into_iter().zip(&shares).zip(&shifts) {
+            let found = values.likelihoods(1.0 - own, own, length, &whole);
+            for ((likelihood, share), of) in found.into_iter().zip(&shares).zip(&whole) {
                 let law = Law {
                     white: 1.0 - own,
                     correlated: own,
                     length,
-                    shift: *shift,
+                    shift: of.shift,
+                    drift: of.drift,
                 };
                 let possible = Possible {
                     law,
                     probability: reference - likelihood.minus_log,
                     quadratic: likelihood.quadratic,
                 };
-                points.push(([a, b, *share], possible));
+                points.push(([a, b, share[0], share[1]], possible));
             }
         }
     }
@@ -266,12 +299,16 @@ fn on_grid(
 }
 
 /// The box around what is not negligible, one step of the grid wider.
-fn closer(points: &[([f64; 3], Possible)], sides: &[Side; 3], limits: &[Side; 3]) -> [Side; 3] {
+fn closer(
+    points: &[([f64; SIDES], Possible)],
+    sides: &[Side; SIDES],
+    limits: &[Side; SIDES],
+) -> [Side; SIDES] {
     let top = points
         .iter()
         .map(|(_, p)| p.probability)
         .fold(f64::NEG_INFINITY, f64::max);
-    let mut next = [(f64::INFINITY, f64::NEG_INFINITY); 3];
+    let mut next = [(f64::INFINITY, f64::NEG_INFINITY); SIDES];
     for (at, _) in points
         .iter()
         .filter(|(_, p)| p.probability > top + NEGLIGIBLE.ln())
@@ -281,8 +318,7 @@ fn closer(points: &[([f64; 3], Possible)], sides: &[Side; 3], limits: &[Side; 3]
         }
     }
     for (k, side) in next.iter_mut().enumerate() {
-        let count = if k == 2 { SHIFTS } else { POINTS };
-        let step = (sides[k].1 - sides[k].0) / count as f64;
+        let step = (sides[k].1 - sides[k].0) / COUNTS[k] as f64;
         *side = (
             (side.0 - step).max(limits[k].0),
             (side.1 + step).min(limits[k].1),
@@ -312,7 +348,7 @@ mod tests {
                     noise
                 })
                 .collect();
-            contrasts.add(&x, &repeats);
+            contrasts.add(&x, &repeats, 1.0);
         }
         (x, contrasts)
     }
@@ -327,12 +363,21 @@ mod tests {
                 correlated: 1.0,
                 length: 15.0,
                 shift: 0.0,
+                drift: 0.0,
             },
             Law {
                 white: 1.0,
                 correlated: 0.0,
                 length: 1.0,
                 shift: 0.3,
+                drift: 0.0,
+            },
+            Law {
+                white: 1.0,
+                correlated: 0.0,
+                length: 1.0,
+                shift: 9.0,
+                drift: 2e-3,
             },
         ] {
             let (mut inside, seeds) = ([0; 2], 150);
@@ -356,7 +401,11 @@ mod tests {
                     let of: Vec<f64> = posterior
                         .possible()
                         .iter()
-                        .map(|p| p.law.form(&crate::noise::decays(&x, p.law.length), w, w))
+                        .map(|p| {
+                            let places = crate::noise::about_middle(&x);
+                            p.law.form(&crate::noise::decays(&x, p.law.length), w, w)
+                                + p.law.drift * crate::noise::drift_form(&places, w, w)
+                        })
                         .collect();
                     let (variance, freedom) = posterior.variance(&of);
                     let error: f64 = noise.iter().zip(w).map(|(e, w)| e * w).sum();
@@ -381,6 +430,7 @@ mod tests {
             correlated: 0.6,
             length: 10.0,
             shift: 0.2,
+            drift: 0.0,
         };
         let (_, contrasts) = contrasts(&law, 400, 5);
         let mean = Posterior::of(&contrasts).unwrap().mean();
@@ -400,6 +450,7 @@ mod tests {
             correlated: 0.0,
             length: 1.0,
             shift: 1e5,
+            drift: 0.0,
         };
         let (_, contrasts) = contrasts(&law, 60, 5);
         let mean = Posterior::of(&contrasts).unwrap().mean();
@@ -412,7 +463,7 @@ mod tests {
     fn too_few_or_no_noise_give_no_law() {
         assert!(Posterior::of(&Contrasts::default()).is_none());
         let mut still = Contrasts::default();
-        still.add(&[0.0; 10], &[vec![1.0; 10], vec![1.0; 10]]);
+        still.add(&[0.0; 10], &[vec![1.0; 10], vec![1.0; 10]], 1.0);
         assert!(Posterior::of(&still).is_none());
     }
 }

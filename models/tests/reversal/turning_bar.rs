@@ -35,6 +35,7 @@ const NOISE: Law = Law {
     correlated: 0.04,
     length: 0.6,
     shift: 0.0,
+    drift: 0.0,
 };
 
 const PLAIN: Made = Made {

@@ -45,6 +45,7 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
                 "correlated": law.correlated.sqrt(),
                 "length": law.length,
                 "shift": law.shift.sqrt(),
+                "drift": 1e-3 * law.drift.sqrt(),
             })),
             "degrees_of_freedom": o.degrees_of_freedom,
             "channels": o.channel_noise.iter().map(|(c, s)| (c.name().to_owned(), json!(s))).collect::<Map<_, _>>(),

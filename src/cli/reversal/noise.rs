@@ -26,11 +26,12 @@ pub fn words(
             let part = |variance: f64| number::plain(variance.sqrt(), 2);
             return format!(
                 "from the repeats, {of}: white {} µm, correlated along a trace {} µm over {} mm, \
-                 shift of a trace {} µm",
+                 shift of a trace {} µm, slope by which a trace drifts {} µrad",
                 part(law.white),
                 part(law.correlated),
                 number::plain(law.length, 2),
-                part(law.shift)
+                part(law.shift),
+                number::plain(1e3 * law.drift.sqrt(), 2)
             );
         }
         NoiseOrigin::Declared => "declared in the set-up".to_owned(),

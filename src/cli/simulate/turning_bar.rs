@@ -126,6 +126,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
             correlated: correlated * correlated,
             length: args.correlation,
             shift: 0.0,
+            drift: 0.0,
         },
         recorded: args.recorded,
         seed: args.common.seed,

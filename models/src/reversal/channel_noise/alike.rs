@@ -38,19 +38,20 @@ impl Survey<'_> {
     /// The readings of every channel, µm, less the lines by which its traces differ; the mean of these lines is left.
     /// `None` where no channel has more than one trace.
     pub fn alike(&self) -> Option<Vec<Vec<f64>>> {
-        let several =
-            |traces: &Vec<traces::Trace>| traces.iter().filter(|t| t.len() > 0).count() > 1;
-        if !self.traces.iter().any(several) {
-            return None;
-        }
-        let all = self.traces.iter().enumerate();
-        Some(
-            all.map(|(c, own)| match several(own) {
-                true => self.channel_alike(c),
-                false => self.values[c].to_vec(),
-            })
-            .collect(),
-        )
+        self.traces
+            .iter()
+            .any(several)
+            .then(|| self.without_lines(&self.values))
+    }
+
+    /// Values of the readings of every channel less the lines by which its traces differ, as [`alike`](Self::alike).
+    pub fn without_lines<V: AsRef<[f64]>>(&self, values: &[V]) -> Vec<Vec<f64>> {
+        let all = self.traces.iter().zip(values).enumerate();
+        all.map(|(c, (own, values))| match several(own) {
+            true => self.channel_alike(c, values.as_ref()),
+            false => values.as_ref().to_vec(),
+        })
+        .collect()
     }
 
     /// The readings of every channel less the heights by which the repeats of one direction differ, their mean left.
@@ -84,9 +85,9 @@ impl Survey<'_> {
         Some(level)
     }
 
-    fn channel_alike(&self, channel: usize) -> Vec<f64> {
+    fn channel_alike(&self, channel: usize, values: &[f64]) -> Vec<f64> {
         let (x, traces) = (self.x[channel], &self.traces[channel]);
-        let mut values = self.values[channel].to_vec();
+        let mut values = values.to_vec();
         let group = traces::of_channel(channel, x, traces);
         let (Some(first), Some(last)) = (x.first(), x.last()) else {
             return values;
@@ -104,6 +105,11 @@ impl Survey<'_> {
         }
         values
     }
+}
+
+/// Whether a channel has more than one trace.
+fn several(traces: &Vec<traces::Trace>) -> bool {
+    traces.iter().filter(|t| t.len() > 0).count() > 1
 }
 
 impl Group {

@@ -10,11 +10,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::sum_of_squares;
 use super::supposed::Counted;
 use super::survey::Survey;
 use super::traces::Group;
-use crate::noise::{Contrasts, Law, Posterior, decays, markov_form};
+use super::{rms, sum_of_squares};
+use crate::noise::{Contrasts, Law, Posterior, about_middle, decays, drift_form, markov_form};
 
 /// Readings of a cell whose derivatives stand for all of it.
 const MOST_ROWS: usize = 4;
@@ -54,6 +54,10 @@ struct Row {
 #[derive(Debug, Clone)]
 struct Cells {
     positions: Vec<f64>,
+    /// The same from the middle of the trace.
+    about_middle: Vec<f64>,
+    /// What a shift of one is in weighted units, against readings of the mean weight.
+    one: f64,
     rows: Vec<Row>,
     /// The place of each cell among all channels', directions' and positions'; repeats share it.
     places: Vec<usize>,
@@ -74,6 +78,7 @@ impl Gathered {
         groups: &[Group],
         weights: &[f64],
     ) -> Result<Self, NoValue> {
+        let ones = ones(weights);
         let mut traces = Vec::new();
         let mut places = 0;
         for group in groups {
@@ -81,6 +86,8 @@ impl Gathered {
                 let rows_of = &survey.traces[group.channel][*trace];
                 let mut cells = Cells {
                     positions: Vec::with_capacity(on_cells.cells.len()),
+                    about_middle: Vec::new(),
+                    one: ones[group.channel],
                     rows: Vec::with_capacity(on_cells.cells.len()),
                     places: Vec::with_capacity(on_cells.cells.len()),
                 };
@@ -106,6 +113,7 @@ impl Gathered {
                     cells.rows.push(sum);
                     cells.places.push(places + cell);
                 }
+                cells.about_middle = about_middle(&cells.positions);
                 traces.push(cells);
             }
             places += group.positions.len();
@@ -160,6 +168,14 @@ impl Gathered {
     }
 }
 
+/// What a shift of one is in the weighted units of each channel, against channels of the mean weight: an indicator that is
+/// zeroed anew, or drifts, does so by as much whether it is noisy or not.
+fn ones(weights: &[f64]) -> Vec<f64> {
+    let sigmas: Vec<f64> = weights.iter().map(|w| 1.0 / w).collect();
+    let mean = rms(&sigmas);
+    weights.iter().map(|w| w * mean).collect()
+}
+
 /// The laws that repeats allow, and the variance of what the model misses.
 #[derive(Debug, Clone)]
 pub struct AlongTraces {
@@ -189,11 +205,13 @@ impl AlongTraces {
             .zip(fit.weights)
             .map(|(own, weight)| own.iter().map(|r| weight * r).collect())
             .collect();
+        let ones = ones(fit.weights);
         let mut contrasts = Contrasts::default();
         for group in &survey.repeats {
             let complete = group.complete();
             let positions: Vec<f64> = complete.iter().map(|k| group.positions[*k]).collect();
-            contrasts.add(&positions, &survey.complete_means(group, &weighted));
+            let repeats = survey.complete_means(group, &weighted);
+            contrasts.add(&positions, &repeats, ones[group.channel]);
         }
         let Some(posterior) = Posterior::of(&contrasts) else {
             return Ok(None);
@@ -241,9 +259,12 @@ impl AlongTraces {
     ) -> (f64, f64) {
         let counting = self.gathered.counting(&covariance.times(band, border));
         let white: f64 = counting.iter().map(|own| sum_of_squares(own)).sum();
-        let shift: f64 = counting
-            .iter()
-            .map(|own| own.iter().sum::<f64>().powi(2))
+        let traces = || self.gathered.traces.iter().zip(&counting);
+        let shift: f64 = traces()
+            .map(|(trace, own)| (trace.one * own.iter().sum::<f64>()).powi(2))
+            .sum();
+        let drift: f64 = traces()
+            .map(|(trace, own)| trace.one.powi(2) * drift_form(&trace.about_middle, own, own))
             .sum();
         let correlated: Vec<f64> = self
             .lengths
@@ -259,7 +280,10 @@ impl AlongTraces {
             .iter()
             .zip(&self.length_of)
             .map(|(p, l)| {
-                p.law.white * white + p.law.correlated * correlated[*l] + p.law.shift * shift
+                p.law.white * white
+                    + p.law.correlated * correlated[*l]
+                    + p.law.shift * shift
+                    + p.law.drift * drift
             })
             .collect();
         let (noise, freedom) = self.posterior.variance(&of);
@@ -274,7 +298,7 @@ impl AlongTraces {
         (whole, whole * whole / doubt.max(f64::MIN_POSITIVE))
     }
 
-    /// The law of one reading in weighted units: the mean of what the repeats allow.
+    /// The law of one reading of the mean weight in weighted units: the mean of what the repeats allow.
     pub fn law(&self) -> Law {
         let law = self.posterior.mean();
         Law {
@@ -294,17 +318,14 @@ impl AlongTraces {
     /// With V the covariance of the noise and H the hat matrix their sum of squares is expected to be
     /// tr V − tr HV; the last is found by drawn signs, ηᵀHVη.
     fn missed<R>(&self, fit: &AtRest<R>, survey: &Survey, weighted: &[Vec<f64>]) -> (f64, f64) {
-        let law = self.posterior.mean();
-        let double = Law {
-            length: 0.5 * law.length,
-            ..law
-        };
+        let mean_law = self.posterior.mean();
         let (mut squares, mut expected, mut variance) = (0.0, 0.0, 0.0);
         let (mut readings, mut cells) = (0.0, 0.0);
         let mut first = 0;
         for group in &survey.repeats {
             let traces = &self.gathered.traces[first..first + group.traces.len()];
             first += group.traces.len();
+            let law = mean_law.where_whole_is(traces.first().map_or(1.0, |t| t.one));
             let mut sums = vec![(0.0, 0.0, 0.0); group.positions.len()];
             for (t, trace) in traces.iter().enumerate() {
                 let means = survey.cell_means(group, t, weighted);
@@ -318,30 +339,38 @@ impl AlongTraces {
                     sum.2 += row.count;
                 }
             }
-            let seen: Vec<_> = sums.into_iter().filter(|s| s.1 > 0.0).collect();
-            for (sum, repeats, count) in &seen {
+            let places = about_middle(&group.positions);
+            let seen: Vec<_> = sums
+                .into_iter()
+                .zip(places)
+                .filter(|(s, _)| s.1 > 0.0)
+                .map(|((sum, repeats, count), place)| (sum, repeats, count, place * place))
+                .collect();
+            let mut drifting = 0.0;
+            for (sum, repeats, count, square) in &seen {
                 squares += count * (sum / repeats).powi(2);
-                expected += count * law.variance() / repeats;
+                expected += count * (law.variance() + law.drift * square) / repeats;
+                drifting += square;
                 readings += count;
                 cells += 1.0;
             }
-            let mean = |of: fn(&(f64, f64, f64)) -> f64| {
+            let mean = |of: fn(&(f64, f64, f64, f64)) -> f64| {
                 seen.iter().map(of).sum::<f64>() / seen.len().max(1) as f64
             };
             let (repeats, count) = (mean(|s| s.1), mean(|s| s.2));
             variance += 2.0
                 * (count / repeats).powi(2)
-                * law.squares(
+                * (law.squares(
                     &decays(&group.positions, law.length),
-                    &decays(&group.positions, double.length),
-                );
+                    &decays(&group.positions, 0.5 * law.length),
+                ) + (law.drift * drifting).powi(2));
         }
         let unknowns = fit.counts.2 as f64;
         let freedom = cells - unknowns;
         if !(freedom > 0.0 && expected > 0.0) {
             return (0.0, 1.0);
         }
-        expected -= self.taken_up(fit.covariance, fit.counts, &law);
+        expected -= self.taken_up(fit.covariance, fit.counts, &mean_law);
         let ones = vec![1.0; self.posterior.possible().len()];
         let (_, known) = self.posterior.variance(&ones);
         let doubt = (variance + 2.0 / known * expected * expected).sqrt();
@@ -392,10 +421,13 @@ impl AlongTraces {
                 let band: Vec<(usize, f64)> = band.into_iter().enumerate().collect();
                 let border: Vec<(usize, f64)> = border.into_iter().enumerate().collect();
                 let taken = self.gathered.counting(&covariance.times(&band, &border));
-                let traces = taken.iter().zip(signs).zip(&along);
-                traces
-                    .map(|((taken, signs), d)| law.form(d, taken, signs))
-                    .sum::<f64>()
+                let own = taken.iter().zip(signs).zip(&along).zip(traces);
+                own.map(|(((taken, signs), d), trace)| {
+                    let law = law.where_whole_is(trace.one);
+                    law.form(d, taken, signs)
+                        + law.drift * drift_form(&trace.about_middle, taken, signs)
+                })
+                .sum::<f64>()
             })
             .collect::<Vec<f64>>()
             .iter()

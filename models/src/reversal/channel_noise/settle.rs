@@ -90,8 +90,11 @@ pub fn settle<P: Weighed>(
             let scale = robust_scale(&residuals, &next, freedom_left(problem));
             next.iter_mut().for_each(|s| *s *= scale);
         } else if !all_equal(&next) && (round > 0 || !all_equal(sigmas)) {
-            // Weights by the noise alone would hand what the model misses to the noisiest channel.
-            missed = shared_misfit(&residuals, &next, &levels, freedom_left(problem), missed);
+            // Weights by the noise alone would hand what the model misses to the noisiest channel. Lines by which repeats
+            // differ are theirs, not the model's.
+            let (left, lines) = survey.left_of_repeats(&residuals);
+            let freedom = freedom_left(problem) - lines as f64;
+            missed = shared_misfit(&left, &next, &levels, freedom, missed);
             next.iter_mut().for_each(|s| *s = s.hypot(missed.sqrt()));
         }
         if change(&next, sigmas, robust) <= if robust { ROBUST_SETTLED } else { SETTLED } {

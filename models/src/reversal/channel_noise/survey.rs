@@ -90,6 +90,16 @@ impl<'a> Survey<'a> {
         }
     }
 
+    /// Residuals less the lines by which repeats of a channel differ, and how many numbers these lines are; as they are
+    /// where nothing is repeated.
+    pub fn left_of_repeats(&self, residuals: &[Vec<f64>]) -> (Vec<Vec<f64>>, usize) {
+        if self.repeats.is_empty() {
+            return (residuals.to_vec(), 0);
+        }
+        let more = self.repeats.iter().map(|g| g.traces.len() - 1);
+        (self.without_lines(residuals), 2 * more.sum::<usize>())
+    }
+
     /// What neighbours tell of each channel's noise: in contrasts of the repeats of every channel, else
     /// in the residuals.
     pub fn levels(&self, residuals: &[Vec<f64>]) -> Levels {

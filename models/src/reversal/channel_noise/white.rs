@@ -16,8 +16,10 @@ use crate::reversal::simultaneous::{Agreement, Noise, NoiseOrigin};
 pub struct Told {
     /// What makes standard uncertainties.
     pub scatter: Scatter,
-    /// The noise of a channel over the σ of its weight.
-    pub unit: f64,
+    /// The noise of a channel's readings over the σ of its weight.
+    unit: f64,
+    /// Variance of the shifts of whole traces, the same in all channels, µm².
+    shift_um2: f64,
     /// Where it comes from.
     pub origin: NoiseOrigin,
     /// Whether model and readings agree.
@@ -59,6 +61,7 @@ impl Told {
             } else {
                 (variance - left.variance).max(0.0).sqrt()
             },
+            shift_um2: 0.0,
             origin: if declared {
                 NoiseOrigin::Declared
             } else {
@@ -69,6 +72,11 @@ impl Told {
                 missed: left.variance.sqrt() * rms(sigmas),
             },
         }
+    }
+
+    /// Standard deviation of one reading of a channel whose weight has this σ, µm.
+    pub fn sigma(&self, of_weight: f64) -> f64 {
+        (of_weight * self.unit).hypot(self.shift_um2.sqrt())
     }
 
     /// The laws of noise that repeats allow; `None` where they do not tell.
@@ -87,7 +95,8 @@ impl Told {
         let (law, missed) = (along.law(), along.missed_variance());
         let mean_square = rms(sigmas).powi(2);
         Ok(Some(Self {
-            unit: law.variance().sqrt(),
+            unit: law.of_readings().sqrt(),
+            shift_um2: law.shift * mean_square,
             origin: NoiseOrigin::Repeats(law.times(mean_square)),
             agreement: Agreement {
                 disagree: Some(missed > 0.0),

@@ -114,7 +114,7 @@ impl DesignFit {
             .map(|(own, sigma)| ChannelResiduals {
                 readings: own.len(),
                 rms: rms(own),
-                sigma: sigma * told.unit,
+                sigma: told.sigma(*sigma),
             })
             .collect();
         let sigmas: Vec<f64> = by_channel.iter().map(|c| c.sigma).collect();

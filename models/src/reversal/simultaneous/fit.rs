@@ -165,6 +165,7 @@ fn assemble(
     };
     let freedom = freedom_left(problem);
     let told = Told::white(problem, settled, sigmas, options.noise, options.loss);
+    let noise = channel_noise(channels, sigmas, by_channel, &told, freedom);
     let mut residuals = vec![0.0; ground.observations.readings.len()];
     for (channel, own) in channels.iter().zip(by_channel) {
         for (i, r) in channel.source.iter().zip(own) {
@@ -185,7 +186,7 @@ fn assemble(
         covariance,
         scatter: told.scatter,
         weights: problem.weights.clone(),
-        noise: channel_noise(channels, sigmas, by_channel, told.unit, freedom),
+        noise,
         noise_origin: told.origin,
         agreement: told.agreement,
         residuals,
@@ -248,7 +249,7 @@ fn learn_from_repeats(
         return Ok(());
     };
     let freedom = solution.degrees_of_freedom;
-    solution.noise = channel_noise(problem.channels, sigmas, residuals, told.unit, freedom);
+    solution.noise = channel_noise(problem.channels, sigmas, residuals, &told, freedom);
     solution.noise_origin = told.origin;
     solution.agreement = told.agreement;
     solution.scatter = told.scatter;
@@ -316,7 +317,7 @@ fn channel_noise(
     channels: &[ChannelReadings],
     sigmas: &[f64],
     residuals: &[Vec<f64>],
-    unit: f64,
+    told: &Told,
     freedom: f64,
 ) -> Vec<ChannelNoise> {
     let readings: usize = channels.iter().map(ChannelReadings::len).sum();
@@ -328,7 +329,7 @@ fn channel_noise(
             channel: c.channel,
             readings: c.len(),
             residual_rms: rms(residuals),
-            sigma: sigma * unit,
+            sigma: told.sigma(*sigma),
             degrees_of_freedom: freedom * c.len() as f64 / readings as f64,
         })
         .collect()

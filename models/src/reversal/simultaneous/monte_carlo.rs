@@ -143,7 +143,17 @@ pub fn monte_carlo(
 fn laws(solution: &Simultaneous) -> Vec<Law> {
     let variances = || solution.noise.iter().map(|n| n.sigma * n.sigma);
     match solution.noise_origin {
-        NoiseOrigin::Repeats(law) => variances().map(|v| law.times(v / law.variance())).collect(),
+        // Shifts and drifts are as great in channels of any noise.
+        NoiseOrigin::Repeats(law) => variances()
+            .map(|v| {
+                let own = (v - law.shift) / law.of_readings().max(f64::MIN_POSITIVE);
+                Law {
+                    shift: law.shift,
+                    drift: law.drift,
+                    ..law.times(own.max(0.0))
+                }
+            })
+            .collect(),
         NoiseOrigin::Declared | NoiseOrigin::Residuals => variances().map(Law::of_white).collect(),
     }
 }

@@ -7,6 +7,7 @@
 
 mod answers;
 mod designs;
+mod drift;
 mod estimates;
 mod forms;
 mod gauge;
@@ -200,7 +201,8 @@ const MOST: f64 = std::f64::consts::FRAC_PI_4;
 /// [`NoSolution`] says what is missing.
 pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, NoSolution> {
     check(observations, options)?;
-    let (traces, levelled_um) = Trace::all(observations);
+    let (mut traces, levelled_um) = Trace::all(observations);
+    let drifts = drift::take_out(observations, &mut traces);
     let channels: Vec<Channel> = traces.iter().map(|t| t.channel).collect();
     let designs = Designs::of(&channels);
     let first = fit_lines(&traces)?;
@@ -231,7 +233,7 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
     let closing = (traces.len() == 4).then(|| together.closure(&designs, &joint));
     let noise_figures = noise_figures(options, &traces, closing.as_ref());
     let noise = *noise_figures.first().ok_or(NoSolution::NoReadings)?;
-    let tilts = Tilts::of(&joint, noise.sigma);
+    let tilts = Tilts::of(&joint, noise.sigma, &drifts);
     let lines = channel_lines(&traces, fits, estimates, &tilts);
     let forms = together.forms(&designs, &joint, noise.sigma);
     let contrasts = (traces.len() == 4).then(|| contrasts(&tilts));

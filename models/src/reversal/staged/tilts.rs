@@ -20,7 +20,8 @@ pub(super) struct Tilts {
 }
 
 impl Tilts {
-    pub(super) fn of(joint: &Joint, sigma: f64) -> Self {
+    /// With what the drifts of repeats add to the variance of each channel's slope, (µm/mm)².
+    pub(super) fn of(joint: &Joint, sigma: f64, drifts: &[f64]) -> Self {
         let values: Vec<f64> = joint
             .lines
             .iter()
@@ -31,7 +32,11 @@ impl Tilts {
             .map(|tilt| mm_from_um(sigma) * tilt.cos().powi(2))
             .collect();
         let slopes = joint.slopes();
-        let covariance = slopes.map_with_location(|r, c, v| v * gain[r] * gain[c]);
+        let mut covariance = slopes.map_with_location(|r, c, v| v * gain[r] * gain[c]);
+        for (c, variance) in drifts.iter().enumerate() {
+            let gain = mm_from_um(1.0) * values[c].cos().powi(2);
+            covariance[(c, c)] += variance * gain * gain;
+        }
         Self { values, covariance }
     }
 

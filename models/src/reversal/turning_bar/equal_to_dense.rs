@@ -21,6 +21,7 @@ const LAW: Law = Law {
     correlated: 0.05,
     length: 5.0,
     shift: 0.0,
+    drift: 0.0,
 };
 
 const SLOW: Slow = Slow {

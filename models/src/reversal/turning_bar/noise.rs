@@ -12,7 +12,7 @@ use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::run::Run;
-use crate::noise::{Law, Likelihood, NoiseValues, Posterior};
+use crate::noise::{Law, Likelihood, NoiseValues, OfWhole, Posterior};
 
 /// Turns of a window.
 const WINDOW_TURNS: f64 = 2.0;
@@ -143,7 +143,7 @@ impl NoiseValues for Windows {
         white: f64,
         correlated: f64,
         length: f64,
-        shifts: &[f64],
+        whole: &[OfWhole],
     ) -> Vec<Likelihood> {
         let of = |w: &Window| w.filtered(white, correlated, length);
         let parts: Vec<(f64, f64)> = self.windows.par_iter().map(of).collect();
@@ -156,7 +156,7 @@ impl NoiseValues for Windows {
             minus_log: 0.5 * (count * (quadratic / count).ln() + log),
             quadratic,
         };
-        vec![found; shifts.len()]
+        vec![found; whole.len()]
     }
 }
 

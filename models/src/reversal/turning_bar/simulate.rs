@@ -64,6 +64,7 @@ impl Default for TurningPlan {
                 correlated: 0.04,
                 length: 0.8,
                 shift: 0.0,
+                drift: 0.0,
             },
             recorded: false,
             seed: 1,

@@ -137,6 +137,7 @@ fn four_channels_have_the_noise_of_the_four_channel_fit() {
         correlated: 16e-4,
         length: 12.0,
         shift: 4e-4,
+        drift: 0.0,
     };
     for (repeats, noisy) in [(4, 1.0), (4, 8.0), (1, 8.0)] {
         let mut rng = ChaCha8Rng::seed_from_u64(8);

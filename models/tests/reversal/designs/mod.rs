@@ -4,5 +4,6 @@ mod crest;
 mod effects;
 mod fit;
 mod knots;
+mod noise;
 mod table;
 mod thickness;

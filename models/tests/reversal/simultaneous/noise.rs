@@ -157,6 +157,7 @@ fn repeats_tell_correlated_noise() {
         correlated: 0.05 * 0.05,
         length: 15.0,
         shift: 0.0,
+        drift: 0.0,
     };
     let (mut inside, mut count, mut white_inside) = (0.0, 0.0, 0.0);
     for seed in 0..40 {
@@ -199,6 +200,7 @@ fn repeats_whose_positions_differ_are_compared() {
         correlated: 0.05 * 0.05,
         length: 30.0,
         shift: 0.0,
+        drift: 0.0,
     };
     let (mut plan, basis) = spline_plan(10, 121, 0.0, 3);
     plan.repeats = 4;

@@ -93,6 +93,7 @@ pub fn json(o: &Outcome) -> Result<Value, Message> {
                     "correlated": law.correlated.sqrt(),
                     "length": law.length,
                     "shift": law.shift.sqrt(),
+                    "drift": 1e-3 * law.drift.sqrt(),
                 }),
                 _ => Value::Null,
             },

@@ -79,6 +79,7 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         Message::bad_input(why.to_string())
             .in_file(&args.run)
             .remedy(match args.rpm {
+                _ if matches!(why, NoTraces::Unsteady { .. }) => "`errsep diagnose` follows a turn that is not steady and tells slide, bar and turn from the same run",
                 Some(_) => "give --rpm as about the speed of the spindle in this run, or leave it out: it is found in the readings",
                 None => "give a run in one direction in which the spindle turns steadily, and --rpm if its speed is known",
             })
@@ -127,7 +128,7 @@ fn answer(args: &Args, samples: usize, turning: &Turning, data: &Observations) -
             .count()
     };
     let (near, far) = (count("1A"), count("2B"));
-    let rpm = (turning.frequency * 60.0, turning.frequency_std * 60.0);
+    let rpm = (turning.spindle * 60.0, turning.spindle_std * 60.0);
     let degrees = turning.angle_std_rad.to_degrees();
     let mut text = String::new();
     let _ = write!(
@@ -171,7 +172,7 @@ fn answer(args: &Args, samples: usize, turning: &Turning, data: &Observations) -
             "schema": "errsep.traces/1",
             "samples": samples,
             "turns": turning.turns,
-            "frequency": {"value": turning.frequency, "std": turning.frequency_std, "unit": "Hz"},
+            "frequency": {"value": turning.spindle, "std": turning.spindle_std, "unit": "Hz"},
             "amplitude": {"value": turning.amplitude, "unit": "um"},
             "angle": {"value": args.angle.to_radians(), "std": turning.angle_std_rad, "unit": "rad"},
             "rest": {"rms": turning.rest_rms, "unit": "um"},
@@ -202,7 +203,7 @@ fn page(args: &Args, turning: &Turning, data: &Observations) -> Page {
     let sentence = format!(
         "Traces at two opposite spindle angles, from {} turns at {} turns/min; what wave and form leave is {} µm RMS.",
         plain(turning.turns, 3),
-        plain(turning.frequency * 60.0, 4),
+        plain(turning.spindle * 60.0, 4),
         plain(turning.rest_rms, 3)
     );
     Page::new("Traces of a turning artefact", args.run.display().to_string())
@@ -210,8 +211,8 @@ fn page(args: &Args, turning: &Turning, data: &Observations) -> Page {
         .section(
         Section::new("Two opposite spindle angles")
             .key_figures([
-                KeyFigure::new("Speed", turning.frequency * 60.0, "turns/min")
-                    .std(turning.frequency_std * 60.0),
+                KeyFigure::new("Speed", turning.spindle * 60.0, "turns/min")
+                    .std(turning.spindle_std * 60.0),
                 KeyFigure::new("Once-per-turn amplitude", turning.amplitude, "µm")
                     .meaning("in the middle of the run"),
             ])

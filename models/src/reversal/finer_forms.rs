@@ -93,6 +93,12 @@ impl FinerForms {
         let apart = places(count).map(square).sum::<f64>() / count as f64;
         let few = count.min(VARIANCES);
         let noise = places(few).map(variance).sum::<f64>() / few as f64;
-        (apart - more * noise).max(noise * LEAST).sqrt()
+        cut_off(apart, more, noise)
     }
+}
+
+/// The root mean square of what knots cut off, from the mean square by which a form on finer ones differs, the part by which
+/// these have more unknowns, and the mean variance.
+pub(super) fn cut_off(apart: f64, more: f64, noise: f64) -> f64 {
+    (apart - more * noise).max(noise * LEAST).sqrt()
 }

@@ -28,15 +28,18 @@ pub struct Sample {
 /// How the spindle turned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turning {
-    /// Turns in a second.
+    /// Turns of the once-per-turn wave in a second.
     pub frequency: f64,
+    /// Turns of the spindle in a second: the direction in which a bar runs out turns along it where it is inclined across, and
+    /// the wave with it.
+    pub spindle: f64,
     /// Its standard uncertainty.
-    pub frequency_std: f64,
+    pub spindle_std: f64,
     /// Time, s, at which the once-per-turn wave is highest, nearest the middle of the run.
     pub highest_at: f64,
     /// Half the run-out in the middle of the run: amplitude of the once-per-turn wave, µm.
     pub amplitude: f64,
-    /// Standard uncertainty of the spindle angle in the middle of the run, rad.
+    /// Standard uncertainty of the spindle angle at a reading, root mean square over the run, rad.
     pub angle_std_rad: f64,
     /// Root mean square of what background, wave and its harmonics leave, µm.
     pub rest_rms: f64,
@@ -71,11 +74,22 @@ pub enum NoTraces {
         /// Which sample, from 0.
         index: usize,
     },
+    /// The turn is not steady, so that the wave tells no angle.
+    #[error(
+        "the once-per-turn wave strays from a steady turn by {degrees:.0}° (root mean square): at one angle of it the spindle stands at many"
+    )]
+    Unsteady {
+        /// By how much, degrees.
+        degrees: f64,
+    },
     /// Nothing turns.
     #[error("no once-per-turn wave stands out of the readings")]
     NoWave,
 }
 
+/// Stray of the wave of a turn beyond which it tells no angle: the half width of the window in which readings of an angle are
+/// taken, 20°.
+const MOST_UNSTEADY: f64 = 20.0 * TAU / 360.0;
 /// Samples a turn needs, and turns a run needs.
 const SAMPLES_PER_TURN: f64 = 20.0;
 const FEWEST_TURNS: f64 = 3.0;
@@ -132,13 +146,25 @@ pub fn find_turning(samples: &[Sample], about: Option<f64>) -> Result<Turning, N
     if wave.amplitude.is_nan() || wave.amplitude <= 4.0 * noise {
         return Err(NoTraces::NoWave);
     }
-    let (frequency, frequency_std) = wave.frequency;
+    if wave.unsteadiness > MOST_UNSTEADY {
+        return Err(NoTraces::Unsteady {
+            degrees: wave.unsteadiness.to_degrees(),
+        });
+    }
+    let (frequency, _) = wave.frequency;
+    let (spindle, spindle_std) = wave.of_spindle;
+    // What wave and spindle may differ by grows evenly from the middle of the run to either end.
+    let apart = (spindle - frequency).hypot(spindle_std) * TAU * span / 12f64.sqrt();
+    let angle = (noise / wave.amplitude)
+        .hypot(apart)
+        .hypot(wave.unsteadiness);
     Ok(Turning {
         frequency,
-        frequency_std,
+        spindle,
+        spindle_std,
         highest_at: wave.highest_at,
         amplitude: wave.amplitude,
-        angle_std_rad: noise / wave.amplitude,
+        angle_std_rad: angle,
         rest_rms: wave.rest,
         turns: span * frequency,
     })

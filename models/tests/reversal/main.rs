@@ -10,3 +10,4 @@ mod simultaneous;
 mod staged;
 mod turning;
 mod turning_bar;
+mod turning_possible;

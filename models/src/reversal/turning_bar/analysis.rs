@@ -26,6 +26,8 @@ const ALL_TRIED: usize = 40;
 /// between these stand all that the other has over as many cells: where one has few cells and the other one a turn
 /// of a long run, the band is as wide as a part of the run, and its memory goes by the square of the cells.
 const PATIENCE: usize = 2;
+/// −2 ln of the likelihood by which an unknown of the form must lower it (Akaike).
+const AKAIKE: f64 = 2.0;
 /// Cells from which the law of the noise is first taken, at most.
 const FIRST_CELLS: (usize, usize) = (20, 40);
 
@@ -158,11 +160,12 @@ fn slow_of(rivals: [Option<&Rival>; 3]) -> (Slow, f64) {
 }
 
 /// The cells that describe the run: of the turn, then of the form, one rung of a ladder above those of greatest
-/// likelihood under the law less ½ ln n for each unknown (Schwarz).
+/// likelihood under the law less ½ ln n for each unknown of the turn (Schwarz), which is a rival, and less one for each of the
+/// form (Akaike), which any run has.
 ///
-/// At the best rung what the cells do not follow is as great as the noise that one more rung would take up, and no
-/// covariance counts it. A rung above, the error of a cubic spline, which falls by the fourth power of the length
-/// of its cells, is a quarter of that.
+/// At the best rung what the cells do not follow is as great as the noise that one more rung would take up. A rung above, the
+/// error of a cubic spline, which falls by the fourth power of the length of its cells, is a quarter of that; what is left
+/// is counted by [`CutOff`](super::cut_off::CutOff).
 fn chosen(
     run: &Run,
     survey: &Survey,
@@ -176,7 +179,7 @@ fn chosen(
         across: from.across_held,
         ..Held::default()
     };
-    let score = |setting: &Setting| {
+    let score = |setting: &Setting, a_unknown: f64| {
         let fitted = fit(run, survey, setting, hold, &|problem, at| {
             at.border.clone_from(&from.at.border);
             if let (Some(basis), Some(unknowns)) = (&problem.wave, problem.wave_unknowns.first()) {
@@ -187,7 +190,7 @@ fn chosen(
             }
         });
         let fitted = fitted.ok()?;
-        let price = (run.len() as f64).ln() * fitted.unknowns as f64;
+        let price = a_unknown * fitted.unknowns as f64;
         Some(misfit(run, &fitted.residuals, noise) + price)
     };
     let mut setting = first.clone();
@@ -196,6 +199,7 @@ fn chosen(
             wave: Wave::Unsteady { cells },
             ..setting.clone()
         };
+        let score = |setting: &Setting| score(setting, (run.len() as f64).ln());
         setting = above_best_of(most, with, &score).unwrap_or(setting);
     }
     if plan.form_cells.is_none() {
@@ -203,6 +207,7 @@ fn chosen(
             form_cells,
             ..setting.clone()
         };
+        let score = |setting: &Setting| score(setting, AKAIKE);
         setting = above_best_of(most, with, &score).unwrap_or(setting);
     }
     setting
@@ -258,7 +263,9 @@ impl Analysis<'_> {
         }
     }
 
-    /// Probability that a steady turn seems to stray as much, from the covariance of the stray itself.
+    /// Probability that a steady turn seems to stray as much, from the covariance of the stray itself; where the
+    /// likelihood falls less, that of the fall: with γ across of the other sign a steady turn is one that strays, and
+    /// of two fits alike the stray of one says nothing.
     pub fn p_steady(&self) -> f64 {
         let Some(rival) = &self.unsteady else {
             return 1.0;
@@ -268,7 +275,8 @@ impl Analysis<'_> {
                 let known = self.steady.turns.freedom.max(3.0);
                 // The covariance is the mean over the laws, known / (known − 2) of Fisher's scale.
                 let ratio = square / freedom * known / (known - 2.0);
-                FisherSnedecor::new(freedom, known).map_or(1.0, |law| law.sf(ratio))
+                let own = FisherSnedecor::new(freedom, known).map_or(1.0, |law| law.sf(ratio));
+                own.max(self.p_value(rival))
             }
             _ => 1.0,
         }

@@ -55,6 +55,16 @@ pub struct TurnCurve {
     pub greatest: usize,
 }
 
+impl TurnCurve {
+    /// Puts `greatest` where |lag| is largest.
+    pub(super) fn seek_greatest(&mut self) {
+        let lags = self.lag_rad.iter().enumerate();
+        self.greatest = lags
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+            .map_or(0, |(k, _)| k);
+    }
+}
+
 /// A harmonic of the section at mid travel: a cos kψ + b sin kψ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Harmonic {
@@ -99,22 +109,30 @@ impl TurningFit<'_> {
 
     /// The form without its line at places, µm, each with its standard uncertainty.
     pub fn form(&self, places: &[f64], spread: &Spread) -> Vec<Told> {
+        let told = |row: DVector<f64>| Told {
+            value: self.dot(&row),
+            std: spread.variance(&row).sqrt(),
+        };
+        self.form_rows(places).map(told).collect()
+    }
+
+    /// The form without its line at places, µm.
+    pub(super) fn form_values(&self, places: &[f64]) -> Vec<f64> {
+        self.form_rows(places).map(|row| self.dot(&row)).collect()
+    }
+
+    /// The form without its line at places, as combinations of the unknowns.
+    fn form_rows(&self, places: &[f64]) -> impl Iterator<Item = DVector<f64>> {
         let (height, axis) = self.line_row(0);
         let (slope, _) = self.line_row(1);
-        places
-            .iter()
-            .map(|x| {
-                let mut row = -&height - &slope * axis.xi(*x);
-                let (first, values) = self.problem.form.values(*x);
-                for (k, value) in values.into_iter().enumerate() {
-                    row[self.problem.form_unknowns[first + k]] += value;
-                }
-                Told {
-                    value: self.dot(&row),
-                    std: spread.variance(&row).sqrt(),
-                }
-            })
-            .collect()
+        places.iter().map(move |x| {
+            let mut row = -&height - &slope * axis.xi(*x);
+            let (first, values) = self.problem.form.values(*x);
+            for (k, value) in values.into_iter().enumerate() {
+                row[self.problem.form_unknowns[first + k]] += value;
+            }
+            row
+        })
     }
 
     fn dot(&self, weights: &DVector<f64>) -> f64 {
@@ -356,11 +374,14 @@ impl TurningFit<'_> {
             curve.lag_std.push(spread.variance(&row).sqrt());
             curve.speed.push(onward * (base + rate / TAU));
         }
-        let lags = curve.lag_rad.iter().enumerate();
-        curve.greatest = lags
-            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
-            .map_or(0, |(k, _)| k);
+        curve.seek_greatest();
         Some(curve)
+    }
+
+    /// The lags of [`curve`](Self::curve) alone, rad.
+    pub(super) fn lags(&self, points: usize) -> Option<Vec<f64>> {
+        let none = Spread::none(self);
+        self.curve(points, 0.0, &none).map(|curve| curve.lag_rad)
     }
 }
 

@@ -212,6 +212,30 @@ pub fn unsteady<'a>(
     Ok(found)
 }
 
+/// The fit of the same model with γ across of the other sign, and the turn with which it makes the same waves.
+pub(super) fn mirrored<'a>(
+    run: &'a Run,
+    survey: &'a Survey,
+    of: &TurningFit<'a>,
+) -> Option<TurningFit<'a>> {
+    let start: &Begin = &|problem, at| {
+        *at = problem.taken_over(&of.problem, &of.at);
+        at.border[ACROSS_E] = -of.across();
+        if problem.wave.is_some() {
+            put_turn(problem, at, &|basis| {
+                of.turn_on(basis, true).unwrap_or_default()
+            });
+        } else {
+            let (low, high) = run.range();
+            let (from, to) = (of.axis_direction(low), of.axis_direction(high));
+            let forward = (run.x[run.len() - 1] - run.x[0]).signum();
+            at.border[THETA] += from + to;
+            at.border[SPEED] += forward * (to - from);
+        }
+    };
+    fit(run, survey, of.setting(), Held::default(), start).ok()
+}
+
 /// A start with a bar, and the turn by which it makes the waves of a survey.
 fn seen_in(survey: &Survey, bar: [f64; 3]) -> impl Fn(&TurningProblem, &mut Parameters) {
     move |problem, at| {

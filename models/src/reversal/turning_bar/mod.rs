@@ -14,6 +14,7 @@
 mod analysis;
 mod answers;
 mod contrasts;
+mod cut_off;
 #[cfg(test)]
 mod equal_to_dense;
 mod error;
@@ -24,6 +25,7 @@ mod nearest;
 mod noise;
 mod once_a_turn;
 mod pairs;
+mod possible;
 mod problem;
 mod run;
 mod setting;
@@ -40,6 +42,7 @@ pub use fit::{TurningFit, bent, steady, unsteady};
 pub use noise::{laws, misfit};
 pub use once_a_turn::{OnceATurn, once_a_turn};
 pub use pairs::Pairs;
+pub use possible::Possible;
 pub use problem::Frame;
 pub use run::{FEWEST_PER_TURN, FEWEST_READINGS, FEWEST_TURNS, Run, TurningReading};
 pub use setting::{Along, HIGHEST_HARMONIC, Setting, Wave};

@@ -6,7 +6,8 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::Complex;
 
 use super::error::TurningError;
-use super::fit::fit;
+use super::fit::{fit, steady};
+use super::possible::Possible;
 use super::problem::{ECCENTRICITY, Held, SPEED, THETA};
 use super::run::Run;
 use super::setting::{Along, Setting, Wave};
@@ -24,8 +25,13 @@ const REACH: f64 = 6.0 * PI;
 /// The once-per-turn wave of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnceATurn {
-    /// Turns in a second, and their standard uncertainty in white noise.
+    /// Turns of the wave in a second, and their standard uncertainty in white noise.
     pub frequency: (f64, f64),
+    /// Turns of the spindle in a second, and their standard uncertainty: the direction of a bar that is inclined turns along
+    /// it, and the wave with that.
+    pub of_spindle: (f64, f64),
+    /// By how much the wave of a turn strays from a steady turn, rad.
+    pub unsteadiness: f64,
     /// Time at which the wave is highest, nearest the middle of the run.
     pub highest_at: f64,
     /// Amplitude in the middle, µm.
@@ -44,6 +50,7 @@ pub struct OnceATurn {
 /// [`TurningError`]: nothing turns, or too few turns.
 pub fn once_a_turn(run: &Run, about_hz: Option<f64>) -> Result<OnceATurn, TurningError> {
     let mut survey = Survey::new(run, 0.0, 1.0, about_hz)?;
+    let surveyed = survey.clone();
     // In the middle a wave that goes out of step along the run is not lost.
     survey.frame.reference_mm = middle_of(run);
     let survey = survey;
@@ -78,12 +85,27 @@ pub fn once_a_turn(run: &Run, about_hz: Option<f64>) -> Result<OnceATurn, Turnin
     // What the wave's growth leaves in the first fit is no noise: that of the second is.
     let noise = Law::of_white(bar.squares / bar.freedom());
     let frequency = wave.speed(survey.base_hz, &Spread::new(&wave, &noise, Slow::default()));
+    let straight = steady(run, &surveyed, bar.setting())?;
+    let possible = Possible::of_fit(
+        run,
+        &surveyed,
+        &straight,
+        (&noise, Slow::default(), 1.0),
+        false,
+    );
+    let of_spindle = possible
+        .speed(surveyed.base_hz)
+        .map_or((frequency.value, f64::INFINITY), |told| {
+            (told.value, told.std)
+        });
     let middle = survey.frame.middle;
     let direction = bar.axis_direction(middle_of(run));
     // Highest where ψ = −θ is the direction of the run-out.
     let ahead = (-direction - bar.at.border[THETA] + PI).rem_euclid(TAU) - PI;
     Ok(OnceATurn {
         frequency: (frequency.value, frequency.std),
+        of_spindle,
+        unsteadiness: surveyed.unsteadiness(noise.variance(), run.len()),
         highest_at: middle + ahead / (TAU * frequency.value),
         amplitude: bar.amplitude(middle_of(run)),
         rest: (bar.squares / bar.freedom()).sqrt(),

@@ -41,6 +41,11 @@ impl Spread {
         }
     }
 
+    /// Of readings without noise.
+    pub(super) fn none(fit: &TurningFit) -> Self {
+        Self::new(fit, &Law::of_white(0.0), Slow::default())
+    }
+
     /// Variance of a combination of unknowns.
     pub fn variance(&self, weights: &DVector<f64>) -> f64 {
         self.meat.form(&self.taken(weights.as_slice())).max(0.0)

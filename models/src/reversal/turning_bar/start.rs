@@ -123,6 +123,26 @@ impl Survey {
         }
     }
 
+    /// By how much the waves of single turns stray from those of a straight bar that turns steadily, rad, each counted by the
+    /// square of its amplitude, without what noise of this variance of a reading makes; a quarter of a turn where nothing is
+    /// left of a common direction.
+    pub(super) fn unsteadiness(&self, variance: f64, readings: usize) -> f64 {
+        let BarStart { theta, speed, bar } = self.steady;
+        let (mut left, mut whole) = (0.0, 0.0);
+        for wave in &self.waves {
+            let xi = self.frame.xi(wave.x);
+            let own = Complex::new(bar[0] + bar[1] * xi, bar[2] * xi);
+            let turned = Complex::from_polar(1.0, theta + speed * self.frame.tau(wave.time));
+            left += (wave.z - own * turned).norm_sqr();
+            whole += wave.z.norm_sqr();
+        }
+        let turns = self.waves.len() as f64;
+        // Each amplitude of a turn of m readings has 2σ²/m.
+        let of_noise = 4.0 * variance * turns * turns / readings as f64;
+        let part = ((left - of_noise) / whole.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        part.sqrt().asin()
+    }
+
     /// Coefficients of a spline in time that the angle of the spindle follows where the bar has these
     /// e, γ₁, γ₂, rad.
     pub fn turn(&self, basis: &CubicBSpline, bar: [f64; 3]) -> Vec<f64> {

@@ -8,9 +8,12 @@
 use super::fit::TurningFit;
 use super::spread::Spread;
 
-/// Steps, of which each adds to χ², end where two in a row add no more than this share of it: what rounding has left of a
-/// residual lies where C is zero, and steps from there would grow without bounds.
+/// Steps, of which each adds to χ², end where two in a row add no more than this share of it.
 const SETTLED: f64 = 1e-9;
+
+/// What is left to be solved is rounding where its square is this share of what it was: it says nothing of χ², and steps
+/// from there would grow without bounds.
+const ROUNDING: f64 = 1e-20;
 
 impl TurningFit<'_> {
     /// χ² of what the turn's spline holds beside a line, and its degrees of freedom: how surely the turn
@@ -44,21 +47,24 @@ impl TurningFit<'_> {
         let nearly_solved = |values: &[f64]| of(&spread.meat_times(&whole(values)));
         let values = without_line(&of(&self.at.band));
         let freedom = values.len().saturating_sub(2);
-        let square = generalised_square(values, freedom, common, nearly_solved);
+        let square = generalised_square(values, freedom, common, nearly_solved, without_line);
         Some((square, freedom as f64))
     }
 }
 
-/// vᵀC⁺v of a v in the range of C, of a rank, by conjugate gradients: `near` is about C⁺.
+/// vᵀC⁺v of a v in the range of C, of a rank, by conjugate gradients: `near` is about C⁺, `within` projects on the range,
+/// out of which rounding leads.
 fn generalised_square(
     v: Vec<f64>,
     rank: usize,
     times: impl Fn(&[f64]) -> Vec<f64>,
     near: impl Fn(&[f64]) -> Vec<f64>,
+    within: impl Fn(&[f64]) -> Vec<f64>,
 ) -> f64 {
     let mut rest = v;
     let mut direction = near(&rest);
     let mut size = dot(&rest, &direction);
+    let least = ROUNDING * size;
     let mut square = 0.0;
     let mut settled = 0;
     // Without rounding there are no more steps than the rank.
@@ -81,8 +87,12 @@ fn generalised_square(
         for (rest, image) in rest.iter_mut().zip(&image) {
             *rest -= step * image;
         }
+        rest = within(&rest);
         let next = near(&rest);
         let before = std::mem::replace(&mut size, dot(&rest, &next));
+        if size <= least {
+            break;
+        }
         for (direction, next) in direction.iter_mut().zip(&next) {
             *direction = next + size / before * *direction;
         }

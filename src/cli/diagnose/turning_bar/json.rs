@@ -135,7 +135,7 @@ fn turning(all: &Told) -> Json {
             "combination": all.combination, "value": all.slope.1.value, "std": all.slope.1.std,
             "std_white": all.slope_std_white(), "unit": "rad",
         },
-        "speed": told(&all.speed, speed_unit),
+        "speed": all.speed.as_ref().map(|speed| told(speed, speed_unit)),
         "bar": bar,
         "axis": {"x": all.places, "e_1": all.axis.iter().map(|a| a.0).collect::<Vec<_>>(),
             "e_2": all.axis.iter().map(|a| a.1).collect::<Vec<_>>()},

@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use errsep_models::reversal::turning_bar::{
-    Analysis, Bar, Harmonic, Pairs, Rival, Run, Slow, Spread, Survey, Told as Value, TurnCurve,
+    Analysis, Bar, Harmonic, Pairs, Possible, Rival, Run, Slow, Spread, Survey, Told as Value,
+    TurnCurve,
 };
 use errsep_models::uncertainty::{DegreesOfFreedom, coverage_factor};
 
@@ -30,8 +31,8 @@ pub(super) struct Told<'a, 'b> {
     pub slope: (Value, Value),
     /// What the slope is, by the direction of the indicator.
     pub combination: String,
-    /// Turns in a unit of time.
-    pub speed: Value,
+    /// Turns in a unit of time; `None` where the axis of the bar may be any.
+    pub speed: Option<Value>,
     pub bar: Option<Bar>,
     pub curve: Option<TurnCurve>,
     pub harmonics: Vec<Harmonic>,
@@ -55,22 +56,20 @@ impl<'a, 'b> Told<'a, 'b> {
         let (low, high) = run.range();
         let step = (high - low) / (POINTS - 1) as f64;
         let places: Vec<f64> = (0..POINTS).map(|k| low + step * k as f64).collect();
-        let bar = chosen.fit.bar(&spread);
+        let possible = Possible::of(run, survey, analysis, chosen, weighed.across_told);
+        let bar = possible.bar();
         Self {
-            slope: (
-                analysis.steady.fit.slope(&plain_spread),
-                chosen.fit.slope(&spread),
-            ),
+            slope: (analysis.steady.fit.slope(&plain_spread), possible.slope()),
             combination: combination(chosen.fit.setting().indicator_rad),
-            speed: chosen.fit.speed(survey.base_hz, &spread),
-            curve: chosen.fit.curve(POINTS, survey.base_hz, &spread),
-            harmonics: chosen.fit.harmonics(&spread),
+            speed: possible.speed(survey.base_hz),
+            curve: possible.curve(POINTS, survey.base_hz),
+            harmonics: possible.harmonics(),
             pairs: chosen.fit.pairs(&spread),
             axis: match bar {
                 Some(_) => chosen.fit.axis(&places),
                 None => Vec::new(),
             },
-            form: chosen.fit.form(&places, &spread),
+            form: possible.form(&places),
             bar,
             places,
             run,
@@ -226,8 +225,15 @@ impl<'a, 'b> Told<'a, 'b> {
                 self.combination
             ),
             "The form along x is that of the slide and the mean form of the bar together (a_0 and M).".to_owned(),
+            format!(
+                "What drifts during the run (the zero of the indicator, temperatures) is in the form and in {}, and in no uncertainty: one run passes each place once. The same run backwards tells.",
+                self.combination
+            ),
         ];
         let Some(bar) = &self.bar else {
+            if self.run.angle.is_none() {
+                all.push("No angle was recorded: the direction of the bar's axis and the speed of the spindle are one, so that neither is known. A mark on the spindle, or an encoder, would settle them.".to_owned());
+            }
             return all;
         };
         if self.run.angle.is_none() {
@@ -236,11 +242,15 @@ impl<'a, 'b> Told<'a, 'b> {
                 "No angle was recorded: the direction of e + γx (which turns by {turned}° along the travel) and the speed of the spindle are one. What counts is the length of e + γx; a mark on the spindle, or an encoder, would settle the direction."
             ));
             all.push(if self.chosen.fit.across_held {
-                "γ across e is not seen in these readings, and was taken as zero: the bar and the spindle axis lie in one plane as far as they tell.".to_owned()
+                let half = self.half_interval() * bar.across_rad.std;
+                let [low, high] = [-half, half].map(|h| plain(URAD * (bar.across_rad.value + h), 2));
+                format!(
+                    "γ across e is not seen for sure in these readings: it lies between {low} and {high} µrad (95 %), and the uncertainties of the others allow for that."
+                )
             } else if self.weighed.across_told {
                 "The sign of γ across e follows from the section of the bar (its harmonics): with the other sign the readings are met worse.".to_owned()
             } else {
-                "γ across e is known but for its sign: the section of the bar is too round to decide it. With the other sign the curve of the turn changes with it.".to_owned()
+                "γ across e is known but for its sign: the section of the bar is too round to decide it. With the other sign speed and curve of the turn change with it, which their uncertainties allow for.".to_owned()
             });
         }
         all
@@ -359,12 +369,14 @@ impl<'a, 'b> Told<'a, 'b> {
             figure(&self.slope.1, URAD)
         );
         let minute = if self.run.timed { MINUTE } else { 1.0 };
-        let speed = if self.speed.std > 0.0 {
-            figure(&self.speed, minute)
-        } else {
-            plain(minute * self.speed.value, 5)
-        };
-        let _ = writeln!(text, "{:<26}{speed} {}", "mean speed", self.speed_unit());
+        if let Some(speed) = &self.speed {
+            let told = if speed.std > 0.0 {
+                figure(speed, minute)
+            } else {
+                plain(minute * speed.value, 5)
+            };
+            let _ = writeln!(text, "{:<26}{told} {}", "mean speed", self.speed_unit());
+        }
         if let Some(bar) = &self.bar {
             let _ = writeln!(
                 text,
@@ -374,7 +386,11 @@ impl<'a, 'b> Told<'a, 'b> {
                 "γ along e",
                 figure(&bar.along_rad, URAD),
                 "γ across e",
-                if self.weighed.across_told { "" } else { "± " },
+                if self.weighed.across_told || self.chosen.fit.across_held {
+                    ""
+                } else {
+                    "± "
+                },
                 figure(&bar.across_rad, URAD)
             );
         }

@@ -21,14 +21,16 @@ pub(super) fn view(data: String, all: &Told) -> sheet::View {
         "µrad".to_owned(),
         "slide against spindle axis and half cone of the bar, together".to_owned(),
     )];
-    let speed = all.per_minute(&[all.speed.value, all.speed.std]);
-    answers.push((
-        "mean speed".to_owned(),
-        speed[0],
-        speed[1],
-        all.speed_unit().to_owned(),
-        format!("{:.1} turns in all", all.survey.turns),
-    ));
+    if let Some(speed) = &all.speed {
+        let speed = all.per_minute(&[speed.value, speed.std]);
+        answers.push((
+            "mean speed".to_owned(),
+            speed[0],
+            speed[1],
+            all.speed_unit().to_owned(),
+            format!("{:.1} turns in all", all.survey.turns),
+        ));
+    }
     if let Some(bar) = &all.bar {
         answers.push((
             "e".to_owned(),
@@ -108,7 +110,7 @@ fn turn(all: &Told) -> Option<sheet::Turn> {
         half: degrees(&curve.lag_std, all.half_interval()),
         speed: all.per_minute(&curve.speed),
         speed_unit: all.speed_unit().to_owned(),
-        mean: all.per_minute(&[all.speed.value])[0],
+        mean: all.per_minute(&[all.speed?.value])[0],
         greatest: curve.greatest,
     })
 }

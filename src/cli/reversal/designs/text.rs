@@ -116,7 +116,7 @@ fn write_all(t: &mut String, file: &Path, o: &Outcome, coverage: &str) -> std::f
         let value = number::measured(c.value.value, Some(c.value.std));
         writeln!(
             t,
-            "  {:22} {value} µm  eccentricity of the artefact (o: its oval part)",
+            "  {:22} {value} µm  eccentricity of the artefact, with what lobes of its section make of it at these sides (o: its oval part)",
             c.name
         )?;
     }

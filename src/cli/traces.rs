@@ -79,7 +79,6 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         Message::bad_input(why.to_string())
             .in_file(&args.run)
             .remedy(match args.rpm {
-                _ if matches!(why, NoTraces::Unsteady { .. }) => "`errsep diagnose` follows a turn that is not steady and tells slide, bar and turn from the same run",
                 Some(_) => "give --rpm as about the speed of the spindle in this run, or leave it out: it is found in the readings",
                 None => "give a run in one direction in which the spindle turns steadily, and --rpm if its speed is known",
             })
@@ -128,20 +127,27 @@ fn answer(args: &Args, samples: usize, turning: &Turning, data: &Observations) -
             .count()
     };
     let (near, far) = (count("1A"), count("2B"));
-    let rpm = (turning.spindle * 60.0, turning.spindle_std * 60.0);
-    let degrees = turning.angle_std_rad.to_degrees();
+    let rpm = (turning.frequency * 60.0, turning.frequency_std() * 60.0);
+    let degrees = plain(turning.angle_std_rad.to_degrees(), 2);
+    let angle = if turning.tells_angle() {
+        format!("spindle angle known to {degrees}°")
+    } else {
+        format!(
+            "the spindle angle is not told: the spindle strays by about {degrees}° from the wave, so that 1A and 2B stay half a turn apart but see other sides along the bar; `errsep diagnose` follows such a turn"
+        )
+    };
     let mut text = String::new();
     let _ = write!(
         text,
         "{}: {samples} samples over {:.1} turns at {} turns a minute\n\
-         Once-per-turn wave: amplitude {} µm in the middle of the run; spindle angle known to {}°\n\
+         Once-per-turn wave: amplitude {} µm in the middle of the run; {}\n\
          Left by background, wave and second harmonic: {} µm rms\n\
          {near} readings at {}° (1A) and {far} half a turn later (2B)\n",
         args.run.display(),
         turning.turns,
         measured(rpm.0, Some(rpm.1)),
         plain(turning.amplitude, 4),
-        plain(degrees, 2),
+        angle,
         plain(turning.rest_rms, 3),
         args.angle,
     );
@@ -172,9 +178,9 @@ fn answer(args: &Args, samples: usize, turning: &Turning, data: &Observations) -
             "schema": "errsep.traces/1",
             "samples": samples,
             "turns": turning.turns,
-            "frequency": {"value": turning.spindle, "std": turning.spindle_std, "unit": "Hz"},
+            "frequency": {"value": turning.frequency, "std": turning.frequency_std(), "unit": "Hz"},
             "amplitude": {"value": turning.amplitude, "unit": "um"},
-            "angle": {"value": args.angle.to_radians(), "std": turning.angle_std_rad, "unit": "rad"},
+            "angle": {"value": args.angle.to_radians(), "std": turning.tells_angle().then_some(turning.angle_std_rad), "unit": "rad"},
             "rest": {"rms": turning.rest_rms, "unit": "um"},
             "readings": {"1A": near, "2B": far},
         }),
@@ -203,7 +209,7 @@ fn page(args: &Args, turning: &Turning, data: &Observations) -> Page {
     let sentence = format!(
         "Traces at two opposite spindle angles, from {} turns at {} turns/min; what wave and form leave is {} µm RMS.",
         plain(turning.turns, 3),
-        plain(turning.spindle * 60.0, 4),
+        plain(turning.frequency * 60.0, 4),
         plain(turning.rest_rms, 3)
     );
     Page::new("Traces of a turning artefact", args.run.display().to_string())
@@ -211,8 +217,8 @@ fn page(args: &Args, turning: &Turning, data: &Observations) -> Page {
         .section(
         Section::new("Two opposite spindle angles")
             .key_figures([
-                KeyFigure::new("Speed", turning.spindle * 60.0, "turns/min")
-                    .std(turning.spindle_std * 60.0),
+                KeyFigure::new("Speed", turning.frequency * 60.0, "turns/min")
+                    .std(turning.frequency_std() * 60.0),
                 KeyFigure::new("Once-per-turn amplitude", turning.amplitude, "µm")
                     .meaning("in the middle of the run"),
             ])

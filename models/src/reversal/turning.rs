@@ -47,6 +47,23 @@ pub struct Turning {
     pub turns: f64,
 }
 
+/// Standard uncertainty of an angle beyond which none is told: the usual half width of the window in which readings of an
+/// angle are taken, 20°.
+const TOLD: f64 = 20.0 * TAU / 360.0;
+
+impl Turning {
+    /// Standard uncertainty of the wave's frequency as that of the spindle.
+    pub fn frequency_std(&self) -> f64 {
+        self.spindle_std.hypot(self.spindle - self.frequency)
+    }
+
+    /// Whether the spindle stands at about one angle where the wave does. Traces half a turn of the wave apart are about
+    /// half a turn of the spindle apart all the same, as it strays slowly.
+    pub fn tells_angle(&self) -> bool {
+        self.angle_std_rad < TOLD
+    }
+}
+
 /// Why a run gives no traces.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum NoTraces {
@@ -74,22 +91,11 @@ pub enum NoTraces {
         /// Which sample, from 0.
         index: usize,
     },
-    /// The turn is not steady, so that the wave tells no angle.
-    #[error(
-        "the once-per-turn wave strays from a steady turn by {degrees:.0}° (root mean square): at one angle of it the spindle stands at many"
-    )]
-    Unsteady {
-        /// By how much, degrees.
-        degrees: f64,
-    },
     /// Nothing turns.
     #[error("no once-per-turn wave stands out of the readings")]
     NoWave,
 }
 
-/// Stray of the wave of a turn beyond which it tells no angle: the half width of the window in which readings of an angle are
-/// taken, 20°.
-const MOST_UNSTEADY: f64 = 20.0 * TAU / 360.0;
 /// Samples a turn needs, and turns a run needs.
 const SAMPLES_PER_TURN: f64 = 20.0;
 const FEWEST_TURNS: f64 = 3.0;
@@ -146,22 +152,19 @@ pub fn find_turning(samples: &[Sample], about: Option<f64>) -> Result<Turning, N
     if wave.amplitude.is_nan() || wave.amplitude <= 4.0 * noise {
         return Err(NoTraces::NoWave);
     }
-    if wave.unsteadiness > MOST_UNSTEADY {
-        return Err(NoTraces::Unsteady {
-            degrees: wave.unsteadiness.to_degrees(),
-        });
-    }
     let (frequency, _) = wave.frequency;
     let (spindle, spindle_std) = wave.of_spindle;
     // What wave and spindle may differ by grows evenly from the middle of the run to either end.
     let apart = (spindle - frequency).hypot(spindle_std) * TAU * span / 12f64.sqrt();
+    // A stray of that size may hold a line in time.
+    let of_stray = wave.unsteadiness * 12f64.sqrt() / (TAU * span);
     let angle = (noise / wave.amplitude)
         .hypot(apart)
         .hypot(wave.unsteadiness);
     Ok(Turning {
         frequency,
         spindle,
-        spindle_std,
+        spindle_std: spindle_std.hypot(of_stray),
         highest_at: wave.highest_at,
         amplitude: wave.amplitude,
         angle_std_rad: angle,

@@ -40,7 +40,7 @@ impl Survey<'_> {
     pub fn alike(&self) -> Option<Vec<Vec<f64>>> {
         self.traces
             .iter()
-            .any(several)
+            .any(|own| several(own))
             .then(|| self.without_lines(&self.values))
     }
 
@@ -108,7 +108,7 @@ impl Survey<'_> {
 }
 
 /// Whether a channel has more than one trace.
-fn several(traces: &Vec<traces::Trace>) -> bool {
+fn several(traces: &[traces::Trace]) -> bool {
     traces.iter().filter(|t| t.len() > 0).count() > 1
 }
 

@@ -31,7 +31,11 @@ fn machine() -> Machine {
                 .map(|k| {
                     let position = 25.0 * f64::from(k % 8);
                     let value = scale * (f64::from(k) * 1.7 + i as f64).sin();
-                    Observation { position, value }
+                    Observation {
+                        position,
+                        value,
+                        repeat: 0,
+                    }
                 })
                 .collect();
             let degree = usize::from(c.kind != Kind::Squareness);

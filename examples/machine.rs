@@ -17,6 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .map(|(i, value)| Observation {
             position: 50.0 * i as f64,
             value,
+            repeat: 0,
         })
         .collect();
     // Squareness of Y to X from its certificate, 15 ± 3 urad.

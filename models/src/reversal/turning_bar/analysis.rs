@@ -207,8 +207,15 @@ fn chosen(
             form_cells,
             ..setting.clone()
         };
-        let score = |setting: &Setting| score(setting, AKAIKE);
-        setting = above_best_of(most, with, &score).unwrap_or(setting);
+        let by = |price: f64| above_best_of(most, &with, &|s: &Setting| score(s, price));
+        // With a cell a turn the form takes up what the noise holds of slow changes, which no law within a few turns tells.
+        let taken = match by(AKAIKE) {
+            Some(fine) if fine.form_cells >= most => by((run.len() as f64).ln())
+                .filter(|coarse| 2 * coarse.form_cells <= most)
+                .or(Some(fine)),
+            taken => taken,
+        };
+        setting = taken.unwrap_or(setting);
     }
     setting
 }

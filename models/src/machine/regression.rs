@@ -65,7 +65,7 @@ pub enum RegressionError {
 ///
 /// The scatter about it becomes the variance of a future reading, and the covariance of the
 /// coefficients that of the function. Where the repeats differ as a whole (each zeroed anew, or drifting),
-/// they are what is independent, not their readings: see [`Repeats`].
+/// they are what is independent, not their readings (`repeats.rs`).
 ///
 /// # Errors
 /// Readings that do not determine the polynomial and its scatter.

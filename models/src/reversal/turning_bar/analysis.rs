@@ -207,7 +207,7 @@ fn chosen(
             form_cells,
             ..setting.clone()
         };
-        let by = |price: f64| above_best_of(most, &with, &|s: &Setting| score(s, price));
+        let by = |price: f64| above_best_of(most, with, &|s: &Setting| score(s, price));
         // With a cell a turn the form takes up what the noise holds of slow changes, which no law within a few turns tells.
         let taken = match by(AKAIKE) {
             Some(fine) if fine.form_cells >= most => by((run.len() as f64).ln())

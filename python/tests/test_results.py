@@ -136,14 +136,17 @@ def test_what_is_not_determined_is_told(answers: dict[str, errsep.Result], readi
     assert not set(few.tilts) & {name.removeprefix("tilt ") for name in few.not_determined}
 
 
-def test_warnings_are_those_of_the_command(answers: dict[str, errsep.Result]) -> None:
+def test_warnings_are_those_of_the_command(tmp_path: Path) -> None:
     still = dict(errsep.simulate("reversal", seed=1)["data"])
     pairs = zip(still["channel"], still["reading"], strict=True)
     still["reading"] = [0.0 if channel == "1A" else reading for channel, reading in pairs]
     answer = errsep.reversal(still)
     assert answer.warnings == answer["warnings"]
     assert any("all readings of 1A are equal" in warning for warning in answer.warnings)
-    assert answers["four_sensor"].warnings == answers["four_sensor"]["warnings"]
+    four = FIXTURES / "four_sensor"
+    setup = tmp_path / "setup.toml"
+    setup.write_text((four / "setup.toml").read_text() + '\n[separation]\npenalty = "profile"\n')
+    assert "L-curve" in errsep.four_sensor(four / "data.csv", setup).warnings[0]
 
 
 def test_a_pickle_and_a_copy_keep_everything(answers: dict[str, errsep.Result], tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 //!
 //! The heights of a channel add up to zero, as its offset is an unknown of its own.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{Circumstances, JoinedEffect, Unknown};
@@ -28,11 +28,11 @@ pub struct Heights {
 impl Heights {
     /// Those of all repeats; `by_pass`: whether both directions of a repeat have heights of their own.
     pub fn of(observations: &Observations, by_pass: bool) -> Arc<dyn JoinedEffect> {
-        let mut channels: BTreeMap<Channel, BTreeMap<(u32, bool), ()>> = BTreeMap::new();
+        let mut channels: BTreeMap<Channel, BTreeSet<(u32, bool)>> = BTreeMap::new();
         for reading in &observations.readings {
             let back = by_pass && reading.direction == Direction::Backward;
             let own = channels.entry(reading.channel).or_default();
-            own.insert((reading.repeat, back), ());
+            own.insert((reading.repeat, back));
         }
         let mut heights = Self {
             by_pass,
@@ -42,7 +42,7 @@ impl Heights {
         for (channel, repeats) in channels {
             let first = heights.count;
             let last = first + repeats.len() - 1;
-            for (k, (repeat, back)) in (first..).zip(repeats.into_keys()) {
+            for (k, (repeat, back)) in (first..).zip(repeats) {
                 let made_of = if k < last {
                     (k..k + 1, 1.0)
                 } else {

@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 use std::time::Instant;
 
-use errsep::diagnosis::{Components, NoiseLaw, Options, certificate, diagnose};
+use errsep::diagnosis::{NoiseLaw, Options, certificate, diagnose};
 use errsep_models::model::FittedModel;
+use errsep_models::noise::Law;
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::{Channel, Observations};
 use serde_json::Value;
@@ -210,11 +211,12 @@ pub fn apart(case: &Case, seen: &[f64]) -> Vec<Option<f64>> {
     };
     let noise = &case.noise;
     let variance = noise.sigma * noise.sigma;
-    let law = NoiseLaw::stated(Components {
+    let law = NoiseLaw::stated(Law {
         white: variance * (1.0 - noise.correlated) + noise.resolution * noise.resolution / 12.0,
         correlated: variance * noise.correlated,
         length: noise.length,
         shift: 0.0,
+        drift: 0.0,
     });
     let options = Options {
         draws: 200,

@@ -33,7 +33,7 @@ pub use catalogue::written::{quoted, rounded, written};
 pub use detection::smallest::SizesByShape;
 pub use joined::{Joined, JoinedEffect, JoinedGap, JoinedProfile, NotJoined};
 pub use learning::{HeldOutAlong, Learnt, NotLearnt, Tested};
-pub use noise::law::{Components, NoiseLaw, NoiseSource};
+pub use noise::law::{NoiseLaw, NoiseSource};
 pub use options::Options;
 pub use planning::certificate::Diagnosability;
 pub use planning::prove::Trials;

@@ -5,6 +5,7 @@ mod agreement;
 mod command;
 mod designs;
 mod different_grids;
+mod drifts;
 mod effect_signatures;
 mod heights;
 mod invariance;

@@ -11,6 +11,7 @@
 //! is then gᵀδ + wᵀm, and what wᵀm adds to the variances is taken from the draws.
 
 use errsep_models::model::{AnyModel, FittedModel, Profile, Quantity};
+use errsep_models::noise::about_middle;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -292,12 +293,18 @@ fn signatures(
 
 /// Σ w, the scatter that the model expects included.
 fn covariance_times(model: &AnyModel, law: &NoiseLaw, weights: &DVector<f64>) -> DVector<f64> {
+    let law = &law.parts;
     let mut spread = weights * law.white;
     for trace in model.traces() {
         let w = weights.rows(trace.start, trace.len());
         let places = &model.places()[trace.clone()];
         let mut own = spread.rows_mut(trace.start, trace.len());
         own.add_scalar_mut(law.shift * w.sum());
+        if law.drift > 0.0 {
+            let x: Vec<f64> = places.iter().map(|place| place.x).collect();
+            let along = DVector::from_vec(about_middle(&x));
+            own.axpy(law.drift * along.dot(&w), &along, 1.0);
+        }
         if law.correlated <= 0.0 {
             continue;
         }

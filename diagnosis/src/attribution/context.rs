@@ -26,6 +26,8 @@ pub(crate) struct Context<'a> {
     pub space: Space,
     pub dictionary: Dictionary,
     pub null: Arc<NullLaw>,
+    /// Number of draws of the null law and their seed.
+    draws: (usize, u64),
     /// Draws for the doubt about the state.
     pub drawn: Drawn,
 }
@@ -75,8 +77,15 @@ impl<'a> Context<'a> {
             space,
             dictionary,
             null,
+            draws: (draws, seed),
             drawn: Drawn::default(),
         }
+    }
+
+    /// The context of the same readings under another law of noise, with a null law of its own; tails are those of this law.
+    pub fn under(&self, law: NoiseLaw) -> Self {
+        let law = law.with_tails_of(&self.law);
+        Self::new(self.model, self.catalogue, law, self.draws.0, self.draws.1)
     }
 
     /// The context of another state and law of noise of the same readings. The null law is kept: it
@@ -96,6 +105,7 @@ impl<'a> Context<'a> {
             space,
             dictionary,
             null: Arc::clone(&self.null),
+            draws: self.draws,
             drawn: Drawn::default(),
         }
     }

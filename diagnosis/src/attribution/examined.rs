@@ -6,9 +6,10 @@ use nalgebra::{DMatrix, DVector};
 use crate::attribution::attribute::{attribute, roughly};
 use crate::attribution::confidence::Answer;
 use crate::attribution::context::{Cause, Context};
+use crate::attribution::drifting::drifts_instead;
 use crate::attribution::remainder::Remainder;
-use crate::detection::estimate::estimate;
-use crate::noise::law::NoiseLaw;
+use crate::detection::estimate::estimate_where;
+use crate::noise::law::{Drifts, NoiseLaw};
 
 /// What a diagnosis has come to before it is put in words.
 pub(crate) struct Examined<'a> {
@@ -21,7 +22,8 @@ pub(crate) struct Examined<'a> {
 }
 
 /// Causes bend the fitted state and swell the noise; both are found again without them, and the
-/// diagnosis is made once more from there.
+/// diagnosis is made once more from there. Where drifts of whole traces explain the repeats better than what is found so,
+/// all of it is done again with a law in which traces drift.
 pub(crate) fn examined<R>(
     context: &Context<'_>,
     readings: &DVector<f64>,
@@ -41,17 +43,22 @@ pub(crate) fn examined<R>(
     }
     let found = roughly(context, readings, &first);
     let changes = context.changes(readings, &found);
-    let (state, law, readings) = afresh(context, &found, changes.as_ref());
-    let context = context.moved(&state, law);
-    let first = context.remainder(&readings, &[]);
-    let found = attribute(&context, &readings, &first, &found);
-    then(Examined {
-        context: &context,
-        readings: &readings,
+    let (state, law, seen) = afresh(context, &found, changes.as_ref());
+    let moved = context.moved(&state, law);
+    let first = moved.remainder(&seen, &[]);
+    let found = attribute(&moved, &seen, &first, &found);
+    let examined = Examined {
+        context: &moved,
+        readings: &seen,
         first: &first,
         detected,
         found,
-    })
+    };
+    if context.law.drifts == Drifts::Never && drifts_instead(context, &examined) {
+        let law = estimate_where(context.model, readings, Drifts::Possible);
+        return self::examined(&context.under(law), readings, false_alarm, then);
+    }
+    then(examined)
 }
 
 /// State and noise without what causes change in the readings, readings × causes, and the readings seen
@@ -74,6 +81,6 @@ pub(crate) fn afresh(
     };
     // The readings themselves keep what an effect had hidden of the state.
     let clean = context.model.refit(observed - &change).linearised();
-    let law = estimate(&state, &clean);
+    let law = estimate_where(&state, &clean, context.law.drifts);
     (state, law, clean + change)
 }

@@ -10,6 +10,7 @@ pub(super) mod candidates;
 pub(super) mod confidence;
 pub(super) mod context;
 pub(super) mod doubt;
+mod drifting;
 pub(super) mod examined;
 mod fewer;
 pub(super) mod limits;

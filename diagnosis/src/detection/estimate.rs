@@ -12,7 +12,7 @@ use crate::detection::space::Space;
 use crate::levels::{FEWEST_CONTRASTS, LIKELIER, LIKELIER_BY_JUMPS, MOST_JUMPS};
 use crate::noise::contrasts::Contrasts;
 use crate::noise::jumps::without_jump;
-use crate::noise::law::{NoiseLaw, NoiseSource, SEED};
+use crate::noise::law::{Drifts, NoiseLaw, NoiseSource, SEED};
 use crate::noise::posterior::allowed;
 use crate::noise::steps::levelled;
 
@@ -22,16 +22,25 @@ const NEIGHBOUR_DRAWS: usize = 64;
 /// The law that is stated, or that the repeats of a model's readings follow, or what stands in
 /// for it.
 pub(crate) fn estimate(model: &AnyModel, readings: &DVector<f64>) -> NoiseLaw {
-    shown(model, readings).whiter(model.noise_allowance())
+    estimate_where(model, readings, Drifts::Never)
+}
+
+/// The same where whole traces may drift, or may not.
+pub(crate) fn estimate_where(
+    model: &AnyModel,
+    readings: &DVector<f64>,
+    drifts: Drifts,
+) -> NoiseLaw {
+    shown(model, readings, drifts).whiter(model.noise_allowance())
 }
 
 /// The same as the differences of traces show it.
-fn shown(model: &AnyModel, readings: &DVector<f64>) -> NoiseLaw {
+fn shown(model: &AnyModel, readings: &DVector<f64>, drifts: Drifts) -> NoiseLaw {
     if let Some(sigma) = model.stated_noise() {
         return NoiseLaw::white(sigma, f64::INFINITY, NoiseSource::Stated);
     }
     let floor = model.rounding().max(f64::MIN_POSITIVE.sqrt());
-    without_jumps(model, levelled(model, readings), floor).1
+    without_jumps(model, levelled(model, readings), drifts, floor).1
 }
 
 /// Whether readings are likelier without their steps and jumps than without causes, by twenty to one: something that jumps
@@ -40,22 +49,37 @@ pub(crate) fn jumps_instead(
     model: &AnyModel,
     readings: &DVector<f64>,
     without_causes: &DVector<f64>,
+    drifts: Drifts,
 ) -> bool {
     let floor = model.rounding().max(f64::MIN_POSITIVE.sqrt());
-    let (without, jumps) = without_jumps(model, levelled(model, readings), floor);
-    let own = || of_repeats(model, &levelled(model, without_causes), floor);
+    let (without, jumps) = without_jumps(model, levelled(model, readings), drifts, floor);
+    let own = || of_repeats(model, &levelled(model, without_causes), drifts, floor);
     without != *readings && jumps.is_likelier(&own(), LIKELIER_BY_JUMPS)
+}
+
+/// Logarithm of how likely readings without their jumps are where whole traces may drift, or may not, to a constant of
+/// their places; none where repeats do not tell the noise.
+pub(crate) fn evidence(model: &AnyModel, readings: &DVector<f64>, drifts: Drifts) -> Option<f64> {
+    let floor = model.rounding().max(f64::MIN_POSITIVE.sqrt());
+    without_jumps(model, levelled(model, readings), drifts, floor)
+        .1
+        .log_evidence
 }
 
 /// Readings without the jumps that make them likelier, each at the laws that they allow themselves, and their law. What
 /// jumps again and again is nothing that jumps and stays; of that nothing is taken out.
-fn without_jumps(model: &AnyModel, level: DVector<f64>, floor: f64) -> (DVector<f64>, NoiseLaw) {
-    let law = of_repeats(model, &level, floor);
+fn without_jumps(
+    model: &AnyModel,
+    level: DVector<f64>,
+    drifts: Drifts,
+    floor: f64,
+) -> (DVector<f64>, NoiseLaw) {
+    let law = of_repeats(model, &level, drifts, floor);
     let as_read = (level, law);
     let mut last = as_read.clone();
     for _ in 0..=MOST_JUMPS {
         let next = without_jump(model, &last.0, &last.1).map(|level| {
-            let law = of_repeats(model, &level, floor);
+            let law = of_repeats(model, &level, drifts, floor);
             (level, law)
         });
         match next.filter(|(_, law)| law.is_likelier(&last.1, LIKELIER)) {
@@ -67,7 +91,7 @@ fn without_jumps(model: &AnyModel, level: DVector<f64>, floor: f64) -> (DVector<
 }
 
 /// The law as the differences of repeats show it, or neighbours where there are none.
-fn of_repeats(model: &AnyModel, readings: &DVector<f64>, floor: f64) -> NoiseLaw {
+fn of_repeats(model: &AnyModel, readings: &DVector<f64>, drifts: Drifts, floor: f64) -> NoiseLaw {
     let contrasts = Contrasts::of(model, readings);
     if contrasts.count() < FEWEST_CONTRASTS {
         return neighbours(model, readings, floor);
@@ -75,9 +99,9 @@ fn of_repeats(model: &AnyModel, readings: &DVector<f64>, floor: f64) -> NoiseLaw
     let (variance, freedom) = contrasts.scatter();
     if variance > floor * floor
         && model.correlated_noise()
-        && let Some(allowed) = allowed(&contrasts, SEED)
+        && let Some(allowed) = allowed(&contrasts, drifts, SEED)
     {
-        return NoiseLaw::mean_of(allowed);
+        return NoiseLaw::mean_of(allowed, drifts);
     }
     NoiseLaw::white(variance.sqrt().max(floor), freedom, NoiseSource::Repeats)
 }
@@ -161,11 +185,11 @@ pub(crate) fn neighbour_scatter(
         return None;
     }
     let spacing = gaps.iter().sum::<f64>() / gaps.len() as f64;
-    let along = (-spacing / law.length).exp();
+    let along = (-spacing / law.parts.length).exp();
     // Variance of (e₋ − 2e₀ + e₊)/√6 under the law; the fit has taken its part of the white noise.
-    let correlated = law.correlated * (6.0 - 8.0 * along + 2.0 * along * along) / 6.0;
+    let correlated = law.parts.correlated * (6.0 - 8.0 * along + 2.0 * along * along) / 6.0;
     let kept = space.degrees_of_freedom() as f64 / space.readings().max(1) as f64;
-    let white = law.white / model.noise_allowance();
+    let white = law.parts.white / model.noise_allowance();
     Some(Scatter {
         seen,
         expected: (kept * (white + correlated)).sqrt(),
@@ -212,7 +236,7 @@ mod tests {
                 .filter(|k| model.places()[**k].time > moment);
             beyond.for_each(|k| stepped[*k] += 0.25);
             assert_eq!(levelled(&model, &stepped), stepped, "{seed}");
-            let (level, _) = without_jumps(&model, stepped, 0.0);
+            let (level, _) = without_jumps(&model, stepped, Drifts::Never, 0.0);
             let away: Vec<f64> = of_channel
                 .iter()
                 .map(|k| level[*k] - model.observed()[*k])
@@ -229,7 +253,7 @@ mod tests {
         for seed in 0..20 {
             let model = made(0.2, seed);
             let readings = model.observed();
-            let (level, _) = without_jumps(&model, readings.clone(), 0.0);
+            let (level, _) = without_jumps(&model, readings.clone(), Drifts::Never, 0.0);
             assert_eq!(level, *readings, "{seed}");
         }
     }

@@ -9,6 +9,7 @@
 //! it, or makes it seem correlated, and so hides itself. Of such an effect the size is a lower bound.
 
 use errsep_models::model::{AnyModel, Column, FittedModel};
+use errsep_models::noise::Law;
 use serde::Serialize;
 
 use crate::detection::dictionary::{Dictionary, Entry, Family};
@@ -114,9 +115,9 @@ fn swells(model: &AnyModel, law: &NoiseLaw, signature: &Column, size: f64) -> bo
     if contrasts.count() == 0 {
         return false;
     }
-    let white = law.white.max(f64::MIN_POSITIVE);
+    let white = law.parts.white.max(f64::MIN_POSITIVE);
     if model.correlated_noise() && contrasts.reach().is_some() {
-        let seen = contrasts.likelihood(law.correlated / white, law.length, law.shift / white);
+        let seen = contrasts.likelihood(&Law { white, ..law.parts });
         return size * size * seen.quadratic / white > PASSES_FOR_NOISE;
     }
     let (variance, _) = contrasts.scatter();

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use errsep_models::model::{AnyModel, FittedModel, Place};
+use errsep_models::noise::{Law, Likelihood, Likelihoods, OfWhole};
 use nalgebra::DVector;
 
 use crate::levels::LONG_TRACE;
@@ -35,14 +36,6 @@ impl Row {
     pub fn is_beside(&self, other: &Self, channel: usize) -> bool {
         self.channel == channel && self.backward == other.backward && self.which == other.which
     }
-}
-
-/// What a law says of the contrasts, its scale left open.
-pub(crate) struct Likelihood {
-    /// −ln L at the best scale; up to a constant also when the scale is integrated out (1/w).
-    pub minus_log: f64,
-    /// Quadratic form; over [`Contrasts::count`] it is the best scale.
-    pub quadratic: f64,
 }
 
 impl Contrasts {
@@ -144,58 +137,19 @@ impl Contrasts {
         self
     }
 
-    /// The likelihood of a correlated part and a shift, both in units of the white variance.
-    ///
-    /// The Ornstein–Uhlenbeck part is Markov, so one pass of the Kalman filter gives determinant
-    /// and quadratic form; the shift is a rank-one update.
-    pub fn likelihood(&self, correlated: f64, length: f64, shift: f64) -> Likelihood {
-        let (mut quadratic, mut log_determinant) = (0.0, 0.0);
-        let mut steps: Vec<Step> = Vec::new();
+    /// The likelihood of a law, its scale left open.
+    pub fn likelihood(&self, law: &Law) -> Likelihood {
+        let whole = [OfWhole {
+            shift: law.shift / law.white,
+            drift: law.drift / law.white,
+        }];
+        let mut sums = Likelihoods::new(&whole);
         for group in &self.groups {
-            steps.clear();
-            let x = &group.positions;
-            let (mut ones, mut variance) = (0.0, correlated);
-            let (mut one1, mut log_totals) = (0.0, 0.0);
-            for k in 0..x.len() {
-                let mut decay = 0.0;
-                if k > 0 && correlated > 0.0 {
-                    decay = (-(x[k] - x[k - 1]).abs() / length).exp();
-                    ones *= decay;
-                    variance = decay * decay * variance + correlated * (1.0 - decay * decay);
-                }
-                let total = variance + 1.0;
-                let e1 = 1.0 - ones;
-                one1 += e1 * e1 / total;
-                log_totals += total.ln();
-                let gain = variance / total;
-                ones += gain * e1;
-                variance *= 1.0 - gain;
-                steps.push(Step {
-                    decay,
-                    gain,
-                    e1: e1 / total,
-                    weight: 1.0 / total,
-                });
-            }
-            for y in &group.rows {
-                let (mut state, mut yy, mut y1) = (0.0, 0.0, 0.0);
-                for (step, value) in steps.iter().zip(y.values.iter()) {
-                    state *= step.decay;
-                    let innovation = value - state;
-                    yy += innovation * innovation * step.weight;
-                    y1 += innovation * step.e1;
-                    state += step.gain * innovation;
-                }
-                quadratic += yy - shift * y1 * y1 / (1.0 + shift * one1);
-                log_determinant += log_totals + (shift * one1).ln_1p();
-            }
+            let rows = group.rows.iter().map(|row| row.values.as_slice());
+            let along = (1.0, law.correlated / law.white, law.length);
+            sums.add(&group.positions, 1.0, rows, along);
         }
-        let count = self.count() as f64;
-        let quadratic = quadratic.max(f64::MIN_POSITIVE);
-        Likelihood {
-            minus_log: 0.5 * (count * (quadratic / count).ln() + log_determinant),
-            quadratic,
-        }
+        sums.found()[0]
     }
 }
 
@@ -209,16 +163,6 @@ pub(crate) fn repeated(places: &[Place], traces: &[Range<usize>]) -> Vec<Vec<usi
         alike.entry(key).or_default().push(k);
     }
     alike.into_values().collect()
-}
-
-/// The filter at one reading: the same for all contrasts on the same positions.
-struct Step {
-    decay: f64,
-    gain: f64,
-    /// Innovation of 1 over its variance.
-    e1: f64,
-    /// 1 / variance of the innovation.
-    weight: f64,
 }
 
 /// Orthonormal contrasts of repeats at given times, orthogonal to {1, t}; to {1} for two repeats.
@@ -282,7 +226,7 @@ mod tests {
         /// The filter's likelihood is that of the dense covariance, with the scale at its best.
         #[test]
         fn the_likelihood_is_the_dense_one(
-            correlated in 0.0f64..3.0, length in 0.5f64..20.0, shift in 0.0f64..2.0,
+            correlated in 0.0f64..3.0, length in 0.5f64..20.0, shift in 0.0f64..2.0, drift in 0.0f64..1.0,
             steps in prop::collection::vec(0.1f64..4.0, 5..12),
             values in prop::collection::vec(-2.0f64..2.0, 52),
         ) {
@@ -294,7 +238,8 @@ mod tests {
             let readings = DVector::from_column_slice(&values[..places.len().min(52)]);
             prop_assume!(readings.len() == places.len());
             let contrasts = Contrasts::new(&places, &traces, &readings);
-            let covariance = NoiseLaw::of(1.0, correlated, length, shift).covariance(&x);
+            let law = Law { white: 1.0, correlated, length, shift, drift };
+            let covariance = NoiseLaw::stated(law).covariance(&x);
             let factor = covariance.cholesky().unwrap();
             let log_determinant = 2.0 * factor.l().diagonal().map(f64::ln).sum();
             let (mut quadratic, mut determinants) = (0.0, 0.0);
@@ -304,8 +249,8 @@ mod tests {
             }
             let count = contrasts.count() as f64;
             let dense = 0.5 * (count * (quadratic / count).ln() + determinants);
-            let filtered = contrasts.likelihood(correlated, length, shift);
-            // Rounding: twelve readings a row, condition of the covariance below 100.
+            let filtered = contrasts.likelihood(&law);
+            // Rounding: twelve readings a row, condition of the covariance below 10 000.
             prop_assert!((filtered.minus_log - dense).abs() < 1e-9 * (1.0 + dense.abs()));
             prop_assert!((filtered.quadratic / quadratic - 1.0).abs() < 1e-9);
         }

@@ -21,10 +21,7 @@ pub(crate) fn without_jump(
     }
     let likelihood = |readings: &DVector<f64>| {
         let contrasts = Contrasts::of(model, readings);
-        let (correlated, shift) = (law.correlated / law.white, law.shift / law.white);
-        -contrasts
-            .likelihood(correlated, law.length, shift)
-            .minus_log
+        -contrasts.likelihood(&law.parts).minus_log
     };
     let jumps = model.jumps();
     let channels = 0..model.channel_names().len();

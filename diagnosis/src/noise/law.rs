@@ -1,17 +1,18 @@
 //! Noise first: the covariance of the readings from repeats alone.
 //!
 //! One reading = white noise + a part correlated along its trace (Ornstein–Uhlenbeck: variance
-//! o, correlation exp(−|Δx|/ℓ)) + a shift of the whole trace. Repeats of a trace differ by noise,
+//! o, correlation exp(−|Δx|/ℓ)) + a shift of the whole trace + a drift of the whole trace by a slope of its own, where
+//! that explains the repeats better than causes do (`drift.rs`). Repeats of a trace differ by noise,
 //! but also by whatever drifts steadily between them; contrasts orthogonal to {1, t} hold neither
 //! the model nor the drift, so their likelihood estimates the noise alone.
 
 use std::sync::Arc;
 
 use errsep_models::model::{AnyModel, FittedModel};
+use errsep_models::noise::{Law, about_middle};
 use nalgebra::{DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal, StudentT};
-use serde::{Deserialize, Serialize};
 
 use crate::levels::FEWEST_CONTRASTS;
 use crate::noise::contrasts::Contrasts;
@@ -32,84 +33,28 @@ pub enum NoiseSource {
     Neighbours,
 }
 
-/// The parts of the noise of one reading; variances in the square of the reading's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Components {
-    /// Variance of the white part.
-    pub white: f64,
-    /// Variance of the part correlated along a trace.
-    pub correlated: f64,
-    /// Its correlation length, in the unit of the positions.
-    pub length: f64,
-    /// Variance of the shift of a whole trace.
-    pub shift: f64,
+/// Whether whole traces may drift, each by a slope of its own, as noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Drifts {
+    /// What drifts is no noise.
+    Never,
+    /// The repeats decide.
+    Possible,
 }
 
-impl Components {
-    /// Variance of one reading.
-    fn whole(&self) -> f64 {
-        self.white + self.correlated + self.shift
-    }
-
-    /// Noise of all readings of a model.
-    pub(crate) fn draw_all(&self, model: &AnyModel, random: &mut ChaCha8Rng) -> DVector<f64> {
-        let mut noise = DVector::zeros(model.places().len());
-        for trace in model.traces() {
-            let x: Vec<f64> = model.places()[trace.clone()].iter().map(|p| p.x).collect();
-            self.draw(&x, random, &mut noise.as_mut_slice()[trace.clone()]);
-        }
-        noise
-    }
-
-    /// Noise of one trace.
-    pub(crate) fn draw(&self, positions: &[f64], random: &mut ChaCha8Rng, noise: &mut [f64]) {
-        let mut normal = || -> f64 { StandardNormal.sample(random) };
-        let white = self.white.sqrt();
-        let shift = if self.shift > 0.0 {
-            self.shift.sqrt() * normal()
-        } else {
-            0.0
-        };
-        if self.correlated <= 0.0 {
-            noise.iter_mut().for_each(|v| *v = shift + white * normal());
-            return;
-        }
-        let mut state = self.correlated.sqrt() * normal();
-        // Of the last spacing, as most are equal.
-        let (mut known, mut decay, mut fresh) = (f64::NAN, 0.0, 0.0);
-        for (k, value) in noise.iter_mut().enumerate() {
-            if k > 0 {
-                let spacing = (positions[k] - positions[k - 1]).abs();
-                if spacing != known {
-                    known = spacing;
-                    decay = (-spacing / self.length).exp();
-                    fresh = (self.correlated * (1.0 - decay * decay)).sqrt();
-                }
-                state = decay * state + fresh * normal();
-            }
-            *value = shift + state + white * normal();
-        }
-    }
-}
-
-/// The law of the noise; variances in the square of the reading's unit.
+/// The law of the noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseLaw {
-    /// Variance of the white part.
-    pub white: f64,
-    /// Variance of the part correlated along a trace.
-    pub correlated: f64,
-    /// Its correlation length, in the unit of the positions.
-    pub length: f64,
-    /// Variance of the shift of a whole trace.
-    pub shift: f64,
+    /// Variances of its parts, in the square of the reading's unit.
+    pub parts: Law,
     /// Degrees of freedom behind the variance of one reading.
     pub freedom: f64,
     /// Where it comes from.
     pub source: NoiseSource,
+    /// Whether drifts of whole traces were thought of.
+    pub(crate) drifts: Drifts,
     /// Laws drawn from what the repeats allow; empty where only the white variance is in doubt.
-    possible: Arc<Vec<Components>>,
+    possible: Arc<Vec<Law>>,
     /// Heavy tails of the single readings.
     tails: Option<Tails>,
     /// Logarithm of how likely all laws together make the repeats from which it is learnt, to a constant of their places.
@@ -120,12 +65,10 @@ impl NoiseLaw {
     /// White noise of a known standard deviation.
     pub fn white(sigma: f64, freedom: f64, source: NoiseSource) -> Self {
         Self {
-            white: sigma * sigma,
-            correlated: 0.0,
-            length: 1.0,
-            shift: 0.0,
+            parts: Law::of_white(sigma * sigma),
             freedom,
             source,
+            drifts: Drifts::Never,
             possible: Arc::new(Vec::new()),
             tails: None,
             log_evidence: None,
@@ -133,12 +76,9 @@ impl NoiseLaw {
     }
 
     /// A law that is known from elsewhere.
-    pub fn stated(parts: Components) -> Self {
+    pub fn stated(parts: Law) -> Self {
         Self {
-            white: parts.white,
-            correlated: parts.correlated,
-            length: parts.length,
-            shift: parts.shift,
+            parts,
             ..Self::white(1.0, f64::INFINITY, NoiseSource::Stated)
         }
     }
@@ -146,22 +86,23 @@ impl NoiseLaw {
     /// A law of given parts.
     #[cfg(test)]
     pub(crate) fn of(white: f64, correlated: f64, length: f64, shift: f64) -> Self {
-        Self::stated(Components {
+        Self::stated(Law {
             white,
             correlated,
             length,
             shift,
+            drift: 0.0,
         })
     }
 
     /// The mean of laws drawn from what the repeats allow.
-    pub(crate) fn mean_of(Allowed { laws, log_evidence }: Allowed) -> Self {
+    pub(crate) fn mean_of(Allowed { laws, log_evidence }: Allowed, drifts: Drifts) -> Self {
         let count = laws.len().max(1) as f64;
-        let mean = |value: fn(&Components) -> f64| laws.iter().map(value).sum::<f64>() / count;
-        let whole = mean(Components::whole);
+        let mean = |value: fn(&Law) -> f64| laws.iter().map(value).sum::<f64>() / count;
+        let whole = mean(Law::variance);
         let variance = laws
             .iter()
-            .map(|l| (l.whole() - whole).powi(2))
+            .map(|l| (l.variance() - whole).powi(2))
             .sum::<f64>()
             / (count - 1.0).max(1.0);
         let correlated = mean(|l| l.correlated);
@@ -171,10 +112,14 @@ impl NoiseLaw {
             1.0
         };
         Self {
-            white: mean(|l| l.white),
-            correlated,
-            length,
-            shift: mean(|l| l.shift),
+            parts: Law {
+                white: mean(|l| l.white),
+                correlated,
+                length,
+                shift: mean(|l| l.shift),
+                drift: mean(|l| l.drift),
+            },
+            drifts,
             freedom: (2.0 * whole * whole / variance.max(f64::MIN_POSITIVE)).clamp(1.0, 1e9),
             source: NoiseSource::Repeats,
             possible: Arc::new(laws),
@@ -192,7 +137,7 @@ impl NoiseLaw {
     /// The law with another white variance, by a factor.
     pub(crate) fn whiter(mut self, factor: f64) -> Self {
         if factor != 1.0 {
-            self.white *= factor;
+            self.parts.white *= factor;
             let mut laws = self.possible.to_vec();
             laws.iter_mut().for_each(|law| law.white *= factor);
             self.possible = Arc::new(laws);
@@ -206,19 +151,14 @@ impl NoiseLaw {
         self
     }
 
-    /// The parts.
-    pub fn components(&self) -> Components {
-        Components {
-            white: self.white,
-            correlated: self.correlated,
-            length: self.length,
-            shift: self.shift,
-        }
+    /// The law with the tails of another one.
+    pub(crate) fn with_tails_of(self, other: &Self) -> Self {
+        self.with_tails(other.tails)
     }
 
     /// Noise of all readings of a model.
     pub(crate) fn draw(&self, model: &AnyModel, random: &mut ChaCha8Rng) -> DVector<f64> {
-        self.components().draw_all(model, random)
+        draw_all(&self.parts, model, random)
     }
 
     /// Noise of all readings for a draw of the null law: by a law that the readings allow, with
@@ -235,10 +175,10 @@ impl NoiseLaw {
             .tails
             .and_then(|t| Some((t, StudentT::new(t.freedom).ok()?)))
         else {
-            return law.draw_all(model, random);
+            return draw_all(&law, model, random);
         };
         let scale = (law.white / tails.variance).sqrt();
-        let mut noise = Components { white: 0.0, ..law }.draw_all(model, random);
+        let mut noise = draw_all(&Law { white: 0.0, ..law }, model, random);
         for value in noise.iter_mut() {
             *value += scale * student.sample(random);
         }
@@ -247,7 +187,7 @@ impl NoiseLaw {
     }
 
     /// A law that the readings allow.
-    pub(crate) fn possible(&self, draw: usize, random: &mut ChaCha8Rng) -> Components {
+    pub(crate) fn possible(&self, draw: usize, random: &mut ChaCha8Rng) -> Law {
         match self.possible.get(draw % self.possible.len().max(1)) {
             Some(law) => *law,
             None => self.rescaled(random),
@@ -255,27 +195,40 @@ impl NoiseLaw {
     }
 
     /// The white variance drawn from what its degrees of freedom allow.
-    fn rescaled(&self, random: &mut ChaCha8Rng) -> Components {
-        let mut law = self.components();
+    fn rescaled(&self, random: &mut ChaCha8Rng) -> Law {
+        let mut law = self.parts;
         if let (true, Ok(chi)) = (self.freedom < 1e6, ChiSquared::new(self.freedom)) {
             law.white *= self.freedom / chi.sample(random);
         }
         law
     }
 
-    /// Standard deviation of one reading.
+    /// Standard deviation of one reading, in the middle of its trace where that may drift.
     pub fn sigma(&self) -> f64 {
-        self.components().whole().sqrt()
+        self.parts.variance().sqrt()
     }
 
     /// Covariance of the readings of one trace.
     pub fn covariance(&self, positions: &[f64]) -> DMatrix<f64> {
+        let law = &self.parts;
+        let places = about_middle(positions);
         DMatrix::from_fn(positions.len(), positions.len(), |i, j| {
             let apart = (positions[i] - positions[j]).abs();
-            let same = if i == j { self.white } else { 0.0 };
-            same + self.correlated * (-apart / self.length).exp() + self.shift
+            let same = if i == j { law.white } else { 0.0 };
+            let whole = law.shift + law.drift * places[i] * places[j];
+            same + law.correlated * (-apart / law.length).exp() + whole
         })
     }
+}
+
+/// Noise of all readings of a model, of a law.
+pub(crate) fn draw_all(law: &Law, model: &AnyModel, random: &mut ChaCha8Rng) -> DVector<f64> {
+    let mut noise = DVector::zeros(model.places().len());
+    for trace in model.traces() {
+        let x: Vec<f64> = model.places()[trace.clone()].iter().map(|p| p.x).collect();
+        law.draw(&x, random, &mut noise.as_mut_slice()[trace.clone()]);
+    }
+    noise
 }
 
 /// A draw of the scatter that the model expects beside the noise.

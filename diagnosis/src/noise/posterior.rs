@@ -3,12 +3,14 @@
 //! A single best law passes its own error on to every probability that is computed from it: a shift
 //! of the traces that sixteen contrasts happen not to show would make each shift of a trace a
 //! discovery. So the null law is drawn with laws of noise drawn from their posterior: four kinds of
-//! law (white alone, with a correlated part, with shifts, with both), each a quarter beforehand; the
-//! ratios of the standard deviations to the white one follow half-Cauchy laws of scale one (Gelman,
-//! Bayesian Analysis 1 (2006) 515), the logarithm of the correlation length is uniform between the
+//! law (white alone, with a correlated part, with shifts, with both), where whole traces may drift each without and with
+//! that, all as probable beforehand; the
+//! ratios of the standard deviations to the white one, of the drift at the ends of the travel, follow half-Cauchy laws of
+//! scale one (Gelman, Bayesian Analysis 1 (2006) 515), the logarithm of the correlation length is uniform between the
 //! spacing and the length of a trace, that of the white variance everywhere. The posterior is
 //! sampled by importance resampling from Student's law about each mode.
 
+use errsep_models::noise::Law;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -16,7 +18,7 @@ use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use statrs::function::gamma::ln_gamma;
 
 use crate::noise::contrasts::Contrasts;
-use crate::noise::law::Components;
+use crate::noise::law::Drifts;
 use crate::search::{Reach, coordinate_search};
 
 /// Proposals for each kind of law.
@@ -26,36 +28,36 @@ const LAWS: usize = 400;
 /// Degrees of freedom of the proposals: heavier tails than the posterior's.
 const TAILS: f64 = 5.0;
 
-/// Which components a kind of law has.
+/// Which parts a kind of law has.
 #[derive(Debug, Clone, Copy)]
 struct Kind {
     correlated: bool,
     shift: bool,
+    drift: bool,
 }
 
-const KINDS: [Kind; 4] = [
-    Kind {
-        correlated: false,
-        shift: false,
-    },
-    Kind {
-        correlated: false,
-        shift: true,
-    },
-    Kind {
-        correlated: true,
-        shift: false,
-    },
-    Kind {
-        correlated: true,
-        shift: true,
-    },
-];
+/// The kinds of law: white alone, with shifts, with a correlated part, with both; where traces may drift each without a drift
+/// and with it.
+fn kinds(drifts: Drifts) -> impl Iterator<Item = Kind> {
+    let drifts = match drifts {
+        Drifts::Never => &[false][..],
+        Drifts::Possible => &[false, true],
+    };
+    drifts.iter().flat_map(|drift| {
+        [(false, false), (false, true), (true, false), (true, true)].map(|(correlated, shift)| {
+            Kind {
+                correlated,
+                shift,
+                drift: *drift,
+            }
+        })
+    })
+}
 
 /// A proposed law and its logarithmic weight.
 struct Proposal {
-    /// Correlated and shift variance in units of the white one; length.
-    ratios: Components,
+    /// The law, its white variance one.
+    ratios: Law,
     quadratic: f64,
     weight: f64,
 }
@@ -63,49 +65,66 @@ struct Proposal {
 /// What contrasts allow.
 pub(crate) struct Allowed {
     /// Laws of noise drawn from their posterior.
-    pub laws: Vec<Components>,
+    pub laws: Vec<Law>,
     /// Logarithm of the probability density of the contrasts under all laws together, to a constant that their number
     /// and places alone decide.
     pub log_evidence: f64,
 }
 
 /// Laws of noise drawn from what the contrasts allow, where any can be told.
-pub(crate) fn allowed(contrasts: &Contrasts, seed: u64) -> Option<Allowed> {
+pub(crate) fn allowed(contrasts: &Contrasts, drifts: Drifts, seed: u64) -> Option<Allowed> {
     let (spacing, travel) = contrasts.reach()?;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let range = (spacing.ln(), travel.max(2.0 * spacing).ln());
+    let scale = Scale {
+        lengths: (spacing.ln(), travel.max(2.0 * spacing).ln()),
+        half: 0.5 * travel,
+    };
     let mut proposals: Vec<Proposal> = Vec::new();
-    for kind in KINDS {
-        proposals.extend(proposed(contrasts, kind, range, &mut random));
+    let mut tried = 0;
+    for kind in kinds(drifts) {
+        proposals.extend(proposed(contrasts, kind, scale, &mut random));
+        tried += 1;
     }
-    resampled(&proposals, contrasts.count() as f64, &mut random)
+    let mut allowed = resampled(&proposals, contrasts.count() as f64, &mut random)?;
+    // Each kind is as probable as the others beforehand.
+    allowed.log_evidence -= f64::from(tried).ln();
+    Some(allowed)
+}
+
+/// What points of a search stand for.
+#[derive(Debug, Clone, Copy)]
+struct Scale {
+    /// Logarithms of the least and the greatest correlation length.
+    lengths: (f64, f64),
+    /// Half a travel, at which a slope is taken.
+    half: f64,
 }
 
 impl Kind {
-    /// The law of a point: standard deviations in units of the white one, then ln of the length.
-    fn ratios(self, point: &[f64]) -> Components {
-        let mut law = Components {
-            white: 1.0,
-            correlated: 0.0,
-            length: 1.0,
-            shift: 0.0,
-        };
+    /// The law of a point: standard deviations in units of the white one, of the correlated part with ln of the length, of
+    /// the shift, and of the drift at the ends of the travel.
+    fn ratios(self, point: &[f64], scale: Scale) -> Law {
+        let mut law = Law::of_white(1.0);
         let mut rest = point;
         if let (true, [sd, log_length, others @ ..]) = (self.correlated, rest) {
             law.correlated = sd * sd;
             law.length = log_length.exp();
             rest = others;
         }
-        if let (true, [sd, ..]) = (self.shift, rest) {
+        if let (true, [sd, others @ ..]) = (self.shift, rest) {
             law.shift = sd * sd;
+            rest = others;
+        }
+        if let (true, [sd, ..]) = (self.drift, rest) {
+            law.drift = (sd / scale.half).powi(2);
         }
         law
     }
 
     /// −ln of the prior density at a point, infinite outside.
-    fn minus_log_prior(self, point: &[f64], range: (f64, f64)) -> f64 {
-        let half_cauchy = |sd: f64| {
-            if sd < 0.0 {
+    fn minus_log_prior(self, point: &[f64], (least, most): (f64, f64)) -> f64 {
+        let half_cauchy = |sd: &f64| {
+            if *sd < 0.0 {
                 f64::INFINITY
             } else {
                 (std::f64::consts::FRAC_PI_2 * (1.0 + sd * sd)).ln()
@@ -114,27 +133,24 @@ impl Kind {
         let mut sum = 0.0;
         let mut rest = point;
         if let (true, [sd, log_length, others @ ..]) = (self.correlated, rest) {
-            sum += half_cauchy(*sd);
-            sum += if *log_length < range.0 || *log_length > range.1 {
+            sum += half_cauchy(sd);
+            sum += if *log_length < least || *log_length > most {
                 f64::INFINITY
             } else {
-                (range.1 - range.0).ln()
+                (most - least).ln()
             };
             rest = others;
         }
-        if let (true, [sd, ..]) = (self.shift, rest) {
-            sum += half_cauchy(*sd);
-        }
-        sum
+        sum + rest.iter().map(half_cauchy).sum::<f64>()
     }
 
     /// Where the search for the mode begins, and its steps.
-    fn starts(self, range: (f64, f64)) -> Vec<(Vec<f64>, Vec<f64>)> {
-        let shift: &[f64] = if self.shift { &[0.3] } else { &[] };
+    fn starts(self, (least, most): (f64, f64)) -> Vec<(Vec<f64>, Vec<f64>)> {
+        let of_whole = vec![0.3; usize::from(self.shift) + usize::from(self.drift)];
         let at = |parts: &[f64], steps: &[f64]| {
             let (mut p, mut s) = (parts.to_vec(), steps.to_vec());
-            p.extend(shift);
-            s.extend(shift.iter().map(|v| 0.5 * v));
+            p.extend(&of_whole);
+            s.extend(of_whole.iter().map(|v| 0.5 * v));
             (p, s)
         };
         if !self.correlated {
@@ -142,7 +158,7 @@ impl Kind {
         }
         [0.1, 0.3, 0.55]
             .iter()
-            .map(|part| at(&[0.5, range.0 + part * (range.1 - range.0)], &[0.25, 0.5]))
+            .map(|part| at(&[0.5, least + part * (most - least)], &[0.25, 0.5]))
             .collect()
     }
 }
@@ -151,20 +167,19 @@ impl Kind {
 fn proposed(
     contrasts: &Contrasts,
     kind: Kind,
-    range: (f64, f64),
+    scale: Scale,
     random: &mut ChaCha8Rng,
 ) -> Vec<Proposal> {
     let judged = |point: &[f64]| -> (f64, f64) {
-        let prior = kind.minus_log_prior(point, range);
+        let prior = kind.minus_log_prior(point, scale.lengths);
         if !prior.is_finite() {
             return (f64::INFINITY, 1.0);
         }
-        let law = kind.ratios(point);
-        let likelihood = contrasts.likelihood(law.correlated, law.length, law.shift);
+        let likelihood = contrasts.likelihood(&kind.ratios(point, scale));
         (likelihood.minus_log + prior, likelihood.quadratic)
     };
     let mode = kind
-        .starts(range)
+        .starts(scale.lengths)
         .into_iter()
         .map(|(start, steps)| coordinate_search(&start, &steps, Reach::WIDE, |p| judged(p).0))
         .fold((Vec::new(), f64::INFINITY), |best, next| {
@@ -175,7 +190,7 @@ fn proposed(
     if d == 0 {
         let (value, quadratic) = judged(&mode);
         return vec![Proposal {
-            ratios: kind.ratios(&mode),
+            ratios: kind.ratios(&mode, scale),
             quadratic,
             weight: -value,
         }];
@@ -202,7 +217,7 @@ fn proposed(
             let (value, quadratic) = judged(&point);
             let density = norm - 0.5 * (TAILS + dimension) * (z.norm_squared() / TAILS).ln_1p();
             value.is_finite().then(|| Proposal {
-                ratios: kind.ratios(&point),
+                ratios: kind.ratios(&point, scale),
                 quadratic,
                 weight: -value - density - (PROPOSALS as f64).ln(),
             })
@@ -323,12 +338,7 @@ fn resampled(proposals: &[Proposal], count: f64, random: &mut ChaCha8Rng) -> Opt
                 ratios, quadratic, ..
             } = &proposals[chosen];
             let white = quadratic / chi.sample(random);
-            Components {
-                white,
-                correlated: white * ratios.correlated,
-                length: ratios.length,
-                shift: white * ratios.shift,
-            }
+            ratios.times(white)
         })
         .collect();
     Some(Allowed {
@@ -362,7 +372,7 @@ mod tests {
         let mut readings = DVector::zeros(32 * n);
         for trace in &traces {
             let rows = &mut readings.as_mut_slice()[trace.clone()];
-            law.components().draw(&x, &mut random, rows);
+            law.parts.draw(&x, &mut random, rows);
         }
         Contrasts::new(&places, &traces, &readings)
     }
@@ -378,7 +388,7 @@ mod tests {
             NoiseLaw::of(1.0, 0.0, 1.0, 0.1),
             NoiseLaw::of(1.0, 0.6, 10.0, 0.1),
         ] {
-            type Measure = fn(&Components) -> f64;
+            type Measure = fn(&Law) -> f64;
             let measures: [Measure; 3] = [
                 |l| l.white + l.correlated + l.shift,
                 |l| l.shift + l.white / 120.0 + l.correlated * 2.0 * l.length / 240.0,
@@ -386,19 +396,21 @@ mod tests {
             ];
             let mut held = [0; 3];
             for seed in 0..40 {
-                let laws = allowed(&contrasts(&law, seed), seed).unwrap().laws;
+                let laws = allowed(&contrasts(&law, seed), Drifts::Never, seed)
+                    .unwrap()
+                    .laws;
                 assert_eq!(laws.len(), LAWS);
                 for (count, measure) in held.iter_mut().zip(measures) {
                     let mut values: Vec<f64> = laws.iter().map(measure).collect();
                     values.sort_by(f64::total_cmp);
-                    let truth = measure(&law.components());
+                    let truth = measure(&law.parts);
                     let inside = truth > values[LAWS / 20] && truth < values[LAWS - LAWS / 20];
                     *count += usize::from(inside);
                 }
             }
             // A law without a component lies at the edge of what is possible, not in the middle:
             // the mean of a trace is then on the low side more often.
-            let least = if law.shift > 0.0 && law.correlated > 0.0 {
+            let least = if law.parts.shift > 0.0 && law.parts.correlated > 0.0 {
                 29
             } else {
                 24

@@ -1,10 +1,12 @@
 //! L⁻¹ and L⁻ᵀ of the noise of one trace, linear in its readings.
 //!
-//! V = A + s 1 1ᵀ with A white plus Ornstein–Uhlenbeck noise. A is Markov along the trace, so its
-//! inverse factor B is the innovations form of the Kalman filter; with u = B 1 and q = |u|²,
-//! V = B⁻¹ (I + s u uᵀ) B⁻ᵀ, and L⁻¹ = (I − c u uᵀ) B with c = (1 − 1/√(1 + s q))/q.
+//! V = A + s 1 1ᵀ + d ξ ξᵀ with A white plus Ornstein–Uhlenbeck noise, ξ the positions about the middle of the trace. A is
+//! Markov along the trace, so its
+//! inverse factor B is the innovations form of the Kalman filter; with w₁, w₂ orthogonal and
+//! w₁w₁ᵀ + w₂w₂ᵀ = B (s 1 1ᵀ + d ξ ξᵀ) Bᵀ, L⁻¹ = (I − Σ cₖ wₖ wₖᵀ) B with cₖ = (1 − 1/√(1 + qₖ))/qₖ, qₖ = |wₖ|².
 
-use nalgebra::DVector;
+use errsep_models::noise::about_middle;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::noise::law::NoiseLaw;
 
@@ -20,25 +22,22 @@ pub(crate) struct Whitening {
     gain: Vec<f64>,
     /// Innovations in units of their standard deviation.
     scale: Vec<f64>,
-    /// u = B 1.
-    unit: DVector<f64>,
-    /// c.
-    pull: f64,
+    /// wₖ and cₖ.
+    of_whole: Vec<(DVector<f64>, f64)>,
     correlated: bool,
 }
 
 impl Whitening {
     pub fn new(law: &NoiseLaw, positions: &[f64]) -> Self {
-        let whole = law.white + law.correlated + law.shift;
-        let floor = (BREATH * whole).max(f64::MIN_POSITIVE);
+        let law = &law.parts;
+        let floor = (BREATH * law.variance()).max(f64::MIN_POSITIVE);
         let white = law.white.max(floor);
         let n = positions.len();
         let mut made = Self {
             decay: vec![0.0; n],
             gain: vec![0.0; n],
             scale: vec![0.0; n],
-            unit: DVector::from_element(n, 1.0),
-            pull: 0.0,
+            of_whole: Vec::new(),
             correlated: law.correlated > 0.0,
         };
         let mut variance = law.correlated;
@@ -53,13 +52,22 @@ impl Whitening {
             made.gain[k] = variance / total;
             variance *= white / total;
         }
-        let mut unit = std::mem::replace(&mut made.unit, DVector::zeros(0));
-        made.filter(unit.as_mut_slice());
-        let q = unit.norm_squared();
-        if q > 0.0 {
-            made.pull = (1.0 - 1.0 / (1.0 + law.shift * q).sqrt()) / q;
+        let shift = vec![law.shift.sqrt(); n];
+        let places = about_middle(positions).into_iter();
+        let drift = places.map(|place| law.drift.sqrt() * place).collect();
+        let mut filtered: Vec<DVector<f64>> = Vec::new();
+        for (size, mut of_whole) in [(law.shift, shift), (law.drift, drift)] {
+            if size > 0.0 && n > 0 {
+                made.filter(&mut of_whole);
+                filtered.push(DVector::from_vec(of_whole));
+            }
         }
-        made.unit = unit;
+        made.of_whole = orthogonal(filtered)
+            .into_iter()
+            .map(|w| (w.norm_squared(), w))
+            .filter(|(q, _)| *q > 0.0)
+            .map(|(q, w)| (w, (1.0 - 1.0 / (1.0 + q).sqrt()) / q))
+            .collect();
         made
     }
 
@@ -100,19 +108,30 @@ impl Whitening {
     }
 
     fn pull_back(&self, y: &mut [f64]) {
-        if self.pull > 0.0 {
-            let along: f64 = self.unit.iter().zip(y.iter()).map(|(u, y)| u * y).sum();
-            for (y, u) in y.iter_mut().zip(self.unit.iter()) {
-                *y -= self.pull * along * u;
+        for (w, pull) in &self.of_whole {
+            let along: f64 = w.iter().zip(y.iter()).map(|(w, y)| w * y).sum();
+            for (y, w) in y.iter_mut().zip(w.iter()) {
+                *y -= pull * along * w;
             }
         }
     }
 }
 
+/// Orthogonal vectors of the same sum of products w wᵀ as at most two.
+fn orthogonal(vectors: Vec<DVector<f64>>) -> Vec<DVector<f64>> {
+    if vectors.len() < 2 {
+        return vectors;
+    }
+    let together = DMatrix::from_columns(&vectors);
+    let axes = SymmetricEigen::new(together.tr_mul(&together)).eigenvectors;
+    let turned = together * axes;
+    turned.column_iter().map(|w| w.clone_owned()).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::DMatrix;
+    use errsep_models::noise::Law;
     use proptest::prelude::*;
 
     proptest! {
@@ -120,13 +139,13 @@ mod tests {
         #[test]
         fn the_covariance_becomes_the_identity(
             white in 0.1f64..2.0, correlated in 0.0f64..3.0, length in 0.5f64..50.0,
-            shift in 0.0f64..3.0, steps in prop::collection::vec(0.01f64..5.0, 1..20),
+            shift in 0.0f64..3.0, drift in 0.0f64..1.0, steps in prop::collection::vec(0.01f64..5.0, 1..20),
         ) {
             let mut x = vec![0.0];
             for step in steps {
                 x.push(x[x.len() - 1] + step);
             }
-            let law = NoiseLaw::of(white, correlated, length, shift);
+            let law = NoiseLaw::stated(Law { white, correlated, length, shift, drift });
             let whitening = Whitening::new(&law, &x);
             let n = x.len();
             let mut inverse = DMatrix::identity(n, n);

@@ -18,7 +18,7 @@ use crate::attribution::shrink::GapMeter;
 use crate::attribution::sizes::{Sizes, Unknown, first_amplitude};
 use crate::detection::space::Space;
 use crate::joined::{NotJoined, in_the_fit};
-use crate::noise::law::{NoiseLaw, NoiseSource};
+use crate::noise::law::{NoiseLaw, NoiseSource, draw_all};
 use crate::options::Options;
 use crate::sealing::ahead::{derivatives, held, placed, reported};
 use crate::sealing::carried::{Anew, Carried};
@@ -168,7 +168,7 @@ fn forecast(
     );
     Ok(Sealed {
         unit: model.reading_unit().to_owned(),
-        noise: context.law.components(),
+        noise: context.law.parts,
         gap: spread.gap,
         effect: there.told((context, causes, &known), &ahead, &expected)?,
         quantity: spread.quantities,
@@ -368,8 +368,8 @@ fn drawn(
     let mut missed = DMatrix::zeros(ahead.space.readings(), BATCH);
     for j in 0..BATCH {
         let law = context.law.possible(batch * BATCH + j, random);
-        noise.set_column(j, &law.draw_all(context.model, random));
-        missed.set_column(j, &law.draw_all(ahead.model, random));
+        noise.set_column(j, &draw_all(&law, context.model, random));
+        missed.set_column(j, &draw_all(&law, ahead.model, random));
     }
     let mut errors = &known.gain * context.space.forward(noise.clone()).0;
     errors += &known.rest

@@ -1,10 +1,9 @@
 //! What is sealed, as plain values.
 
 use errsep_models::model::{AnyModel, FittedModel};
+use errsep_models::noise::Law;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
-
-use crate::noise::law::Components;
 
 /// Standard deviations to either end of a 95 % interval.
 pub(super) const REACH: f64 = 1.959_964;
@@ -16,7 +15,7 @@ pub struct Sealed {
     /// Unit of the readings.
     pub unit: String,
     /// The noise of a reading; variances in the square of the unit.
-    pub noise: Components,
+    pub noise: Law,
     /// What the model misses there, without and with the causes.
     pub gap: SealedGap,
     /// The named causes.

@@ -216,7 +216,9 @@ pub(crate) fn severities(
         left,
         several: answer.causes.len() > 1,
         dependent_noise: dependence.is_seen(),
-        jump: clean.is_some_and(|clean| jumps_instead(context.model, readings, &clean)),
+        jump: clean.is_some_and(|clean| {
+            jumps_instead(context.model, readings, &clean, context.law.drifts)
+        }),
     };
     Name::all(context, readings, answer, options.false_alarm)
         .iter()

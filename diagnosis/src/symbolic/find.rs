@@ -186,7 +186,7 @@ fn best_in_white(
     readings: &DVector<f64>,
     options: &Options,
 ) -> Option<Fitted> {
-    let sigma = law.components().white.sqrt();
+    let sigma = law.parts.white.sqrt();
     let white = NoiseLaw::white(sigma, law.freedom, law.source);
     Bench::new(model, white, options)?.best(readings)
 }

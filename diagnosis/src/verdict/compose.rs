@@ -24,7 +24,7 @@ use crate::verdict::hidden::hidden;
 use crate::verdict::places::places;
 use crate::verdict::shape::fingerprint;
 use crate::verdict::statement::{separating, statement};
-use crate::verdict::told::{for_people, no_noise, pulled_in};
+use crate::verdict::told::{drifting, for_people, no_noise, pulled_in};
 use crate::verdict::types::{Detail, Diagnosis, Kind, NoiseOut, Verdict};
 use errsep_models::number::plain;
 
@@ -243,6 +243,7 @@ fn notes(context: &Context<'_>, clean: &DVector<f64>, calm: &Calmed) -> Vec<Stri
             plain(tails.freedom, 2)
         ));
     }
+    notes.extend(drifting(context.model, &context.law));
     notes.extend(disagreement(context, clean));
     if context.law.source == NoiseSource::Neighbours {
         notes.push(

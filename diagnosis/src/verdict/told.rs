@@ -1,11 +1,14 @@
 //! Numbers and units as people read them: the same in the sentence, the text and the page.
 
+use std::ops::Range;
+
 use errsep_models::model::{AnyModel, FittedModel};
 
 use crate::attribution::reported::ParameterOut;
 use crate::attribution::shrink::Size;
 use crate::levels::DEPENDENT;
 use crate::noise::dependence::Dependence;
+use crate::noise::law::{Drifts, NoiseLaw};
 use crate::verdict::types::Gap;
 use errsep_models::number::{measured, percent, plain};
 
@@ -200,4 +203,25 @@ pub fn scaled(unit: &str) -> (f64, &str) {
         "rad/mm" => (1e6, "µrad/mm"),
         unit => (1.0, for_people(unit)),
     }
+}
+
+/// That whole traces drift, where the law of the noise has it so.
+pub(crate) fn drifting(model: &AnyModel, law: &NoiseLaw) -> Option<String> {
+    if law.drifts == Drifts::Never || law.parts.drift <= 0.0 {
+        return None;
+    }
+    let travel = |trace: &Range<usize>| {
+        let places = model.places()[trace.clone()].iter();
+        let ends = places.fold(
+            (f64::INFINITY, f64::NEG_INFINITY),
+            |(least, most), place| (least.min(place.x), most.max(place.x)),
+        );
+        ends.1 - ends.0
+    };
+    let longest = model.traces().iter().map(travel).fold(0.0, f64::max);
+    Some(format!(
+        "Every trace drifts by a slope of its own, {} {} from end to end (standard deviation): that explains the repeats better than any cause that goes on from trace to trace, and counts as noise. An indicator that has come to rest before a pass begins does not drift.",
+        plain(law.parts.drift.sqrt() * longest, 2),
+        for_people(model.reading_unit())
+    ))
 }

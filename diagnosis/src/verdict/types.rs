@@ -292,6 +292,9 @@ pub struct NoiseOut {
     pub length: f64,
     /// Of the shift of a whole trace.
     pub shift: f64,
+    /// Of the slope by which a whole trace drifts, in the unit of the readings over that of the positions; zero unless
+    /// that explains the repeats better than causes do.
+    pub drift: f64,
     /// `repeats`, `stated` or `neighbours`.
     pub source: &'static str,
     /// How well it is known, and with it every standard uncertainty of the diagnosis; none where it
@@ -357,10 +360,11 @@ impl NoiseOut {
     pub(crate) fn of(model: &AnyModel, law: &NoiseLaw, dependence: &Dependence) -> Self {
         use crate::noise::law::NoiseSource;
         Self {
-            white: law.white.sqrt(),
-            correlated: law.correlated.sqrt(),
-            length: law.length,
-            shift: law.shift.sqrt(),
+            white: law.parts.white.sqrt(),
+            correlated: law.parts.correlated.sqrt(),
+            length: law.parts.length,
+            shift: law.parts.shift.sqrt(),
+            drift: law.parts.drift.sqrt(),
             source: match law.source {
                 NoiseSource::Repeats => "repeats",
                 NoiseSource::Stated => "stated",

@@ -1,8 +1,7 @@
 //! Differences between repeats of a trace, and how likely a law of noise makes them.
 
-use super::law::{about_middle, decays};
-use super::posterior::{NoiseValues, OfWhole};
-use nalgebra::{Matrix2, Vector2};
+use super::likelihood::{Likelihood, Likelihoods, OfWhole};
+use super::posterior::NoiseValues;
 
 /// A trace of this many readings can show what is correlated along it.
 const LONG: usize = 20;
@@ -21,25 +20,6 @@ struct Group {
     /// In the unit of the values: a shift or a drift of one.
     one: f64,
     rows: Vec<Vec<f64>>,
-}
-
-/// What a law says of the contrasts, its scale left open.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Likelihood {
-    /// −ln L at the best scale; up to a constant also with the scale integrated out (1/scale).
-    pub minus_log: f64,
-    /// Quadratic form under the law of scale one; over [`Contrasts::count`] it is the best scale.
-    pub quadratic: f64,
-}
-
-/// The filter at one reading: the same for all contrasts on the same positions.
-struct Step {
-    decay: f64,
-    gain: f64,
-    /// Innovations of a trace of ones and of one that drifts over their variance.
-    slow: [f64; 2],
-    /// 1/variance of the innovation.
-    weight: f64,
 }
 
 impl Contrasts {
@@ -103,13 +83,6 @@ impl NoiseValues for Contrasts {
         true
     }
 
-    /// The correlated part is Markov, so one pass of the Kalman filter gives determinant and quadratic
-    /// form; shift and drift are an update of rank two: with U the traces of ones and of a drift, D their variances and
-    /// G = UᵀV⁻¹U
-    ///
-    /// ```text
-    ///     r'(V + UDUᵀ)⁻¹r = r'V⁻¹r − vᵀ(I + DG)⁻¹Dv,   v = UᵀV⁻¹r,      |V + UDUᵀ| = |V| |I + DG|
-    /// ```
     fn likelihoods(
         &self,
         white: f64,
@@ -117,75 +90,23 @@ impl NoiseValues for Contrasts {
         length: f64,
         whole: &[OfWhole],
     ) -> Vec<Likelihood> {
-        let mut quadratics = vec![0.0; whole.len()];
-        let mut log_determinants = vec![0.0; whole.len()];
-        let mut steps: Vec<Step> = Vec::new();
+        let mut sums = Likelihoods::new(whole);
         for group in &self.groups {
-            steps.clear();
-            let places = about_middle(&group.positions);
-            let (mut slow, mut variance) = ([0.0; 2], correlated);
-            let (mut gram, mut log_totals) = (Matrix2::zeros(), 0.0);
-            for (k, decay) in decays(&group.positions, length).into_iter().enumerate() {
-                if k > 0 {
-                    slow = slow.map(|s| s * decay);
-                    variance = decay * decay * variance + correlated * (1.0 - decay * decay);
-                }
-                let total = variance + white;
-                let ones = [group.one, group.one * places[k]];
-                let innovation = Vector2::new(ones[0] - slow[0], ones[1] - slow[1]);
-                gram += innovation * innovation.transpose() / total;
-                log_totals += total.ln();
-                let gain = variance / total;
-                slow = [0, 1].map(|l| slow[l] + gain * innovation[l]);
-                variance *= 1.0 - gain;
-                steps.push(Step {
-                    decay,
-                    gain,
-                    slow: [innovation[0] / total, innovation[1] / total],
-                    weight: 1.0 / total,
-                });
-            }
-            // Over all rows: r'V⁻¹r and vvᵀ.
-            let (mut own, mut together) = (0.0, Matrix2::zeros());
-            for row in &group.rows {
-                let (mut state, mut along) = (0.0, Vector2::zeros());
-                for (step, value) in steps.iter().zip(row) {
-                    state *= step.decay;
-                    let innovation = value - state;
-                    own += innovation * innovation * step.weight;
-                    along += Vector2::from(step.slow) * innovation;
-                    state += step.gain * innovation;
-                }
-                together += along * along.transpose();
-            }
-            let rows = group.rows.len() as f64;
-            for (k, of) in whole.iter().enumerate() {
-                let sizes = Matrix2::from_diagonal(&Vector2::new(of.shift, of.drift));
-                let grown = Matrix2::identity() + sizes * gram;
-                let taken = grown
-                    .try_inverse()
-                    .map_or_else(Matrix2::zeros, |i| i * sizes);
-                quadratics[k] += own - (taken * together).trace();
-                log_determinants[k] += rows * (log_totals + grown.determinant().ln());
-            }
+            let rows = group.rows.iter().map(Vec::as_slice);
+            sums.add(
+                &group.positions,
+                group.one,
+                rows,
+                (white, correlated, length),
+            );
         }
-        let count = self.count() as f64;
-        quadratics
-            .into_iter()
-            .zip(log_determinants)
-            .map(|(quadratic, log_determinant)| {
-                let quadratic = quadratic.max(f64::MIN_POSITIVE);
-                Likelihood {
-                    minus_log: 0.5 * (count * (quadratic / count).ln() + log_determinant),
-                    quadratic,
-                }
-            })
-            .collect()
+        sums.found()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::law::about_middle;
     use super::*;
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;

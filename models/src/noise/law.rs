@@ -2,9 +2,11 @@
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
 
 /// Variances of the parts of the noise of one reading, in the square of the reading's unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Law {
     /// Of the white part.
     pub white: f64,
@@ -15,6 +17,7 @@ pub struct Law {
     /// Of the shift of a whole trace.
     pub shift: f64,
     /// Of the slope by which a whole trace drifts about its middle, in the square of the unit over that of the positions.
+    #[serde(default)]
     pub drift: f64,
 }
 
@@ -65,21 +68,38 @@ impl Law {
     /// Draws the noise of one trace, readings in the order in which they were taken.
     pub fn draw(&self, positions: &[f64], random: &mut impl Rng, noise: &mut [f64]) {
         let mut normal = || -> f64 { StandardNormal.sample(random) };
-        let (white, markov) = (self.white.sqrt(), self.correlated.sqrt());
-        let shift = self.shift.sqrt() * normal();
-        let slope = if self.drift > 0.0 {
-            self.drift.sqrt() * normal()
+        let white = self.white.sqrt();
+        let shift = if self.shift > 0.0 {
+            self.shift.sqrt() * normal()
         } else {
             0.0
         };
-        let places = about_middle(positions);
-        let mut state = markov * normal();
-        let decays = decays(positions, self.length);
-        for (k, (value, decay)) in noise.iter_mut().zip(&decays).enumerate() {
-            if k > 0 {
-                state = decay * state + markov * (1.0 - decay * decay).sqrt() * normal();
+        if self.drift > 0.0 {
+            let slope = self.drift.sqrt() * normal();
+            for (value, place) in noise.iter_mut().zip(about_middle(positions)) {
+                *value = shift + slope * place;
             }
-            *value = shift + slope * places[k] + state + white * normal();
+        } else {
+            noise.fill(shift);
+        }
+        if self.correlated <= 0.0 {
+            noise.iter_mut().for_each(|v| *v += white * normal());
+            return;
+        }
+        let mut state = self.correlated.sqrt() * normal();
+        // Of the last spacing, as most are equal.
+        let (mut known, mut decay, mut fresh) = (f64::NAN, 0.0, 0.0);
+        for (k, value) in noise.iter_mut().enumerate() {
+            if k > 0 {
+                let spacing = (positions[k] - positions[k - 1]).abs();
+                if spacing != known {
+                    known = spacing;
+                    decay = (-spacing / self.length).exp();
+                    fresh = (self.correlated * (1.0 - decay * decay)).sqrt();
+                }
+                state = decay * state + fresh * normal();
+            }
+            *value += state + white * normal();
         }
     }
 

@@ -8,8 +8,10 @@
 
 mod contrasts;
 mod law;
+mod likelihood;
 mod posterior;
 
-pub use contrasts::{Contrasts, Likelihood};
+pub use contrasts::Contrasts;
 pub use law::{Law, about_middle, decays, drift_form, markov_form};
-pub use posterior::{NoiseValues, OfWhole, Possible, Posterior};
+pub use likelihood::{Likelihood, Likelihoods, OfWhole};
+pub use posterior::{NoiseValues, Possible, Posterior};

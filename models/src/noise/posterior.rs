@@ -6,8 +6,8 @@
 //! travel) of the whole and the logarithm of the correlation length are uniform, and that of the scale everywhere. The
 //! scale is integrated in closed form; the others on a grid that closes in on where the probability lies.
 
-use super::contrasts::Likelihood;
 use super::law::Law;
+use super::likelihood::{Likelihood, OfWhole};
 
 /// Fewest values in contrasts from which a law can be told.
 const FEWEST: usize = 8;
@@ -49,15 +49,6 @@ pub struct Posterior {
 
 /// A side of the grid: from, to.
 type Side = (f64, f64);
-
-/// Variances of what a whole trace does.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct OfWhole {
-    /// Of its shift.
-    pub shift: f64,
-    /// Of the slope of its drift.
-    pub drift: f64,
-}
 
 /// Values that hold noise and nothing else, and how likely a law makes them.
 pub trait NoiseValues {

@@ -5,7 +5,11 @@
 //! round (`attribution/sizes.rs`, `attribution/bias.rs`). The noise is what the repeats leave without
 //! the effects.
 
-use errsep_models::model::{AnyModel, Effect, FittedModel, Shape};
+mod fitting;
+
+pub(crate) use fitting::in_the_fit;
+
+use errsep_models::model::{AnyModel, Effect, FittedModel};
 use nalgebra::DVector;
 use serde::Serialize;
 use thiserror::Error;
@@ -14,21 +18,14 @@ use crate::attribution::allowed::{Allowed, allowed_fits, answers_widened, widene
 use crate::attribution::bias::biases;
 use crate::attribution::candidates::elsewhere;
 use crate::attribution::context::{Cause, Context, raw_signatures, span};
-use crate::attribution::examined::afresh;
 use crate::attribution::reported::{Bias, Elsewhere, ParameterOut};
 use crate::attribution::shrink::{GapMeter, HeldOut, Size, shrink};
 use crate::attribution::sizes::{Sizes, first_amplitude};
-use crate::detection::estimate::estimate;
-use crate::levels::{INVISIBLE, POLISHED, SEPARABLE, WEAK};
+use crate::levels::{SEPARABLE, WEAK};
 use crate::noise::dependence::Dependence;
-use crate::noise::spikes::calmed;
 use crate::options::Options;
-use crate::search::Reach;
-use crate::verdict::told::{no_noise, of_what, pulled_in};
+use crate::verdict::told::{no_noise, of_what};
 use crate::verdict::types::NoiseOut;
-
-/// Fits of noise and state without the effects: the second begins with sizes that are nearly right.
-const PASSES: usize = 2;
 
 /// Why effects cannot join the fit.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -167,112 +164,6 @@ pub(super) fn joined(
         options,
         |context, readings, causes, notes| told(context, readings, causes, notes, options),
     )?
-}
-
-/// What is made of a fit that effects have joined: its workbench, the readings seen from there, the effects in
-/// the order in which they are named, and what should be known beside.
-pub(crate) fn in_the_fit<R>(
-    model: &AnyModel,
-    catalogue: Vec<Box<dyn Effect<AnyModel>>>,
-    names: &[String],
-    options: &Options,
-    then: impl FnOnce(&Context<'_>, &DVector<f64>, &[Cause], Vec<String>) -> R,
-) -> Result<R, NotJoined> {
-    let chosen = chosen(catalogue, names)?;
-    let (calmed, calm) = calmed(model);
-    let model = calmed.as_ref().unwrap_or(model);
-    let readings = model.linearised();
-    let law = estimate(model, &readings).with_tails(calm.tails);
-    let context = Context::new(model, &chosen, law, options.draws, options.seed);
-    shown(&context)?;
-    let mut causes = fitted(&context, &readings);
-    let changes = context.changes(&readings, &causes);
-    let mut seen = afresh(&context, &causes, changes.as_ref());
-    for _ in 1..PASSES {
-        let (state, law, readings) = seen;
-        let moved = context.moved(&state, law);
-        causes = fitted(&moved, &readings);
-        let changes = moved.changes(&readings, &causes);
-        seen = afresh(&context, &causes, changes.as_ref());
-    }
-    let (state, law, readings) = seen;
-    let context = context.moved(&state, law);
-    let causes = fitted(&context, &readings);
-    let mut notes = Vec::new();
-    if calm.count > 0 {
-        notes.push(pulled_in(calm.count));
-    }
-    Ok(then(&context, &readings, &causes, notes))
-}
-
-/// The effects that are given, in their order.
-fn chosen(
-    catalogue: Vec<Box<dyn Effect<AnyModel>>>,
-    names: &[String],
-) -> Result<Vec<Box<dyn Effect<AnyModel>>>, NotJoined> {
-    let known: Vec<String> = catalogue.iter().map(|e| e.name().to_owned()).collect();
-    let mut left: Vec<Option<Box<dyn Effect<AnyModel>>>> =
-        catalogue.into_iter().map(Some).collect();
-    let mut chosen = Vec::new();
-    for name in names {
-        let Some(at) = known.iter().position(|own| own == name) else {
-            return Err(NotJoined::NoSuch {
-                name: name.clone(),
-                known,
-            });
-        };
-        let effect = left[at]
-            .take()
-            .ok_or_else(|| NotJoined::Twice(name.clone()))?;
-        if effect.absorbed() {
-            return Err(NotJoined::Absorbed(name.clone()));
-        }
-        chosen.push(effect);
-    }
-    Ok(chosen)
-}
-
-/// Refuses what no reading could show.
-fn shown(context: &Context<'_>) -> Result<(), NotJoined> {
-    for (k, effect) in context.catalogue.iter().enumerate() {
-        let name = || effect.name().to_owned();
-        let family = context
-            .family_of(k)
-            .ok_or_else(|| NotJoined::Nowhere(name()))?;
-        if context.dictionary.families[family].visible < INVISIBLE {
-            return Err(NotJoined::Absorbed(name()));
-        }
-    }
-    Ok(())
-}
-
-/// Every effect at its best shape beside the others, with the state that is left without them.
-fn fitted(context: &Context<'_>, readings: &DVector<f64>) -> Vec<Cause> {
-    let mut causes: Vec<Cause> = Vec::new();
-    for effect in 0..context.catalogue.len() {
-        let remainder = context.remainder(readings, &causes);
-        let first = || {
-            context.catalogue[effect]
-                .grid(context.model)
-                .into_iter()
-                .next()
-        };
-        let start = context.start(&remainder, effect).cloned().or_else(first);
-        let start = start.unwrap_or_else(Shape::only);
-        let beside = context.beside(context.model, readings, &causes);
-        let (cause, _) = beside.come_back(beside.refine(effect, (&start, Reach::WIDE)));
-        causes.push(cause);
-    }
-    for _ in 0..if causes.len() > 1 { POLISHED } else { 0 } {
-        for k in 0..causes.len() {
-            let mut others = causes.clone();
-            let own = others.remove(k);
-            let start = (&own.shape, Reach::NEAR);
-            let beside = context.beside(context.model, readings, &others);
-            causes[k] = beside.refine(own.effect, start).0;
-        }
-    }
-    context.relinearised(readings, &causes, f64::INFINITY)
 }
 
 fn told(

@@ -1,0 +1,90 @@
+//! Traces that drift, each by a slope of its own.
+
+use crate::scene::{diagnosed, scene};
+use errsep::diagnosis::Kind;
+use errsep_models::reversal::exact_readings::Injection;
+use errsep_models::reversal::{Channel, Direction, Observations};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// A trace drifts by up to so much from end to end, either way, µm.
+const DRIFT: f64 = 0.8;
+/// An indicator is set to zero within this before each pass, µm.
+const ZERO: f64 = 3.0;
+
+/// The readings with a line added to every trace, from its first reading on.
+fn drifting(mut observations: Observations, travel: f64, seed: u64) -> Observations {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut lines = std::collections::HashMap::new();
+    for reading in &mut observations.readings {
+        let back = reading.direction == Direction::Backward;
+        let key = (reading.channel, reading.repeat, back);
+        let (zero, drift) = *lines.entry(key).or_insert_with(|| {
+            (
+                random.random_range(-ZERO..ZERO),
+                random.random_range(-DRIFT..DRIFT),
+            )
+        });
+        let gone = if back {
+            1.0 - reading.x / travel
+        } else {
+            reading.x / travel
+        };
+        reading.value += zero + drift * gone;
+    }
+    observations
+}
+
+/// *Simulated truth*: where nothing else is in the readings nothing is named, and the drifts are told. A slope is uniform
+/// within ± 0.8 µm a travel: its standard deviation is 0.46, which the eight contrasts of two repeats each know to a quarter;
+/// four of them.
+#[test]
+fn drifts_of_traces_are_no_cause() {
+    let truth = scene(31, 3e-5);
+    let travel = truth.travel();
+    for seed in 0..6 {
+        let readings = drifting(truth.measured(seed), travel, seed);
+        let verdict = diagnosed(&readings, &[]);
+        assert_eq!(
+            verdict.verdict.kind,
+            Kind::None,
+            "{seed}: {}",
+            verdict.verdict.statement
+        );
+        let told = verdict
+            .notes
+            .iter()
+            .any(|note| note.contains("drifts by a slope"));
+        if told {
+            let drift = verdict.noise.drift * travel;
+            assert!(drift > 0.1 && drift < 1.0, "{seed}: {drift}");
+        }
+    }
+}
+
+/// *Simulated truth*: what does not go on in time is named beside them; what does is, where traces do not drift.
+#[test]
+fn causes_are_named_beside_drifts() {
+    let mut truth = scene(32, 3e-5);
+    let travel = truth.travel();
+    let dirt = Injection::LocalContamination {
+        height: 1.0,
+        channel: Channel::C1B,
+        repeat: Some(2),
+        position: 0.4 * travel,
+        width: 0.03 * travel,
+    };
+    for (name, injection) in [
+        ("local-contamination", dirt),
+        ("taper", Injection::Taper(2e-6)),
+    ] {
+        truth.effects = vec![injection];
+        let verdict = diagnosed(&drifting(truth.measured(3), travel, 4), &[]);
+        assert_eq!(
+            verdict.verdict.effects,
+            [name],
+            "{}",
+            verdict.verdict.statement
+        );
+    }
+}

@@ -10,6 +10,7 @@ pub mod diagnosable;
 pub mod effects;
 mod exact_form;
 pub mod exact_readings;
+mod falling;
 mod finer_forms;
 pub mod forward;
 pub mod injected;

@@ -96,6 +96,12 @@ impl<'a> Ground<'a> {
         self.traces.iter().map(Trace::positions).max().unwrap_or(0)
     }
 
+    /// The positions of the channel that has most different ones, in ascending order, mm.
+    pub fn most_read(&self) -> &[f64] {
+        let most = self.traces.iter().max_by_key(|t| t.positions());
+        most.map_or(&[], |t| &t.x)
+    }
+
     /// Most cells that the readings carry: a spline of K cells with its slope and constant has K + 3
     /// unknowns and needs as many positions, and all unknowns need as many readings.
     pub fn most_cells(&self) -> usize {

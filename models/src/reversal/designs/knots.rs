@@ -3,7 +3,8 @@
 //! At the slopes of the channels' lines the cost of the linear fit is that of one linear problem; the least
 //! corrected Akaike criterion of all unknowns decides
 //! ([`knots`](crate::reversal::simultaneous::knots)). First all forms go up the ladder together, then each
-//! form by itself up and down from there while that lowers the criterion, in turn until none moves.
+//! form by itself up and down from there while that lowers the criterion, in turn until none moves. With few positions a
+//! rung that leaves more than the finest does is refuted, as there, and all forms take the fewest cells that are not.
 
 use std::collections::HashMap;
 
@@ -21,7 +22,7 @@ use crate::basis::bspline::CubicBSpline;
 use crate::reversal::finer_forms::{Curves, FinerForms, TIMES};
 use crate::reversal::simultaneous::Knots;
 use crate::reversal::simultaneous::knots::{
-    FEWEST_POSITIONS, KnotTrial, PATIENCE, POSITIONS_A_CELL, ladder, trial,
+    FEWEST_POSITIONS, KnotTrial, PATIENCE, POSITIONS_A_CELL, ladder, sparse, trial,
 };
 
 /// The break points of a fit.
@@ -69,17 +70,23 @@ pub(super) fn breaks(ground: &Ground) -> Result<Chosen, DesignFitError> {
         },
         Knots::Chosen => {
             let mut rungs = Rungs::new(ground)?;
-            let (best, table) = rungs.together()?;
-            let common = rungs.breaks[best].clone();
-            let own = match ground.options.alike {
-                true => vec![best; ground.layout.forms.len()],
-                false => rungs.by_form(best)?,
+            let (best, mut table) = rungs.together()?;
+            let refuting = rungs.refuting(best, &mut table)?;
+            let forms = ground.layout.forms.len();
+            let own: Vec<Vec<f64>> = match &refuting {
+                Some(breaks) => vec![breaks.clone(); forms],
+                None if ground.options.alike => vec![rungs.breaks[best].clone(); forms],
+                None => {
+                    let own = rungs.by_form(best)?;
+                    own.iter().map(|r| rungs.breaks[*r].clone()).collect()
+                }
             };
+            let common = refuting.unwrap_or_else(|| rungs.breaks[best].clone());
             Ok(Chosen {
-                breaks: own.iter().map(|r| rungs.breaks[*r].clone()).collect(),
+                forms: rungs.finer(&own, common.len() - 1)?,
+                breaks: own,
                 common,
                 table,
-                forms: rungs.finer(&own, best)?,
             })
         }
     }
@@ -124,6 +131,8 @@ struct Rungs<'g, 'a> {
     breaks: Vec<Vec<f64>>,
     /// What was tried, by the rung of each form: the criterion, where the readings carry it.
     tried: HashMap<Vec<usize>, Option<f64>>,
+    /// The forms on the rungs of the ladder of all forms together.
+    ladder: Vec<Curves>,
 }
 
 impl<'g, 'a> Rungs<'g, 'a> {
@@ -139,6 +148,7 @@ impl<'g, 'a> Rungs<'g, 'a> {
             ground,
             breaks,
             tried: HashMap::new(),
+            ladder: Vec::new(),
         })
     }
 
@@ -169,28 +179,78 @@ impl<'g, 'a> Rungs<'g, 'a> {
         }))
     }
 
-    /// The forms on these rungs and on finer breaks, no form's coarser than the rung that was best for all together;
+    /// The forms on their breaks and on finer ones, no form's coarser than the cells that are best for all together;
     /// `None` where the readings carry none.
-    fn finer(&self, rungs: &[usize], common: usize) -> Result<Option<FinerForms>, DesignFitError> {
-        let own: Vec<Vec<f64>> = rungs.iter().map(|r| self.breaks[*r].clone()).collect();
-        let most = self.ground.positions().saturating_sub(FEWEST_POSITIONS - 1);
+    fn finer(self, own: &[Vec<f64>], common: usize) -> Result<Option<FinerForms>, DesignFitError> {
+        let most = self.most_by_positions();
         let finer = own.iter().map(|b| {
-            let cells = (TIMES * (b.len() - 1)).max(self.breaks[common].len() - 1);
-            let cells = cells.min(most).max(1);
-            even(self.ground, cells)
+            let cells = (TIMES * (b.len() - 1)).max(common);
+            even(self.ground, cells.min(most).max(1))
         });
         let finer: Vec<Vec<f64>> = finer.collect::<Result<_, _>>()?;
-        if own
-            .iter()
-            .zip(&finer)
-            .any(|(own, finer)| finer.len() <= own.len())
-        {
+        let mut both = own.iter().zip(&finer);
+        if both.any(|(own, finer)| finer.len() <= own.len()) {
             return Ok(None);
         }
-        let taken = self.fitted(own)?.map(|own| own.1);
+        let taken = self.fitted(own.to_vec())?.map(|own| own.1);
         let finer = self.fitted(finer)?.map(|own| own.1);
-        let both = taken.zip(finer);
-        Ok(both.map(|(taken, finer)| FinerForms { taken, finer }))
+        let x = self.ground.most_read();
+        Ok(taken
+            .zip(finer)
+            .map(|(taken, finer)| FinerForms::new(taken, finer, self.ladder, x)))
+    }
+
+    /// Cells that a spline with its slope and constant has at most on the positions.
+    fn most_by_positions(&self) -> usize {
+        self.ground.positions().saturating_sub(FEWEST_POSITIONS - 1)
+    }
+
+    /// The fewest cells, of all forms alike, that leave no more than the finest but for noise, where positions are few and
+    /// the best of the ladder leaves more.
+    fn refuting(
+        &self,
+        best: usize,
+        table: &mut Vec<KnotTrial>,
+    ) -> Result<Option<Vec<f64>>, DesignFitError> {
+        let Some(taken) = table.get(best).copied() else {
+            return Ok(None);
+        };
+        if !sparse::are_few(self.ground.positions()) {
+            return Ok(None);
+        }
+        let forms = self.ground.layout.forms.len();
+        let readings = self.ground.readings();
+        let on = |cells: usize| -> Result<_, DesignFitError> {
+            let breaks = even(self.ground, cells)?;
+            let fitted = self.fitted(vec![breaks.clone(); forms])?;
+            Ok(fitted.map(|own| (breaks, own.0)))
+        };
+        let mut finest = None;
+        for cells in (taken.cells + 1..=self.most_by_positions()).rev() {
+            finest = on(cells)?;
+            if finest.is_some() {
+                break;
+            }
+        }
+        let Some((_, finest)) = finest else {
+            return Ok(None);
+        };
+        if !sparse::leaves_more(&taken, &finest, readings) {
+            return Ok(None);
+        }
+        table.truncate(best + 1);
+        for cells in taken.cells + 1..=finest.cells {
+            let Some((breaks, own)) = on(cells)? else {
+                break;
+            };
+            if table.last().is_some_and(|before| before.cells < own.cells) {
+                table.push(own);
+                if !sparse::leaves_more(&own, &finest, readings) {
+                    return Ok(Some(breaks));
+                }
+            }
+        }
+        Ok(None)
     }
 
     /// Goes up the ladder with all forms together: the best rung, and the table.
@@ -199,11 +259,14 @@ impl<'g, 'a> Rungs<'g, 'a> {
         let forms = self.ground.layout.forms.len();
         for rung in 0..self.breaks.len() {
             let all = vec![rung; forms];
-            let own = self.trial(&all)?;
-            self.tried.insert(all, own.map(|t| t.aicc));
-            let Some(own) = own else {
+            let breaks = vec![self.breaks[rung].clone(); forms];
+            let fitted = self.fitted(breaks)?;
+            self.tried
+                .insert(all, fitted.as_ref().map(|own| own.0.aicc));
+            let Some((own, curves)) = fitted else {
                 break;
             };
+            self.ladder.push(curves);
             table.push(own);
             if own.aicc < table[best].aicc {
                 best = rung;

@@ -7,7 +7,7 @@
 //! noise; there what the finest rung leaves is the measure (`sparse.rs`).
 
 mod climbed;
-mod sparse;
+pub mod sparse;
 
 use errsep_solvers::linear::bordered::{Bordered, Solved};
 use errsep_solvers::problem::NoValue;
@@ -50,8 +50,17 @@ pub fn ladder(most: usize) -> impl Iterator<Item = usize> {
 
 /// Number of different positions of the channel that has most.
 pub fn positions(channels: &[ChannelReadings]) -> usize {
-    let of = |c: &ChannelReadings| c.x.chunk_by(|a, b| a == b).count();
-    channels.iter().map(of).max().unwrap_or(0)
+    different(most_read(channels))
+}
+
+/// The positions of the channel that has most different ones, in ascending order.
+fn most_read(channels: &[ChannelReadings]) -> &[f64] {
+    let all = channels.iter().map(|c| c.x.as_slice());
+    all.max_by_key(|x| different(x)).unwrap_or_default()
+}
+
+fn different(x: &[f64]) -> usize {
+    x.chunk_by(|a, b| a == b).count()
 }
 
 /// Most cells that readings carry: a spline of K cells with its slope and offset has K + 3 unknowns and
@@ -163,7 +172,7 @@ impl Choice<'_> {
                 (Squares { left, rounding }, RungFit { curves, linear })
             }))
         })?;
-        Ok(climbed.chosen())
+        Ok(climbed.chosen(most_read(self.channels)))
     }
 
     /// The ladder by normal equations; `None` where they do not tell.
@@ -190,7 +199,7 @@ impl Choice<'_> {
         if !(told && climbed.clear) {
             return Ok(None);
         }
-        Ok(Some(climbed.chosen()))
+        Ok(Some(climbed.chosen(most_read(self.channels))))
     }
 
     /// The readings gathered for normal equations; `None` with effects, which know single readings.
@@ -239,7 +248,7 @@ impl Choice<'_> {
                 break;
             }
         }
-        if most < sparse::CELLS {
+        if sparse::are_few(positions(self.channels)) {
             self.climb_to_the_finest(unknowns_of, &mut squares, &mut climbed)?;
         }
         self.look_finer(unknowns_of, squares, &mut climbed)?;

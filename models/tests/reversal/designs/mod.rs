@@ -1,5 +1,6 @@
 //! The reversal in any number of positions and planes.
 
+mod bands;
 mod crest;
 mod effects;
 mod fit;

@@ -6,9 +6,10 @@ use errsep_models::reversal::staged::{self, solve};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// What is measured: positions, repeats, and by how much each repeat is zeroed anew, µm.
+/// What is measured: positions, noise of a reading, repeats, and by how much each repeat is zeroed anew, µm.
 struct Case {
     positions: usize,
+    noise_um: f64,
     repeats: u32,
     zeros_um: f64,
 }
@@ -19,7 +20,7 @@ fn within(case: &Case, seeds: u64) -> [f64; 3] {
     let (mut inside, mut count, mut squares) = (0.0, 0.0, 0.0);
     for seed in 0..seeds {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut plan = Plan::even(0.0, 300.0, case.positions, 0.05);
+        let mut plan = Plan::even(0.0, 300.0, case.positions, case.noise_um);
         for form in [&mut plan.m, &mut plan.s_a, &mut plan.s_b] {
             *form = TrueForm::random_waves(&mut random, 1.0, 450.0, 12);
         }
@@ -50,16 +51,20 @@ fn within(case: &Case, seeds: u64) -> [f64; 3] {
 
 #[test]
 fn what_chosen_knots_cut_off_is_in_the_bands() {
-    for positions in [61, 31] {
+    for (positions, noise_um) in [(61, 0.05), (31, 0.05), (61, 1.0), (31, 0.3)] {
         let case = Case {
             positions,
+            noise_um,
             repeats: 1,
             zeros_um: 0.0,
         };
         let [share, count, _] = within(&case, 120);
         // k·u: neighbouring places share cells, so that half of them count; four standard deviations.
         let off = 4.0 * f64::sqrt(0.95 * 0.05 / (count / 2.0));
-        assert!(share > 0.95 - off, "{positions} positions: {share}");
+        assert!(
+            share > 0.95 - off,
+            "{positions} positions, {noise_um} µm: {share}"
+        );
     }
 }
 
@@ -67,6 +72,7 @@ fn what_chosen_knots_cut_off_is_in_the_bands() {
 fn a_zero_of_each_repeat_hides_no_detail() {
     let alike = |zeros_um| Case {
         positions: 61,
+        noise_um: 0.05,
         repeats: 4,
         zeros_um,
     };

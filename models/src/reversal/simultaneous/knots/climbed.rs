@@ -133,22 +133,28 @@ impl Climbed {
     }
 
     /// The best rung and what stands beside it.
-    pub(super) fn chosen(self) -> Chosen {
+    /// The choice; `x` are positions of a channel in ascending order, mm.
+    pub(super) fn chosen(self, x: &[f64]) -> Chosen {
         let cells = self.cells();
         let (mut taken, mut linear, mut finer) = (None, None, self.finer);
+        let mut ladder = Vec::new();
         for (place, (rung, fit)) in self.table.iter().zip(self.fits).enumerate() {
-            if place == self.best {
+            if place < self.best {
+                ladder.push(fit.curves);
+            } else if place == self.best {
                 (taken, linear) = (Some(fit.curves), fit.linear);
-            } else if finer.is_none() && taken.is_some() && rung.cells >= TIMES * cells {
+            } else if finer.is_none() && rung.cells >= TIMES * cells {
                 finer = Some(fit.curves);
             }
         }
-        let forms = taken.zip(finer);
+        let forms = taken
+            .zip(finer)
+            .map(|(taken, finer)| FinerForms::new(taken, finer, ladder, x));
         Chosen {
             cells,
             table: self.table,
             linear,
-            forms: forms.map(|(taken, finer)| FinerForms { taken, finer }),
+            forms,
         }
     }
 }

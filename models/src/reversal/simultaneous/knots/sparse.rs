@@ -16,10 +16,15 @@ use crate::reversal::simultaneous::ReversalError;
 use crate::reversal::simultaneous::unknowns::Unknowns;
 
 /// Where the ladder carries fewer cells the positions are few.
-pub(super) const CELLS: usize = 12;
+const CELLS: usize = 12;
 
 /// Probability under noise alone below which a rung leaves more than noise.
 const LEVEL: f64 = 0.01;
+
+/// Whether so many positions are few.
+pub fn are_few(positions: usize) -> bool {
+    positions / POSITIONS_A_CELL < CELLS
+}
 
 impl Choice<'_> {
     /// Takes in place of the best rung the one with the fewest cells that leaves no more than the finest does but for
@@ -70,7 +75,7 @@ impl Choice<'_> {
 }
 
 /// Whether a rung leaves more than the finest does and noise allows.
-fn leaves_more(rung: &KnotTrial, finest: &KnotTrial, readings: usize) -> bool {
+pub fn leaves_more(rung: &KnotTrial, finest: &KnotTrial, readings: usize) -> bool {
     let free = |t: &KnotTrial| (readings - t.unknowns) as f64;
     let left = |t: &KnotTrial| t.noise * t.noise * free(t);
     let more = free(rung) - free(finest);

@@ -8,6 +8,7 @@ pub mod diagonal;
 pub mod four_sensor;
 pub mod fourier;
 pub mod machine;
+pub mod missing;
 pub mod model;
 pub mod noise;
 pub mod number;

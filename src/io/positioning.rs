@@ -197,8 +197,11 @@ impl PositioningData {
             PositioningError::MissingDirection { .. } => {
                 "approach every target from both sides, or leave that direction out everywhere"
             }
-            PositioningError::UnequalRuns { .. } => {
-                "measure it, or leave this run out at all targets: the figures compare targets of as many runs"
+            PositioningError::OneReading { .. } => {
+                "measure the target again from this side, leave it out in all runs, or write nominal positions as targets"
+            }
+            PositioningError::Apart { .. } => {
+                "number the runs 1, 2, 3, … at every target, or give readings that are no runs of one test as files of their own"
             }
         });
         match error.reading().and_then(|r| self.lines.get(r)) {
@@ -225,10 +228,11 @@ const COLUMNS: [&str; 7] = [
 ];
 
 /// Reads the columns `target` and `position` (in `unit`, or degrees) or `deviation` (µm or seconds of
-/// arc), and where they apply `run`, `direction`, `time` (s) and `temperature` (°C).
+/// arc), and where they apply `run`, `direction`, `time` (s) and `temperature` (°C). A row of which the position or
+/// deviation is empty is a reading that is missing.
 ///
 /// # Errors
-/// The table cannot be read, has both `position` and `deviation` or neither, a direction of another
+/// The table cannot be read, has both `position` and `deviation` or neither, no reading at all, a direction of another
 /// name, or a number beyond any axis.
 pub fn read_readings(
     path: &Path,
@@ -245,7 +249,12 @@ pub fn read_readings(
         file: path.to_owned(),
         lines: Vec::new(),
     };
+    let mut empty = 0;
     while let Some(row) = table.next_row()? {
+        if row.is_empty(&columns.value) {
+            empty += 1;
+            continue;
+        }
         data.readings.push(columns.reading(row)?);
         data.lines.push(row.line());
         if let Some(column) = &columns.temperature {
@@ -253,6 +262,12 @@ pub fn read_readings(
             let (low, high) = data.temperature.unwrap_or((now, now));
             data.temperature = Some((low.min(now), high.max(now)));
         }
+    }
+    if data.readings.is_empty() && empty > 0 {
+        let what = format!("no reading in {empty} rows");
+        return Err(table
+            .at_column(&columns.value, what)
+            .remedy("fill in the readings; a field that is empty is a reading that is missing"));
     }
     if data.readings.is_empty() {
         return Err(table.no_rows());

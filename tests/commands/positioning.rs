@@ -328,6 +328,62 @@ fn every_key_is_documented() {
     crate::command::documented(&answer, "docs/json/positioning.md");
 }
 
+/// A row left out and a field left empty are the same: told by name, in the figures of the others.
+#[test]
+fn readings_may_be_missing() {
+    let folder = Folder::with(&[]);
+    simulated(&folder, "whole.csv", &["--seed", "3"]);
+    let (mut out, mut empty) = (String::new(), String::new());
+    for line in folder.read("whole.csv").lines() {
+        let mut fields: Vec<&str> = line.split(',').collect();
+        let missing = matches!(
+            fields[..3],
+            ["50", "2", "forward"] | ["500", "5", "backward"]
+        );
+        if !missing {
+            out += &format!("{line}\n");
+        } else {
+            fields[3] = "";
+        }
+        empty += &format!("{}\n", fields.join(","));
+    }
+    folder.write("out.csv", &out);
+    folder.write("empty.csv", &empty);
+    let [whole, out, empty] = ["whole.csv", "out.csv", "empty.csv"]
+        .map(|name| json(&folder, &["positioning", name, "--format", "json"]));
+    for key in ["iso230_2", "vdi3441", "points", "missing", "scatter"] {
+        assert_eq!(out[key], empty[key], "{key}");
+    }
+    let none: [Value; 0] = [];
+    assert_eq!(whole["missing"]["readings"], Value::from(none.to_vec()));
+    let missing = &out["missing"]["readings"];
+    assert_eq!(missing.as_array().unwrap().len(), 2);
+    assert_eq!(missing[0]["target"], 50.0);
+    assert_eq!(
+        (&missing[0]["direction"], &missing[0]["run"]),
+        (&"forward".into(), &2.into())
+    );
+    assert_eq!(out["points"][1]["readings_forward"], 4);
+    assert_eq!(out["points"][1]["readings_backward"], 5);
+    assert_eq!(out["scatter"]["degrees_of_freedom"], 86);
+    assert!(
+        value(&out, "iso230_2", "A") > 0.0 && out["iso230_2"]["A"]["U"].as_f64().unwrap() > 0.0
+    );
+    let text = run(&folder, &["positioning", "empty.csv"]).stdout;
+    for part in [
+        "forward and backward, 2 readings missing",
+        "2 readings are missing (run 2 at 50 mm forward, run 5 at 500 mm backward)",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    folder.write("none.csv", "target,run,position\n0,1,\n10,1,\n");
+    bad_input(
+        &folder,
+        &["positioning", "none.csv"],
+        &["no reading in 2 rows", "help: "],
+    );
+}
+
 #[test]
 fn bad_readings_are_refused() {
     const GOOD: &str = "\
@@ -347,7 +403,7 @@ target,run,direction,position
         (
             "10,2,backward,10.0031\n",
             "",
-            "data.csv:7:1: target 10 backward lacks run 2",
+            "data.csv:7:1: target 10 has one backward reading, of run 1, others have up to 2",
         ),
         (
             "10,2,backward,10.0031",
@@ -357,7 +413,7 @@ target,run,direction,position
         (
             "10,1,backward,10.003\n",
             "",
-            "data.csv:8:1: target 10 backward lacks run 1",
+            "data.csv:8:1: target 10 has one backward reading, of run 2, others have up to 2",
         ),
         (
             "10,1,forward",

@@ -3,7 +3,10 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal};
 
-use super::readings::Deviations;
+use super::drift::Drift;
+use super::readings::{Deviations, Targets, mean};
+use super::uncertainty::NoUncertainty;
+use crate::missing::{apart, heights};
 
 /// Scatter of one reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,19 +37,23 @@ impl Scatter {
             return None;
         }
         let left = residuals(deviations);
-        let freedom = (deviations.runs - 1) as f64;
-        let variances: Vec<f64> = left
+        let variances: Vec<(f64, f64)> = left
             .iter()
             .flatten()
-            .map(|row| row.iter().map(|v| v * v).sum::<f64>() / freedom)
+            .map(|row| {
+                let freedom = (row.iter().flatten().count() - 1) as f64;
+                let squares: f64 = row.iter().flatten().map(|v| v * v).sum();
+                (squares / freedom, freedom)
+            })
             .collect();
-        let count = variances.len();
-        let pooled = variances.iter().sum::<f64>() / count as f64;
+        let freedom: f64 = variances.iter().map(|(_, freedom)| freedom).sum();
+        let squares = variances.iter().map(|(v, freedom)| v * freedom);
+        let pooled = squares.sum::<f64>() / freedom;
         Some(Self {
             std: pooled.sqrt(),
-            degrees_of_freedom: count * (deviations.runs - 1),
+            degrees_of_freedom: freedom as usize,
             equal: bartlett(&variances, pooled, freedom),
-            independent: alike(&left, deviations.runs),
+            independent: alike(&left),
             level: level(&left, deviations.runs),
         })
     }
@@ -70,67 +77,114 @@ impl Scatter {
     }
 }
 
+/// Whether readings scatter alike and independently of each other.
+pub(super) struct Dependence {
+    /// Standard deviation of one reading; none with one run.
+    pub(super) std: Option<f64>,
+    /// Why figures that rest on scatter have no uncertainty.
+    pub(super) why: Option<NoUncertainty>,
+    /// Why what a drift shifts has none.
+    pub(super) shifted: Option<NoUncertainty>,
+}
+
+impl Dependence {
+    pub(super) fn of(scatter: Option<&Scatter>, drift: Option<&Drift>) -> Self {
+        let shows = drift.is_some_and(Drift::shows);
+        let may = drift.is_some_and(|d| d.may);
+        let why = scatter.and_then(|scatter| {
+            let why = [
+                (shows, NoUncertainty::Drifts),
+                (scatter.runs_differ() || may, NoUncertainty::RunsDiffer),
+                (scatter.depends(), NoUncertainty::ReadingsAlike),
+                (scatter.differs(), NoUncertainty::ScatterDiffers),
+            ];
+            why.into_iter().find(|(is, _)| *is).map(|(_, why)| why)
+        });
+        let shifted = match why {
+            Some(NoUncertainty::Drifts) => why,
+            Some(_) if may => Some(NoUncertainty::MayDrift),
+            _ => None,
+        };
+        Self {
+            std: scatter.map(|s| s.std),
+            why,
+            shifted,
+        }
+    }
+
+    /// Whether runs have something in common, so that they are what is independent and not the readings.
+    pub(super) fn by_run(&self) -> bool {
+        let alone = [None, Some(NoUncertainty::ScatterDiffers)];
+        !alone.contains(&self.why)
+    }
+}
+
 /// Readings less the mean of their target and direction, by direction.
-pub(super) fn residuals(deviations: &Deviations) -> Vec<Vec<Vec<f64>>> {
+pub(super) fn residuals(deviations: &Deviations) -> Vec<Targets> {
+    let row = |row: &Vec<Option<f64>>| {
+        let mean = mean(row);
+        row.iter().map(|v| Some((*v)? - mean)).collect()
+    };
     deviations
         .directions()
-        .map(|(_, rows)| {
-            rows.iter()
-                .map(|row| {
-                    let mean = row.iter().sum::<f64>() / row.len() as f64;
-                    row.iter().map(|v| v - mean).collect()
-                })
-                .collect()
-        })
+        .map(|(_, rows)| rows.iter().map(row).collect())
         .collect()
 }
 
-/// M. S. Bartlett's test of equal variances, all of the same degrees of freedom.
-fn bartlett(variances: &[f64], pooled: f64, freedom: f64) -> Option<f64> {
+/// M. S. Bartlett's test of equal variances, each with its degrees of freedom; `freedom` is their sum.
+fn bartlett(variances: &[(f64, f64)], pooled: f64, freedom: f64) -> Option<f64> {
     let count = variances.len() as f64;
-    if count < 2.0 || variances.iter().any(|v| !(*v > 0.0)) {
+    if count < 2.0 || variances.iter().any(|(v, _)| !(*v > 0.0)) {
         return None;
     }
-    let logs: f64 = variances.iter().map(|v| (v / pooled).ln()).sum();
-    let correction = 1.0 + (count + 1.0) / (3.0 * count * freedom);
+    let logs: f64 = variances.iter().map(|(v, f)| f * (v / pooled).ln()).sum();
+    let inverse: f64 = variances.iter().map(|(_, f)| 1.0 / f).sum();
+    let correction = 1.0 + (inverse - 1.0 / freedom) / (3.0 * (count - 1.0));
     let law = ChiSquared::new(count - 1.0).ok()?;
-    Some(law.sf((-freedom * logs / correction).max(0.0)))
+    Some(law.sf((-logs / correction).max(0.0)))
 }
 
 /// F of the heights of the runs against what is left beside them.
-fn level(left: &[Vec<Vec<f64>>], runs: usize) -> Option<f64> {
-    let rows = || left.iter().flatten();
-    let count = rows().count() as f64;
-    let all: f64 = rows().flatten().map(|v| v * v).sum();
-    let heights: f64 = (0..runs)
-        .map(|run| {
-            let sum: f64 = rows().filter_map(|row| row.get(run)).sum();
-            sum * sum / count
-        })
-        .sum();
+fn level(left: &[Targets], runs: usize) -> Option<f64> {
+    let rows = || left.iter().flatten().map(Vec::as_slice);
+    let there = rows().flatten().flatten();
+    let (count, all) = there.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v * v));
+    // What least squares take from the squares: the solution times the right side of its equations.
+    let right = apart(rows(), runs, |_, value| value);
+    let own = heights(rows(), runs);
+    let taken: f64 = own.iter().zip(&right).map(|(z, b)| z * b).sum();
     let between = (runs - 1) as f64;
-    let within = (count - 1.0) * between;
-    let rest = all - heights;
+    let within = count - rows().count() as f64 - between;
+    let rest = all - taken;
     // Less than rounding leaves of the squares is no scatter.
     if !(within > 0.0) || !(rest > 1e-14 * all) {
         return None;
     }
     let law = FisherSnedecor::new(between, within).ok()?;
-    Some(law.sf(heights / between / (rest / within)))
+    Some(law.sf(taken / between / (rest / within)))
 }
 
 /// Correlations over the runs between a target and its neighbour, and between both directions of a
-/// target. Of independent normal readings each has mean 0 and variance 1/(n − 1), and any two of
-/// them are uncorrelated, so that their sum is normal for many targets.
-fn alike(left: &[Vec<Vec<f64>>], runs: usize) -> Option<f64> {
+/// target, each over the n runs that both have. Of independent normal readings each has mean 0 and variance
+/// 1/(n − 1), and any two of them are uncorrelated, so that their sum is normal for many targets.
+fn alike(left: &[Targets]) -> Option<f64> {
     let mut sum = 0.0;
-    let mut pairs = 0.0;
-    let mut add = |a: &[f64], b: &[f64]| {
-        let squares = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
-        let scale = (squares(a) * squares(b)).sqrt();
-        if scale > 0.0 {
-            sum += a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>() / scale;
-            pairs += 1.0;
+    let mut variance = 0.0;
+    let mut add = |a: &[Option<f64>], b: &[Option<f64>]| {
+        let both = || a.iter().zip(b).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
+        let count = both().count() as f64;
+        let (mean_a, mean_b) =
+            both().fold((0.0, 0.0), |(x, y), (a, b)| (x + a / count, y + b / count));
+        let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
+        for (a, b) in both().map(|(a, b)| (a - mean_a, b - mean_b)) {
+            aa += a * a;
+            bb += b * b;
+            ab += a * b;
+        }
+        let scale = (aa * bb).sqrt();
+        if count > 1.0 && scale > 0.0 {
+            sum += ab / scale;
+            variance += 1.0 / (count - 1.0);
         }
     };
     for rows in left {
@@ -145,9 +199,9 @@ fn alike(left: &[Vec<Vec<f64>>], runs: usize) -> Option<f64> {
             add(a, b);
         }
     }
-    if pairs == 0.0 {
+    if variance == 0.0 {
         return None;
     }
-    let z = sum / (pairs / (runs - 1) as f64).sqrt();
-    Normal::new(0.0, 1.0).ok().map(|law| law.sf(z))
+    let law = Normal::new(0.0, 1.0).ok()?;
+    Some(law.sf(sum / variance.sqrt()))
 }

@@ -4,10 +4,11 @@
 //! heights of the runs are therefore what is independent, not the readings: all readings of a run share
 //! its height, and within a run the times go with the targets.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::dependence::LEVEL;
-use super::readings::{Direction, Reading};
+use super::readings::{Direction, Reading, mean};
+use crate::missing::heights;
 use crate::uncertainty::{DegreesOfFreedom, coverage_factor};
 
 /// The common slope of the deviations over time.
@@ -37,32 +38,42 @@ impl Drift {
     /// read at two times.
     #[must_use]
     pub fn of(readings: &[Reading]) -> Option<Self> {
-        let mut cells: BTreeMap<(u64, Direction), Mean> = BTreeMap::new();
+        let runs: BTreeSet<u32> = readings.iter().map(|r| r.run).collect();
+        let place: BTreeMap<u32, usize> = runs.iter().copied().zip(0..).collect();
+        let mut cells: BTreeMap<(u64, Direction), [Vec<Option<f64>>; 2]> = BTreeMap::new();
+        let mut counts = vec![0.0; runs.len()];
         for r in readings {
-            let cell = ((r.target + 0.0).to_bits(), r.direction);
-            cells.entry(cell).or_default().add(r.time?, r.deviation);
+            let time = r.time?;
+            let run = *place.get(&r.run)?;
+            let rows = cells
+                .entry(((r.target + 0.0).to_bits(), r.direction))
+                .or_insert_with(|| [vec![None; runs.len()], vec![None; runs.len()]]);
+            rows[0][run] = Some(time);
+            rows[1][run] = Some(r.deviation);
+            counts[run] += 1.0;
         }
         let times = || readings.iter().filter_map(|r| r.time);
         let duration =
             times().fold(f64::NEG_INFINITY, f64::max) - times().fold(f64::INFINITY, f64::min);
-        let mut runs: BTreeMap<u32, Mean> = BTreeMap::new();
-        let mut squares = 0.0;
-        for r in readings {
-            let (time, deviation) = cells
-                .get(&((r.target + 0.0).to_bits(), r.direction))?
-                .mean();
-            let left = r.deviation - deviation;
-            squares += left * left;
-            runs.entry(r.run).or_default().add(r.time? - time, left);
-        }
         let degrees_of_freedom = runs.len().checked_sub(2).filter(|f| *f > 0)?;
-        let (mut tt, mut tx, mut xx) = (0.0, 0.0, 0.0);
-        for run in runs.values() {
-            let (t, x) = run.mean();
-            tt += run.count * t * t;
-            tx += run.count * t * x;
-            xx += run.count * x * x;
-        }
+        // Times and heights of the runs, both freed of targets and directions.
+        let [time, height] = [0, 1].map(|k| {
+            let rows = cells.values().map(|rows| rows[k].as_slice());
+            let mut own = heights(rows, runs.len());
+            let weighted = own.iter().zip(&counts).map(|(z, n)| z * n);
+            let mean = weighted.sum::<f64>() / readings.len() as f64;
+            own.iter_mut().for_each(|z| *z -= mean);
+            own
+        });
+        let sum = |a: &[f64], b: &[f64]| -> f64 {
+            let both = a.iter().zip(b).zip(&counts);
+            both.map(|((a, b), n)| n * a * b).sum()
+        };
+        let (tt, tx, xx) = (
+            sum(&time, &time),
+            sum(&time, &height),
+            sum(&height, &height),
+        );
         // Times that differ by rounding alone tell no slope.
         if !(tt.sqrt() > 1e-9 * duration) || !tt.is_finite() {
             return None;
@@ -70,6 +81,16 @@ impl Drift {
         let rate = tx / tt;
         let about = (xx - rate * tx).max(0.0);
         let std = (about / degrees_of_freedom as f64 / tt).sqrt();
+        let squares: f64 = cells
+            .values()
+            .map(|[_, row]| {
+                let mean = mean(row);
+                row.iter()
+                    .flatten()
+                    .map(|v| (v - mean).powi(2))
+                    .sum::<f64>()
+            })
+            .sum();
         let freedom = readings.len().saturating_sub(cells.len() + 1);
         let as_readings = ((squares - rate * tx).max(0.0) / freedom.max(1) as f64 / tt).sqrt();
         (rate.is_finite() && std.is_finite()).then_some(Self {
@@ -87,24 +108,4 @@ fn beyond(rate: f64, std: f64, degrees_of_freedom: usize) -> bool {
     let freedom = DegreesOfFreedom::new(degrees_of_freedom as f64);
     let factor = freedom.and_then(|freedom| coverage_factor(1.0 - LEVEL, freedom));
     factor.is_ok_and(|k| rate.abs() > k * std)
-}
-
-/// Mean time and deviation, of sums.
-#[derive(Default)]
-struct Mean {
-    count: f64,
-    time: f64,
-    deviation: f64,
-}
-
-impl Mean {
-    fn add(&mut self, time: f64, deviation: f64) {
-        self.count += 1.0;
-        self.time += time;
-        self.deviation += deviation;
-    }
-
-    fn mean(&self) -> (f64, f64) {
-        (self.time / self.count, self.deviation / self.count)
-    }
 }

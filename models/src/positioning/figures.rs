@@ -1,6 +1,6 @@
 //! The figures of ISO 230-2:2014 and of VDI/DGQ 3441, from means and standard deviations.
 
-use super::readings::{Deviations, Direction};
+use super::readings::{Deviations, Direction, mean};
 
 /// Mean and standard deviation at every target, by direction.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,23 +12,32 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Mean and standard deviation of every target and direction.
+    /// Mean and standard deviation of every target and direction, of the readings that are there.
     #[must_use]
     pub fn of(deviations: &Deviations) -> Self {
+        Self::above(deviations, &[])
+    }
+
+    /// The same, means of readings less the height of their run (0 where none is given).
+    pub(super) fn above(deviations: &Deviations, heights: &[f64]) -> Self {
         let mut profile = Self {
             mean: [None, None],
             std: [None, None],
         };
+        let freed = |row: &Vec<Option<f64>>| {
+            let own: Vec<Option<f64>> = row
+                .iter()
+                .enumerate()
+                .map(|(run, x)| Some((*x)? - heights.get(run).copied().unwrap_or_default()))
+                .collect();
+            mean(&own)
+        };
         for (direction, rows) in deviations.directions() {
-            let means: Vec<f64> = rows.iter().map(|row| mean(row)).collect();
             if deviations.runs > 1 {
-                let std = rows
-                    .iter()
-                    .zip(&means)
-                    .map(|(row, m)| standard_deviation(row, *m));
+                let std = rows.iter().map(|row| standard_deviation(row));
                 profile.std[direction.index()] = Some(std.collect());
             }
-            profile.mean[direction.index()] = Some(means);
+            profile.mean[direction.index()] = Some(rows.iter().map(freed).collect());
         }
         profile
     }
@@ -91,13 +100,10 @@ impl Profile {
     }
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
-fn standard_deviation(values: &[f64], mean: f64) -> f64 {
-    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-    (squares / (values.len().max(2) - 1) as f64).sqrt()
+fn standard_deviation(row: &[Option<f64>]) -> f64 {
+    let mean = mean(row);
+    let squares: f64 = row.iter().flatten().map(|v| (v - mean).powi(2)).sum();
+    (squares / (row.iter().flatten().count().max(2) - 1) as f64).sqrt()
 }
 
 /// A figure of one of the standards.

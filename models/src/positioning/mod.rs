@@ -11,11 +11,14 @@ mod readings;
 mod simulate;
 mod uncertainty;
 
+use crate::missing::heights;
+use dependence::Dependence;
 pub use dependence::Scatter;
 pub use drift::Drift;
 pub use figures::{Figure, FigureValues, Profile};
-pub use readings::{Deviations, Direction, PositioningError, Reading, Targets};
+pub use readings::{Deviations, Direction, Missing, PositioningError, Reading, Targets};
 pub use simulate::{PositioningSimulation, Truth, simulate};
+use uncertainty::Means;
 pub use uncertainty::{COVERAGE, FigureUncertainty, Influences, NoUncertainty};
 
 /// What one test of an axis tells.
@@ -23,6 +26,9 @@ pub use uncertainty::{COVERAGE, FigureUncertainty, Influences, NoUncertainty};
 pub struct Positioning {
     /// The deviations by target, direction and run.
     pub deviations: Deviations,
+    /// Whether means are of readings less the heights of their runs: where readings are missing and the runs lie at
+    /// heights of their own, a target would else be off by what the run that it lacks would have added.
+    pub freed_of_heights: bool,
     /// Mean and standard deviation at each target and direction.
     pub profile: Profile,
     /// The figures of both standards.
@@ -69,18 +75,28 @@ pub fn analyse(
     seed: u64,
 ) -> Result<Positioning, PositioningError> {
     let deviations = Deviations::new(readings)?;
-    let profile = Profile::of(&deviations);
+    let scatter = Scatter::of(&deviations);
+    let drift = Drift::of(readings);
+    let dependence = Dependence::of(scatter.as_ref(), drift.as_ref());
+    let freed_of_heights = !deviations.missing.is_empty() && dependence.by_run();
+    let heights = match freed_of_heights {
+        true => heights(deviations.rows(), deviations.runs),
+        false => Vec::new(),
+    };
+    let profile = Profile::above(&deviations, &heights);
     let values = FigureValues::of(&profile);
     if values.iter().any(|(_, v)| !v.is_finite()) {
         return Err(PositioningError::TooLarge);
     }
-    let scatter = Scatter::of(&deviations);
-    let drift = Drift::of(readings);
-    let dependence = (scatter.as_ref(), drift.as_ref());
-    let uncertainties = uncertainty::expanded(&deviations, &profile, dependence, influences, seed);
+    let means = Means {
+        profile: &profile,
+        heights: &heights,
+    };
+    let uncertainties = uncertainty::expanded(&deviations, &means, &dependence, influences, seed);
     Ok(Positioning {
         drift,
         deviations,
+        freed_of_heights,
         profile,
         values,
         uncertainties,

@@ -101,18 +101,31 @@ pub enum PositioningError {
         /// Place of a reading of the target.
         reading: usize,
     },
-    /// A target without a run that others have.
+    /// A target with one reading in a direction, where others have more.
     #[error(
-        "target {target} {} lacks run {run}, which others have", direction.name()
+        "target {target} has one {} reading, of run {run}, others have up to {runs}: one tells no standard deviation",
+        direction.name()
     )]
-    UnequalRuns {
+    OneReading {
         /// The target.
         target: f64,
         /// The direction.
         direction: Direction,
-        /// The run it lacks.
+        /// The run of its reading.
         run: u32,
-        /// Place of a reading of the target.
+        /// Readings that others have at most.
+        runs: usize,
+        /// Place of the reading.
+        reading: usize,
+    },
+    /// Runs of which no target and direction leads to the others.
+    #[error("run {run} has no target in common with run {other}, nor has any run between the two")]
+    Apart {
+        /// A run.
+        run: u32,
+        /// The first run.
+        other: u32,
+        /// Place of a reading of `run`.
         reading: usize,
     },
 }
@@ -124,31 +137,47 @@ impl PositioningError {
             Self::NotFinite { reading }
             | Self::Duplicate { reading, .. }
             | Self::MissingDirection { reading, .. }
-            | Self::UnequalRuns { reading, .. } => Some(*reading),
+            | Self::OneReading { reading, .. }
+            | Self::Apart { reading, .. } => Some(*reading),
             Self::Empty | Self::TooLarge | Self::OneTarget { .. } => None,
         }
     }
 }
 
-/// Deviations x_ij of one direction: a row a target, in it a value a run.
-pub type Targets = Vec<Vec<f64>>;
+/// Deviations x_ij of one direction: a row a target, in it a value a run, none where the reading is missing.
+pub type Targets = Vec<Vec<Option<f64>>>;
 
-/// The deviations of a whole test: every target approached in the same directions and runs.
+/// A reading that is missing: others have that run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Missing {
+    /// Its target, mm or degrees.
+    pub target: f64,
+    /// Its direction.
+    pub direction: Direction,
+    /// Its run.
+    pub run: u32,
+}
+
+/// The deviations of a whole test: every target approached in the same directions; at each two readings or
+/// more, or one everywhere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Deviations {
     /// Targets in ascending order, mm or degrees; two or more.
     pub targets: Vec<f64>,
-    /// Runs of each target and direction.
+    /// Runs of the test; of a target and direction as many, or less what is missing there.
     pub runs: usize,
     /// By direction; at least one is there.
     pub by_direction: [Option<Targets>; 2],
+    /// Readings that are missing, by direction and target.
+    pub missing: Vec<Missing>,
 }
 
 impl Deviations {
     /// Sorts readings by target, direction and run.
     ///
     /// # Errors
-    /// [`PositioningError`]: readings that are not finite, given twice, or missing.
+    /// [`PositioningError`]: readings that are not finite or given twice, a target that lacks a direction or has one
+    /// reading in it where others have more, runs that cannot be compared.
     pub fn new(readings: &[Reading]) -> Result<Self, PositioningError> {
         let cells = sorted(readings)?;
         let mut targets: Vec<f64> = cells.keys().map(|k| k.target()).collect();
@@ -165,17 +194,48 @@ impl Deviations {
             .flat_map(|runs| runs.keys().copied())
             .collect();
         let mut by_direction = [None, None];
+        let mut missing = Vec::new();
         for direction in Direction::ALL.into_iter().filter(|d| there[d.index()]) {
             let rows = targets
                 .iter()
-                .map(|&target| row(&cells, &runs, readings, target, direction))
+                .map(|&target| {
+                    let own = cell(&cells, target, direction)?;
+                    if let (Some((&run, &reading)), true) =
+                        (own.iter().next(), own.len() < 2.min(runs.len()))
+                    {
+                        let runs = cells.values().map(BTreeMap::len).max().unwrap_or_default();
+                        return Err(PositioningError::OneReading {
+                            target,
+                            direction,
+                            run,
+                            runs,
+                            reading,
+                        });
+                    }
+                    let row = runs.iter().map(|run| {
+                        let reading = own.get(run).and_then(|place| readings.get(*place));
+                        if reading.is_none() {
+                            missing.push(Missing {
+                                target,
+                                direction,
+                                run: *run,
+                            });
+                        }
+                        reading.map(|r| r.deviation)
+                    });
+                    Ok(row.collect())
+                })
                 .collect::<Result<Targets, _>>()?;
             by_direction[direction.index()] = Some(rows);
+        }
+        if !missing.is_empty() {
+            joined(&cells, &runs)?;
         }
         Ok(Self {
             targets,
             runs: runs.len(),
             by_direction,
+            missing,
         })
     }
 
@@ -190,6 +250,12 @@ impl Deviations {
         Direction::ALL
             .into_iter()
             .filter_map(|d| Some((d, self.by_direction[d.index()].as_ref()?)))
+    }
+
+    /// The readings of each target and direction.
+    pub(super) fn rows(&self) -> impl Iterator<Item = &[Option<f64>]> + Clone {
+        let rows = self.by_direction.iter().flatten();
+        rows.flatten().map(Vec::as_slice)
     }
 
     /// From the first to the last target.
@@ -248,36 +314,56 @@ fn sorted(readings: &[Reading]) -> Result<Cells, PositioningError> {
     Ok(cells)
 }
 
-fn row(
+fn cell(
     cells: &Cells,
-    runs: &BTreeSet<u32>,
-    readings: &[Reading],
     target: f64,
     direction: Direction,
-) -> Result<Vec<f64>, PositioningError> {
+) -> Result<&BTreeMap<u32, usize>, PositioningError> {
     let of = |direction| cells.get(&Cell::new(target, direction));
-    let Some(own) = of(direction) else {
+    of(direction).ok_or_else(|| {
         let any = Direction::ALL.into_iter().find_map(of);
         let reading = any.and_then(|runs| runs.values().next()).copied();
-        return Err(PositioningError::MissingDirection {
+        PositioningError::MissingDirection {
             target,
             direction,
             reading: reading.unwrap_or_default(),
-        });
+        }
+    })
+}
+
+/// Checks that runs can be compared: from each run targets that share two runs lead to every other.
+fn joined(cells: &Cells, runs: &BTreeSet<u32>) -> Result<(), PositioningError> {
+    let Some(other) = runs.first().copied() else {
+        return Ok(());
     };
-    let any = own.values().next().copied().unwrap_or_default();
-    runs.iter()
-        .map(|run| {
-            let place = own.get(run).ok_or(PositioningError::UnequalRuns {
-                target,
-                direction,
-                run: *run,
-                reading: any,
-            })?;
-            readings
-                .get(*place)
-                .map(|r| r.deviation)
-                .ok_or(PositioningError::Empty)
-        })
-        .collect()
+    let mut reached = BTreeSet::from([other]);
+    loop {
+        let before = reached.len();
+        for own in cells.values() {
+            if own.keys().any(|run| reached.contains(run)) {
+                reached.extend(own.keys());
+            }
+        }
+        if reached.len() == before {
+            break;
+        }
+    }
+    match runs.difference(&reached).next() {
+        None => Ok(()),
+        Some(run) => Err(PositioningError::Apart {
+            run: *run,
+            other,
+            reading: cells
+                .values()
+                .find_map(|own| own.get(run))
+                .copied()
+                .unwrap_or_default(),
+        }),
+    }
+}
+
+/// Mean of the readings of one target and direction that are there.
+pub(super) fn mean(row: &[Option<f64>]) -> f64 {
+    let there = row.iter().flatten();
+    there.clone().sum::<f64>() / there.count().max(1) as f64
 }

@@ -28,6 +28,7 @@ pub(super) fn as_json(found: &Found) -> Result<Value, Message> {
         "targets": deviations.targets.len(),
         "runs": deviations.runs,
         "directions": directions,
+        "missing": missing(found),
         "iso230_2": figures(found, &Figure::ISO),
         "vdi3441": figures(found, &Figure::VDI),
         "uncertainty": {
@@ -69,16 +70,31 @@ fn figures(found: &Found, which: &[Figure]) -> Map<String, Value> {
         .collect()
 }
 
+/// Readings that are missing, and whether means are freed of the heights of the runs.
+fn missing(found: &Found) -> Value {
+    let readings: Vec<Value> = (found.result.deviations.missing.iter())
+        .map(|m| json!({"target": m.target, "direction": m.direction.name(), "run": m.run}))
+        .collect();
+    json!({"readings": readings, "freed_of_heights": found.result.freed_of_heights})
+}
+
 fn points(found: &Found) -> Vec<Value> {
     let profile = &found.result.profile;
     let of = |values: Option<&[f64]>, i: usize| values.and_then(|v| v.get(i)).copied();
     let (means, reversals) = (profile.bidirectional_means(), profile.reversals());
     let repeatabilities = profile.repeatabilities();
+    let readings = |direction: Direction, i: usize| {
+        let rows = found.result.deviations.by_direction[direction.index()].as_ref();
+        rows.and_then(|rows| rows.get(i))
+            .map(|row| row.iter().flatten().count())
+    };
     let targets = found.result.deviations.targets.iter().enumerate();
     targets
         .map(|(i, target)| {
             json!({
                 "target": target,
+                "readings_forward": readings(Direction::Forward, i),
+                "readings_backward": readings(Direction::Backward, i),
                 "mean_forward": of(profile.means(Direction::Forward), i),
                 "mean_backward": of(profile.means(Direction::Backward), i),
                 "s_forward": of(profile.stds(Direction::Forward), i),

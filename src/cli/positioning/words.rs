@@ -29,12 +29,17 @@ pub(super) fn in_words(data: &str, found: &Found, drift: Option<&str>) -> String
     let ends = [deviations.targets.first(), deviations.targets.last()];
     let [first, last] = ends.map(|t| place(t.copied().unwrap_or_default()));
     let mut text = format!(
-        "Positioning{} ({data}): {} targets from {first} to {last} {at}, {} {}, {}\n",
+        "Positioning{} ({data}): {} targets from {first} to {last} {at}, {} {}, {}{}\n",
         axis.unwrap_or_default(),
         deviations.targets.len(),
         deviations.runs,
         if deviations.runs == 1 { "run" } else { "runs" },
         directions.join(" and "),
+        match deviations.missing.len() {
+            0 => String::new(),
+            1 => ", one reading missing".to_owned(),
+            n => format!(", {n} readings missing"),
+        },
     );
     for (standard, figures) in [("ISO 230-2", &Figure::ISO[..]), ("VDI 3441", &Figure::VDI)] {
         let told: Vec<String> = figures
@@ -209,6 +214,7 @@ pub(super) fn warnings(setup: &PositioningSetup, result: &Positioning) -> Vec<St
             "over {long} ISO 230-2 asks for one run and gives no R and no A; those here go beyond it."
         ));
     }
+    warnings.extend(missing(result, at));
     if !deviations.is_bidirectional() {
         warnings.push(
             "one direction of approach: nothing is told of the reversal, nor of both directions together."
@@ -241,6 +247,46 @@ pub(super) fn warnings(setup: &PositioningSetup, result: &Positioning) -> Vec<St
         }
     }
     warnings
+}
+
+/// Readings that are missing, the first by name, and what is made of those that are there.
+fn missing(result: &Positioning, at: &str) -> Option<String> {
+    /// As many are named.
+    const NAMED: usize = 3;
+    let missing = &result.deviations.missing;
+    let named: Vec<String> = missing
+        .iter()
+        .take(NAMED)
+        .map(|m| {
+            format!(
+                "run {} at {} {at} {}",
+                m.run,
+                place(m.target),
+                m.direction.name()
+            )
+        })
+        .collect();
+    let more = match missing.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    let are = match missing.len() {
+        0 => return None,
+        1 => "one reading is".to_owned(),
+        n => format!("{n} readings are"),
+    };
+    let of = match result.freed_of_heights {
+        true => {
+            "means there are of the other runs, freed of the heights of all runs (which differ), standard deviations of the \
+             readings that are there"
+        }
+        false => "means and standard deviations there are of the readings that are there",
+    };
+    Some(format!(
+        "{are} missing ({}{more}): {of}, and the uncertainties know how many these are. ISO 230-2 takes as many runs at \
+         every target: for a test by the standard measure them again.",
+        named.join(", "),
+    ))
 }
 
 /// Targets that ISO 230-2 asks for: five in each metre and five at least; of a rotary axis 3, 5 and 8

@@ -11,8 +11,7 @@ mod noise;
 mod simulated;
 mod tied;
 
-use super::dependence::{Scatter, residuals};
-use super::drift::Drift;
+use super::dependence::Dependence;
 use super::figures::{Figure, FigureValues, Profile};
 use super::readings::Deviations;
 use noise::Noise;
@@ -100,58 +99,45 @@ pub enum NoUncertainty {
     ReadingsAlike,
 }
 
+/// Means and what they are made of.
+pub(super) struct Means<'a> {
+    pub(super) profile: &'a Profile,
+    /// Heights of the runs that the means are freed of; empty where they are not.
+    pub(super) heights: &'a [f64],
+}
+
 /// The uncertainty of each figure that the profile tells.
 pub(super) fn expanded(
     deviations: &Deviations,
-    profile: &Profile,
-    (scatter, drift): (Option<&Scatter>, Option<&Drift>),
+    means: &Means,
+    dependence: &Dependence,
     influences: &Influences,
     seed: u64,
 ) -> Vec<(Figure, Result<FigureUncertainty, NoUncertainty>)> {
-    let told: Vec<Figure> = FigureValues::of(profile).iter().map(|(f, _)| f).collect();
+    let told: Vec<Figure> = FigureValues::of(means.profile)
+        .iter()
+        .map(|(f, _)| f)
+        .collect();
     let none = |why| told.iter().map(|f| (*f, Err(why))).collect();
-    let Some(scatter) = scatter else {
+    let Some(std) = dependence.std else {
         return none(NoUncertainty::OneRun);
     };
-    if scatter.std == 0.0 {
+    if std == 0.0 {
         return none(NoUncertainty::NoScatter);
     }
     if deviations.targets.len() > MOST_TARGETS {
         return none(NoUncertainty::TooManyTargets);
     }
-    let shifts = |drift: &Drift| drift.shows() || drift.may;
-    let why = [
-        (drift.is_some_and(Drift::shows), NoUncertainty::Drifts),
-        (
-            scatter.runs_differ() || drift.is_some_and(|d| d.may),
-            NoUncertainty::RunsDiffer,
-        ),
-        (scatter.depends(), NoUncertainty::ReadingsAlike),
-        (scatter.differs(), NoUncertainty::ScatterDiffers),
-    ];
-    let why = why.into_iter().find(|(is, _)| *is).map(|(_, why)| why);
-    let noise = match why {
-        None => Noise::Independent {
-            std: scatter.std,
-            runs: deviations.runs,
-        },
-        Some(_) => Noise::ByRun {
-            residuals: residuals(deviations),
-            runs: deviations.runs,
-        },
+    let noise = match dependence.why {
+        None => Noise::independent(std, deviations),
+        Some(_) => Noise::by_run(deviations, means),
     };
-    let found = Test::new(deviations, profile, noise, *influences).expanded(seed);
+    let found = Test::new(deviations, means.profile, noise, *influences).expanded(seed);
     told.into_iter()
-        .map(|figure| match why {
-            Some(why) if figure.rests_on_scatter() => (figure, Err(why)),
+        .map(|figure| match (dependence.why, dependence.shifted) {
+            (Some(why), _) if figure.rests_on_scatter() => (figure, Err(why)),
             // A drift shifts one direction against the other, and their mean difference most clearly.
-            Some(why)
-                if matches!(figure, Figure::BMean | Figure::UMean) && drift.is_some_and(shifts) =>
-            {
-                let shows = why == NoUncertainty::Drifts;
-                let why = if shows { why } else { NoUncertainty::MayDrift };
-                (figure, Err(why))
-            }
+            (_, Some(why)) if matches!(figure, Figure::BMean | Figure::UMean) => (figure, Err(why)),
             _ => {
                 let own = found.iter().find(|(f, _)| *f == figure);
                 (figure, own.map(|(_, u)| *u).ok_or(NoUncertainty::NoScatter))

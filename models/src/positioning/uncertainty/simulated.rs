@@ -4,8 +4,8 @@ use rand::Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 
 use super::super::figures::{Figure, FigureValues, Profile};
-use super::super::readings::{Deviations, Direction, Targets};
-use super::noise::Noise;
+use super::super::readings::{Deviations, Direction};
+use super::noise::{Noise, Readings};
 use super::tied::tied;
 use super::{COVERAGE, FigureUncertainty, Influences};
 use crate::uncertainty;
@@ -32,8 +32,6 @@ pub(super) struct Test {
     influences: Influences,
     /// Places of the targets, 0 at the first and 1 at the last.
     along: Vec<f64>,
-    /// Which directions are there.
-    there: [bool; 2],
 }
 
 /// What one simulated test finds beside the truth, by direction and target.
@@ -78,7 +76,6 @@ impl Test {
             noise,
             influences,
             along: targets.map(|t| (t - first) / length).collect(),
-            there: [0, 1].map(|d| profile.mean[d].is_some()),
         }
     }
 
@@ -101,11 +98,11 @@ impl Test {
             room,
             |random, errors, row| {
                 let scale = match &self.noise {
-                    Noise::Independent { std, runs } => {
-                        std / self.independent(*std, *runs, random, errors)
+                    Noise::Independent { std, readings } => {
+                        std / independent(*std, readings, random, errors)
                     }
                     Noise::ByRun { residuals, runs } => {
-                        self.by_run(residuals, *runs, random, errors);
+                        by_run(residuals, *runs, random, errors);
                         1.0
                     }
                 };
@@ -131,57 +128,6 @@ impl Test {
         found.collect()
     }
 
-    /// Means and standard deviations of independent readings; returns the pooled standard deviation
-    /// that such a test would find.
-    fn independent(
-        &self,
-        std: f64,
-        runs: usize,
-        random: &mut impl Rng,
-        errors: &mut Errors,
-    ) -> f64 {
-        let of_mean = std / (runs as f64).sqrt();
-        let freedom = (runs - 1) as f64;
-        let law = ChiSquared::new(freedom);
-        let (mut sum, mut count) = (0.0, 0.0);
-        for d in (0..2).filter(|d| self.there[*d]) {
-            for (mean, own) in errors.sampled[d].iter_mut().zip(&mut errors.std[d]) {
-                let normal: f64 = StandardNormal.sample(random);
-                *mean = of_mean * normal;
-                let share = law.map_or(1.0, |law| law.sample(random) / freedom);
-                *own = std * share.sqrt();
-                sum += share;
-                count += 1.0;
-            }
-        }
-        // No test with two runs or more has a pooled variance of zero.
-        std * (sum / f64::max(count, 1.0)).sqrt().max(f64::MIN_POSITIVE)
-    }
-
-    /// Means as runs like those measured would give them: their covariance is that of the residuals,
-    /// known from as many runs less one.
-    fn by_run(
-        &self,
-        residuals: &[Targets],
-        runs: usize,
-        random: &mut impl Rng,
-        errors: &mut Errors,
-    ) {
-        let freedom = (runs - 1) as f64;
-        let share = ChiSquared::new(freedom).map_or(1.0, |law| law.sample(random) / freedom);
-        let scale = 1.0 / (share.max(f64::MIN_POSITIVE) * freedom * runs as f64).sqrt();
-        let weights: Vec<f64> = (0..runs)
-            .map(|_| StandardNormal.sample(&mut *random))
-            .collect();
-        let there = (0..2).filter(|d| self.there[*d]);
-        for (d, rows) in there.zip(residuals) {
-            for (mean, row) in errors.sampled[d].iter_mut().zip(rows) {
-                let error: f64 = row.iter().zip(&weights).map(|(r, w)| r * w).sum();
-                *mean = scale * error;
-            }
-        }
-    }
-
     /// Adds what device, misalignment, expansion and drift do.
     fn influence(&self, random: &mut impl Rng, errors: &mut Errors) {
         let normal: f64 = StandardNormal.sample(random);
@@ -195,6 +141,51 @@ impl Test {
                     *all += of_mean * normal;
                 }
             }
+        }
+    }
+}
+
+/// Means and standard deviations of independent readings; returns the pooled standard deviation
+/// that such a test would find.
+fn independent(
+    std: f64,
+    readings: &[Vec<Readings>; 2],
+    random: &mut impl Rng,
+    errors: &mut Errors,
+) -> f64 {
+    let (mut sum, mut freedoms) = (0.0, 0.0);
+    for (d, readings) in readings.iter().enumerate() {
+        let errors = errors.sampled[d].iter_mut().zip(&mut errors.std[d]);
+        for ((mean, own), readings) in errors.zip(readings) {
+            let normal: f64 = StandardNormal.sample(random);
+            *mean = std / readings.count.sqrt() * normal;
+            let freedom = readings.freedom();
+            let law = readings.law.as_ref();
+            let squares = law.map_or(freedom, |law| law.sample(random));
+            *own = std * (squares / freedom).sqrt();
+            sum += squares;
+            freedoms += freedom;
+        }
+    }
+    // No test with two runs or more has a pooled variance of zero.
+    std * (sum / f64::max(freedoms, 1.0))
+        .sqrt()
+        .max(f64::MIN_POSITIVE)
+}
+
+/// Means as runs like those measured would give them: their covariance is that of the residuals,
+/// known from as many runs less one.
+fn by_run(residuals: &[Vec<Vec<f64>>; 2], runs: usize, random: &mut impl Rng, errors: &mut Errors) {
+    let freedom = (runs - 1) as f64;
+    let share = ChiSquared::new(freedom).map_or(1.0, |law| law.sample(random) / freedom);
+    let scale = 1.0 / (share.max(f64::MIN_POSITIVE) * freedom * runs as f64).sqrt();
+    let weights: Vec<f64> = (0..runs)
+        .map(|_| StandardNormal.sample(&mut *random))
+        .collect();
+    for (means, rows) in errors.sampled.iter_mut().zip(residuals) {
+        for (mean, row) in means.iter_mut().zip(rows) {
+            let error: f64 = row.iter().zip(&weights).map(|(r, w)| r * w).sum();
+            *mean = scale * error;
         }
     }
 }

@@ -68,24 +68,18 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The readings with what is missing filled in as a_i + z_j, which least squares of the readings that are there has for
-/// it (F. Yates, Empire J. Exp. Agric. 1, 1933): means over the repeats are then those of the fit. None where a row
-/// has no reading.
-pub fn filled(rows: &[Vec<Option<f64>>]) -> Option<Vec<Vec<f64>>> {
-    let repeats = rows.first()?.len();
-    let heights = heights(rows.iter().map(Vec::as_slice), repeats);
+/// The readings with what is missing filled in as a_i + z_j, a_i the mean of a row less the heights z of the repeats:
+/// with those of least squares ([`heights`]) means over the repeats are those of the fit (F. Yates, Empire J. Exp.
+/// Agric. 1, 1933), of variance σ²/n_i for n_i readings of a row, but for the little that the heights add. None where a
+/// row has no reading.
+pub fn filled(rows: &[Vec<Option<f64>>], heights: &[f64]) -> Option<Vec<Vec<f64>>> {
     rows.iter()
         .map(|row| {
-            let freed = || {
-                row.iter()
-                    .zip(&heights)
-                    .filter_map(|(x, z)| Some((*x)? - z))
-            };
-            let place = Some(freed().count())
-                .filter(|n| *n > 0)
-                .map(|n| freed().sum::<f64>() / n as f64)?;
-            let cells = row.iter().zip(&heights);
-            Some(cells.map(|(x, z)| x.unwrap_or(place + z)).collect())
+            let there = row.iter().zip(heights);
+            let freed = there.filter_map(|(x, z)| Some((*x)? - z));
+            let (count, sum) = freed.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
+            let cells = row.iter().zip(heights);
+            (count > 0.0).then(|| cells.map(|(x, z)| x.unwrap_or(sum / count + z)).collect())
         })
         .collect()
 }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use errsep_models::fourier::{
-    Combination, Compensation, FourierError, Scan, ScanReading, Section, join, step_terms,
+    Combination, Compensation, FourierError, Scan, ScanReading, Section, fill, join, step_terms,
 };
 use serde::Deserialize;
 use toml::Spanned;
@@ -147,6 +147,28 @@ pub struct LocatedScan {
 }
 
 impl LocatedScan {
+    /// Fills in what repeats lack from the others, and tells it: spacing, repeat and x of each position.
+    pub fn fill(located: &mut [Self], section: Section) -> Vec<(f64, u32, f64)> {
+        let mut scans: Vec<Scan> = located.iter().map(|l| l.scan.clone()).collect();
+        fill(&mut scans, section);
+        let mut told = Vec::new();
+        for (own, scan) in located.iter_mut().zip(scans) {
+            let mut filled = scan.filled.clone();
+            filled.sort_by_key(|f| f.index);
+            for f in &filled {
+                let x = scan.readings.get(f.index).map_or(0.0, |r| r.x);
+                told.push((scan.spacing, scan.repeat, x));
+                if f.first {
+                    let before = f.index.checked_sub(1).and_then(|at| own.lines.get(at));
+                    own.lines
+                        .insert(f.index, before.copied().unwrap_or_default());
+                }
+            }
+            own.scan = scan;
+        }
+        told
+    }
+
     /// Checks that the scan can be joined.
     ///
     /// # Errors
@@ -188,11 +210,16 @@ pub fn told(error: &FourierError) -> Message {
         FourierError::UnevenGrid { .. } => {
             "give one row for each step of the grid, from x = 0; resample a scan that is uneven"
         }
+        FourierError::RowMissing { .. } => {
+            "read the position again: a Fourier transform needs every step of the grid; repeats of this spacing, \
+             numbered in a column `repeat`, stand in for what one of them lacks, up to a tenth"
+        }
         FourierError::SectionNotFilled { .. } => {
             "read P1 from 0 to the end of the section, or correct its length"
         }
         FourierError::ProbeMissing { .. } => {
-            "read P2 before the joint x = L - d and P3 from there on"
+            "read P2 before the joint x = L - d and P3 from there on; repeats of this spacing, numbered in a column \
+             `repeat`, stand in for what one of them lacks, up to a tenth"
         }
         FourierError::NoOverlap { .. } => {
             "read both probes at the joint, or choose [method] compensation = \"fitted\""
@@ -253,6 +280,10 @@ pub fn read_scans(
             "" => Ok(None),
             _ => row.number(column).map(Some),
         };
+        // Without P1 the others tell nothing of the workpiece.
+        if row.is_empty(&m1) {
+            continue;
+        }
         let reading = ScanReading {
             x: row.number(&x)?,
             m1: row.number(&m1)?,
@@ -265,6 +296,7 @@ pub fn read_scans(
                     spacing: own,
                     repeat: number,
                     readings: Vec::new(),
+                    filled: Vec::new(),
                 },
                 file: path.to_owned(),
                 lines: Vec::new(),

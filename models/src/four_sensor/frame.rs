@@ -82,6 +82,14 @@ impl<'a> Frame<'a> {
         let mut variances = DVector::zeros(points + 2 * count + 4);
         variances.rows_mut(points, count).fill(own[(0, 0)]);
         variances.rows_mut(points + count, count).fill(own[(1, 1)]);
+        for n in 0..count {
+            let readings = self.outputs.variances(n);
+            if readings != [1.0; 4] {
+                let squares = self.slide.map(|w| w * w) * Vector4::from(readings);
+                variances[points + n] = squares[0];
+                variances[points + count + n] = squares[1];
+            }
+        }
         if let Parabola::TiltSlope(_) = self.parabola {
             // The slope of the tilt's own noise becomes a parabola of everything.
             let weights = self.slope_weights();

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Vector2, Vector4};
 
 use super::frame::Frame;
 use super::gauge::conditions;
-use super::separation::{degrees_of_freedom, normal, random_readings};
+use super::separation::{degrees_of_freedom, normal};
 use super::zone::minimum_zone;
 use super::{
     FourSensorError, Geometry, Line, MinimumZone, Outputs, Parabola, Penalised, Profile,
@@ -184,8 +184,7 @@ impl<'a> LongSeparator<'a> {
         let truth = vec![0.0; self.system.penalty_rows()];
         (0..repeats::DRAWS)
             .map(|draw| {
-                let count = self.outputs.readings().len();
-                let noise = random_readings(&mut repeats::random(draw), found.noise, count);
+                let noise = self.outputs.random(&mut repeats::random(draw), found.noise);
                 let seen = direct::slide_free_part(geometry, &noise);
                 let error = DVector::from_vec(factored.change(seen.as_slice(), &truth)?);
                 Ok(frame.error(&error, &noise).profiles())
@@ -208,7 +207,7 @@ impl<'a> LongSeparator<'a> {
         let frame = Frame::new(self.outputs, self.line, self.settings.parabola);
         let positions = self.outputs.slide_positions();
         minimum_zone(&positions, &found.straightness.values, degrees, |random| {
-            let noise = random_readings(random, found.noise_of_straightness(), positions.len());
+            let noise = self.outputs.random(random, found.noise_of_straightness());
             let truth: Vec<f64> = (0..self.system.penalty_rows())
                 .map(|_| found.scatter.held_back * normal(random))
                 .collect();

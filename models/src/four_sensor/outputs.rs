@@ -1,5 +1,8 @@
 //! The outputs of the four sensors.
 
+use rand::Rng;
+
+use super::separation::normal;
 use super::{FourSensorError, Geometry};
 
 /// Readings of the four sensors at each slide position.
@@ -8,6 +11,8 @@ pub struct Outputs {
     geometry: Geometry,
     start: f64,
     readings: Vec<[f64; 4]>,
+    /// Variance of each reading over that of most, where some are known less well.
+    variances: Option<Vec<[f64; 4]>>,
 }
 
 impl Outputs {
@@ -38,7 +43,33 @@ impl Outputs {
             geometry,
             start,
             readings,
+            variances: None,
         })
+    }
+
+    /// The same with the variance of each reading, over that of most: n/n_i of an average of n_i readings where others
+    /// are of n. Surface and zero-adjustments are fitted as if all were alike; S and γ at a position count what is
+    /// known of its own readings.
+    #[must_use]
+    pub fn with_variances(mut self, variances: Vec<[f64; 4]>) -> Self {
+        let usual = variances.iter().flatten().all(|v| *v == 1.0);
+        self.variances = Some(variances).filter(|_| !usual);
+        self
+    }
+
+    /// Variances of the readings at one slide position, over that of most.
+    pub(super) fn variances(&self, position: usize) -> [f64; 4] {
+        let own = self.variances.as_ref();
+        own.and_then(|rows| rows.get(position))
+            .copied()
+            .unwrap_or([1.0; 4])
+    }
+
+    /// Noise of readings of standard deviation `noise`, µm, one row a slide position.
+    pub(super) fn random(&self, random: &mut impl Rng, noise: f64) -> Vec<[f64; 4]> {
+        (0..self.readings.len())
+            .map(|n| self.variances(n).map(|v| noise * v.sqrt() * normal(random)))
+            .collect()
     }
 
     /// The sensors' places.

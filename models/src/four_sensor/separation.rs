@@ -202,10 +202,9 @@ impl Separator {
         self.check(outputs)?;
         let lambda = found.chosen.point.lambda;
         let frame = Frame::new(outputs, self.line, settings.parabola);
-        let count = outputs.readings().len();
         (0..repeats::DRAWS)
             .map(|draw| {
-                let noise = random_readings(&mut repeats::random(draw), found.noise, count);
+                let noise = outputs.random(&mut repeats::random(draw), found.noise);
                 let seen = direct::slide_free_part(&self.geometry, &noise);
                 let error = self.decomposition.with_data(&seen)?.solution(lambda)?;
                 Ok(frame.error(&(&self.section * error), &noise).profiles())
@@ -232,7 +231,7 @@ impl Separator {
         let frame = Frame::new(outputs, self.line, settings.parabola);
         let positions = outputs.slide_positions();
         minimum_zone(&positions, &found.straightness.values, degrees, |random| {
-            let noise = random_readings(random, found.noise_of_straightness(), positions.len());
+            let noise = outputs.random(random, found.noise_of_straightness());
             let seen = self
                 .decomposition
                 .with_data(&direct::slide_free_part(&self.geometry, &noise))?;
@@ -251,13 +250,6 @@ impl Separator {
         }
         Ok(())
     }
-}
-
-/// Noise of readings, one row a slide position.
-pub(super) fn random_readings(random: &mut impl Rng, noise: f64, count: usize) -> Vec<[f64; 4]> {
-    (0..count)
-        .map(|_| std::array::from_fn(|_| noise * normal(random)))
-        .collect()
 }
 
 pub(super) fn normal(random: &mut impl Rng) -> f64 {

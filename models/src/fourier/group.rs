@@ -16,6 +16,8 @@ pub(super) struct Group {
     pub scans: Vec<usize>,
     /// Readings on the section, N.
     pub samples: usize,
+    /// Differences that a scan lacked and that were taken from the others.
+    pub filled: usize,
     /// First grid point that P3 supplies.
     pub third_from: Option<usize>,
     /// Mean difference signal, orders 0 to (N − 1)/2, µm.
@@ -78,6 +80,7 @@ pub(super) fn group(
         });
         if let Some(own) = own {
             own.scans.push(i);
+            own.filled += scan.filled.len();
             continue;
         }
         let mut beyond = vec![0.0; samples];
@@ -89,6 +92,7 @@ pub(super) fn group(
             spacing: scan.spacing,
             scans: vec![i],
             samples,
+            filled: scan.filled.len(),
             third_from: joint.third_from,
             mean: Vec::new(),
             step: coefficients(&beyond, orders),

@@ -43,6 +43,8 @@ pub struct Joint {
     pub difference: Vec<f64>,
     /// P1, µm.
     pub first: Vec<f64>,
+    /// Grid points at which P1 was not read but taken from other scans.
+    pub first_filled: Vec<usize>,
     /// The first grid point that P3 supplies; nothing in the two-sensor method.
     pub third_from: Option<usize>,
     /// Rise of the workpiece over the section, µm: m₁(L) − m₁(0), if read and if the slide ends level.
@@ -80,6 +82,10 @@ pub fn join(scan: &Scan, section: Section) -> Result<Joint, FourierError> {
     Ok(Joint {
         difference,
         first: readings.iter().take(samples).map(|r| r.m1).collect(),
+        first_filled: (scan.filled.iter())
+            .filter(|f| f.first && f.index < samples)
+            .map(|f| f.index)
+            .collect(),
         third_from,
         rise,
     })

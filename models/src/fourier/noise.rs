@@ -98,7 +98,8 @@ fn enough(squares: f64, freedom: f64) -> Option<Scatter> {
     (freedom >= LEAST_FREEDOM).then_some(Scatter { squares, freedom })
 }
 
-/// Repeats share the workpiece in every order; their zeros and their steps may differ.
+/// Repeats share the workpiece in every order; their zeros and their steps may differ. A difference that was taken from
+/// the others scatters by nothing.
 fn of_repeats(groups: &[Group], spectra: &[Vec<Complex64>]) -> Option<Scatter> {
     let (mut squares, mut freedom) = (0.0, 0.0);
     for g in groups.iter().filter(|g| g.scans.len() > 1) {
@@ -115,7 +116,7 @@ fn of_repeats(groups: &[Group], spectra: &[Vec<Complex64>]) -> Option<Scatter> {
                     .sum::<f64>();
         }
         let unknowns = if g.has_step() { 1.0 } else { 0.0 };
-        freedom += (g.repeats() - 1.0) * (2.0 * g.highest() as f64 - unknowns);
+        freedom += (g.repeats() - 1.0) * (2.0 * g.highest() as f64 - unknowns) - g.filled as f64;
     }
     enough(squares, freedom)
 }

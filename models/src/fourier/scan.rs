@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::filled::Filled;
+
 /// What is measured: the section of the workpiece and how finely.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Section {
@@ -34,6 +36,9 @@ pub struct Scan {
     pub repeat: u32,
     /// Readings in order of x, evenly spaced from 0; the last may be at L.
     pub readings: Vec<ScanReading>,
+    /// Readings that were taken from other scans ([`fill`](super::fill)).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub filled: Vec<Filled>,
 }
 
 /// Why a scan cannot be separated.
@@ -79,6 +84,16 @@ pub enum FourierError {
         expected: f64,
         /// Position found, mm.
         found: f64,
+    },
+    /// A step of the grid without a row, or with one that P1 is missing in.
+    #[error("P1 has no reading at x = {x} mm, the next is at {next} mm")]
+    RowMissing {
+        /// Place in the scan of the next reading, from 0.
+        index: usize,
+        /// Position, mm.
+        x: f64,
+        /// Position of the next reading, mm.
+        next: f64,
     },
     /// The grid does not end at the section's end.
     #[error(
@@ -165,6 +180,7 @@ impl FourierError {
             Self::NotFinite { index, .. }
             | Self::Duplicate { index, .. }
             | Self::UnevenGrid { index, .. }
+            | Self::RowMissing { index, .. }
             | Self::SectionNotFilled { index, .. }
             | Self::ProbeMissing { index, .. }
             | Self::NoOverlap { index, .. } => Some(index),
@@ -205,7 +221,8 @@ impl Scan {
                 });
             }
         };
-        let steps = (length / (second - first)).round();
+        // A position that is missing makes one gap twice as long as the others.
+        let steps = (length / self.usual_gap().unwrap_or(second - first)).round();
         let step = length / steps;
         if !(step > 0.0 && step.is_finite()) {
             return Err(FourierError::UnevenGrid {
@@ -219,6 +236,14 @@ impl Scan {
         let tolerance = 1e-3 * step;
         for (index, r) in self.readings.iter().enumerate() {
             let expected = index as f64 * step;
+            let over = (r.x - expected) / step;
+            if over > 0.5 && (over - over.round()).abs() * step <= tolerance {
+                return Err(FourierError::RowMissing {
+                    index,
+                    x: expected,
+                    next: r.x,
+                });
+            }
             if (r.x - expected).abs() > tolerance {
                 return Err(FourierError::UnevenGrid {
                     index,
@@ -243,6 +268,14 @@ impl Scan {
             });
         }
         Ok(samples)
+    }
+
+    /// Median distance of neighbouring readings, mm.
+    pub(super) fn usual_gap(&self) -> Option<f64> {
+        let pairs = self.readings.windows(2);
+        let mut gaps: Vec<f64> = pairs.map(|pair| pair[1].x - pair[0].x).collect();
+        gaps.sort_by(f64::total_cmp);
+        gaps.get(gaps.len() / 2).copied()
     }
 
     /// Whether the scan has a third probe.

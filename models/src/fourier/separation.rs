@@ -88,6 +88,7 @@ pub fn separate(
         spread: profiled.spread,
         through_first: profiled.through_first,
         scans: same_length(&joined.joints, samples).count(),
+        weights: weights(&joined.joints, samples),
         first: first_scatter(&joined.joints, samples).map_or(1.0, |s| s / sigma),
     };
     let straightness_std = scaled(straightness_std);
@@ -150,7 +151,9 @@ fn same_length(joints: &[Joint], samples: usize) -> impl Iterator<Item = &Joint>
 fn first_scatter(joints: &[Joint], samples: usize) -> Option<f64> {
     let scans: Vec<&[f64]> = same_length(joints, samples).map(|j| &j.first[..]).collect();
     let n = samples as f64;
-    let freedom = (scans.len().checked_sub(1)? * samples.checked_sub(1)?) as f64;
+    let filled = same_length(joints, samples).map(|j| j.first_filled.len());
+    let freedom = scans.len().checked_sub(1)? * samples.checked_sub(1)?;
+    let freedom = freedom.saturating_sub(filled.sum()) as f64;
     let heights: Vec<f64> = scans.iter().map(|s| s.iter().sum::<f64>() / n).collect();
     let squares: f64 = (0..samples)
         .map(|k| {
@@ -165,6 +168,18 @@ fn first_scatter(joints: &[Joint], samples: usize) -> Option<f64> {
         })
         .sum();
     (freedom > 0.0 && squares > 0.0).then(|| (squares / freedom).sqrt())
+}
+
+/// Variance of the mean of P1 at each position over that where all scans have it.
+fn weights(joints: &[Joint], samples: usize) -> Vec<f64> {
+    let scans = same_length(joints, samples).count() as f64;
+    let mut read = vec![scans; samples];
+    for k in same_length(joints, samples).flat_map(|j| &j.first_filled) {
+        if let Some(read) = read.get_mut(*k) {
+            *read -= 1.0;
+        }
+    }
+    read.into_iter().map(|n| scans / n.max(1.0)).collect()
 }
 
 fn slide_of(joints: &[Joint], workpiece: &[f64]) -> Vec<f64> {

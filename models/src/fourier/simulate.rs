@@ -304,6 +304,7 @@ pub fn simulate_disturbed(
                 spacing,
                 repeat,
                 readings,
+                filled: Vec::new(),
             });
         }
     }

@@ -30,6 +30,8 @@ pub(super) struct Errors {
     pub through_first: Vec<Complex64>,
     /// Scans whose P1 is averaged for the slide.
     pub scans: usize,
+    /// Variance of that average at each position, over that where all scans have it.
+    pub weights: Vec<f64>,
     /// By how much P1 scatters from scan to scan, over the noise of a reading; 1 with one scan, which does
     /// not tell it.
     pub first: f64,
@@ -46,7 +48,8 @@ impl Errors {
         let (passed, own) = self.of_first();
         let mut white = |variance: f64| -> Vec<f64> {
             let scale = (variance / scans).sqrt();
-            (0..samples).map(|_| scale * normal(random)).collect()
+            let weights = self.weights.iter().take(samples);
+            weights.map(|w| w.sqrt() * scale * normal(random)).collect()
         };
         let (first, alone) = (white(passed), white(own));
         let series = self.spread.draw(
@@ -79,12 +82,10 @@ impl Errors {
         let (of_first, alone) = self.of_first();
         let passed: f64 = of_first * self.through_first.iter().map(|c| c.re).sum::<f64>();
         let first = of_first + alone;
-        let own = of_mean * (first - (first + 4.0 * passed) / samples);
-        let variance = |w: &f64| (own + w * w).max(0.0);
-        straightness_std
-            .iter()
-            .map(|w| variance(w).sqrt())
-            .collect()
+        let less = of_mean * (first + 4.0 * passed) / samples;
+        let at_places = straightness_std.iter().zip(&self.weights);
+        let variance = |(u, weight): (&f64, &f64)| of_mean * first * weight - less + u * u;
+        at_places.map(|at| variance(at).max(0.0).sqrt()).collect()
     }
 }
 

@@ -332,6 +332,7 @@ fn what_cannot_be_told_is_refused() {
 fn equal_tiny_and_huge_readings_give_finite_numbers() {
     let scan = |spacing: f64, size: f64, jump: f64| Scan {
         spacing,
+        filled: Vec::new(),
         repeat: 1,
         readings: (0..=100)
             .map(|k| ScanReading {

@@ -23,6 +23,7 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     };
     let setup = Setup::read(SetupFile::read(path)?)?;
     let measured = read(&args.data, &args.columns.map(), &setup)?;
+    measured.whole(&args.data)?;
     let points = measured.outputs.geometry().point_count();
     if points > MOST {
         return Err(Message::bad_input(format!(

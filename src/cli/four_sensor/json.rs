@@ -33,6 +33,9 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
             "repeats": found.measured.repeats,
         },
         "average": averaged(found).map(|text| json!({"of": "outputs", "text": text})),
+        "missing": found.measured.missing.iter().map(|m| json!({
+            "sensor": m.sensor, "x": m.x, "repeat": m.repeat,
+        })).collect::<Vec<_>>(),
         "straightness_error": {
             "reference": "minimum_zone",
             "value": zone.value,

@@ -1,5 +1,6 @@
 //! `errsep four-sensor`: surface, straightness and tilt from four sensors.
 
+mod gather;
 mod json;
 mod page;
 pub(super) mod read;

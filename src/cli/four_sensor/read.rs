@@ -1,11 +1,12 @@
 //! Reading the outputs: tidy (`sensor,x,reading`) or wide (`x,m1,m2,m3,m4`), with repeats or without.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use errsep_models::four_sensor::{Geometry, Outputs, Parabola};
 
+use super::gather::{Cell, Gathered, Missing, gather};
 use super::setup::Setup;
+use crate::io::message::Place;
 use crate::io::{ColumnMap, Message, TableReader};
 
 /// Outputs and what their repeats say of the noise.
@@ -20,15 +21,41 @@ pub(in crate::cli) struct Measured {
     pub noise: Option<f64>,
     /// Degrees of freedom of that.
     pub freedom: usize,
+    /// Readings of single repeats that are missing.
+    pub missing: Vec<Missing>,
+    /// Where what is missing would have to stand.
+    lines: Vec<usize>,
+}
+
+impl Measured {
+    /// Refuses readings that are missing, for what looks at each repeat by itself.
+    pub(in crate::cli) fn whole(&self, path: &Path) -> Result<(), Message> {
+        let Some((missing, line)) = self.missing.iter().zip(&self.lines).next() else {
+            return Ok(());
+        };
+        let what = format!(
+            "sensor {} has no reading at {} mm in repeat {}, and causes are sought in each repeat by itself",
+            missing.sensor, missing.x, missing.repeat
+        );
+        let remedy = format!("measure it again, or leave out repeat {}", missing.repeat);
+        Err(Message::bad_input(what).remedy(remedy).at(Place {
+            file: path.to_owned(),
+            line: *line,
+            column: 1,
+            text: String::new(),
+            length: 0,
+        }))
+    }
 }
 
 /// One reading and its line.
-struct Reading {
-    sensor: usize,
-    repeat: u32,
-    x: f64,
-    value: f64,
-    line: usize,
+pub(super) struct Reading {
+    pub sensor: usize,
+    pub repeat: u32,
+    pub x: f64,
+    /// None where the field is empty.
+    pub value: Option<f64>,
+    pub line: usize,
 }
 
 pub(in crate::cli) fn read(
@@ -47,7 +74,15 @@ pub(in crate::cli) fn read(
     }
     let positions = positions(&readings);
     let step = step(&table, &readings, &positions)?;
-    let (cells, repeats) = cells(&table, &readings, &positions)?;
+    // A zero that is stated for all repeats is known no better than they agree.
+    let zeroed = !matches!(setup.settings.parabola, Parabola::ZeroAdjustment(_));
+    let Gathered {
+        cells,
+        repeats,
+        variances,
+        missing,
+        lines,
+    } = gather(&table, &readings, &positions, zeroed)?;
 
     let multiples = multiples(setup, step)?;
     let geometry = Geometry::new(step, multiples, positions.len()).map_err(|error| {
@@ -60,11 +95,10 @@ pub(in crate::cli) fn read(
         .iter()
         .map(|cell| std::array::from_fn(|sensor| mean(&cell[sensor])))
         .collect();
-    // A zero that is stated for all repeats is known no better than they agree.
-    let zeros = matches!(setup.settings.parabola, Parabola::ZeroAdjustment(_));
-    let scatter = scatter(&cells, repeats, !zeros);
+    let scatter = scatter(&cells, repeats, zeroed, missing.len());
     let outputs = Outputs::new(geometry, positions[0], rows)
-        .map_err(|error| Message::bad_input(error.to_string()).in_file(path))?;
+        .map_err(|error| Message::bad_input(error.to_string()).in_file(path))?
+        .with_variances(variances);
     let each = (0..repeats)
         .map(|repeat| {
             let rows = cells
@@ -82,14 +116,18 @@ pub(in crate::cli) fn read(
         // Repeats that agree to the last digit say nothing of the noise.
         noise: scatter.map(|s| s.0).filter(|noise| *noise > 0.0),
         freedom: scatter.map_or(0, |s| s.1),
+        missing,
+        lines,
     })
 }
 
 /// Standard deviation of the averaged reading by the scatter of the repeats, µm, and its degrees of freedom; where sensors may be
-/// zeroed anew before each repeat about the height of each.
-fn scatter(cells: &[Cell], repeats: usize, zeroed: bool) -> Option<(f64, usize)> {
+/// zeroed anew before each repeat about the height of each. What was filled in for `missing` readings lies where the
+/// others have it and adds nothing.
+fn scatter(cells: &[Cell], repeats: usize, zeroed: bool, missing: usize) -> Option<(f64, usize)> {
     let heights = usize::from(zeroed);
     let freedom = 4 * repeats.saturating_sub(1) * (cells.len() - heights);
+    let freedom = freedom.saturating_sub(missing);
     let mut squares = 0.0;
     for sensor in 0..4 {
         let apart = |cell: &Cell, repeat: usize| {
@@ -130,7 +168,10 @@ fn tidy(table: &mut TableReader) -> Result<Vec<Reading>, Message> {
                 .as_ref()
                 .map_or(Ok(1), |column| repeat_number(&row, column))?,
             x: row.number(&at)?,
-            value: row.number(&value)?,
+            value: match row.is_empty(&value) {
+                true => None,
+                false => Some(row.number(&value)?),
+            },
             line: row.line(),
         });
     }
@@ -157,7 +198,10 @@ fn wide(table: &mut TableReader) -> Result<Vec<Reading>, Message> {
                 sensor: index,
                 repeat,
                 x,
-                value: row.number(column)?,
+                value: match row.is_empty(column) {
+                    true => None,
+                    false => Some(row.number(column)?),
+                },
                 line: row.line(),
             });
         }
@@ -214,56 +258,6 @@ fn step(table: &TableReader, readings: &[Reading], positions: &[f64]) -> Result<
             .remedy("measure at equally spaced positions, without gaps"));
     }
     Ok((last - first) / (positions.len() - 1) as f64)
-}
-
-/// The repeated readings of each sensor at one position.
-type Cell = [Vec<f64>; 4];
-
-/// Readings of each position and sensor, and their common number of repeats.
-fn cells(
-    table: &TableReader,
-    readings: &[Reading],
-    positions: &[f64],
-) -> Result<(Vec<Cell>, usize), Message> {
-    let mut cells: Vec<Cell> = vec![Default::default(); positions.len()];
-    let mut seen = BTreeMap::new();
-    let mut by_repeat: Vec<&Reading> = readings.iter().collect();
-    by_repeat.sort_by_key(|r| r.repeat);
-    for reading in by_repeat {
-        let Ok(place) = positions.binary_search_by(|x| x.total_cmp(&reading.x)) else {
-            continue;
-        };
-        if let Some(before) = seen.insert((place, reading.sensor, reading.repeat), reading.line) {
-            return Err(table
-                .at_line(
-                    reading.line,
-                    format!(
-                        "sensor {} at {} mm is given again, first on line {before}",
-                        reading.sensor + 1,
-                        reading.x
-                    ),
-                )
-                .remedy("remove one of the two, or number repeats in a column `repeat`"));
-        }
-        cells[place][reading.sensor].push(reading.value);
-    }
-    let repeats = cells.iter().flatten().map(Vec::len).max().unwrap_or(0);
-    for (x, cell) in positions.iter().zip(&cells) {
-        if let Some(sensor) = cell.iter().position(|values| values.len() < repeats) {
-            let line = readings.iter().find(|r| r.x == *x).map_or(1, |r| r.line);
-            return Err(table
-                .at_line(
-                    line,
-                    format!(
-                        "sensor {} has {} of {repeats} readings at {x} mm",
-                        sensor + 1,
-                        cell[sensor].len()
-                    ),
-                )
-                .remedy("give all four sensors the same number of readings at every position"));
-        }
-    }
-    Ok((cells, repeats))
 }
 
 fn multiples(setup: &Setup, step: f64) -> Result<[usize; 3], Message> {

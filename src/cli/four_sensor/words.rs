@@ -137,9 +137,14 @@ pub(super) fn straightness(found: &Found) -> Result<String, Message> {
 /// How repeats were brought together; nothing without repeats.
 pub(super) fn averaged(found: &Found) -> Option<String> {
     let repeats = found.measured.repeats;
+    let missing = match found.measured.missing.len() {
+        0 => String::new(),
+        1 => "; one reading that a repeat lacks was filled in from the others".to_owned(),
+        n => format!("; {n} readings that single repeats lack were filled in from the others"),
+    };
     (repeats > 1).then(|| {
         format!(
-            "the outputs of {repeats} repeats were averaged first and lambda chosen for the average"
+            "the outputs of {repeats} repeats were averaged first and lambda chosen for the average{missing}"
         )
     })
 }

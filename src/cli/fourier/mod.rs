@@ -1,5 +1,6 @@
 //! `errsep fourier`: straightness by the Fourier two-sensor and three-sensor methods.
 
+mod missing;
 mod weighing;
 
 use std::fmt::Write;
@@ -16,10 +17,11 @@ use self::weighing::{methods, remarks};
 use super::diagnose::joined::{self, Given};
 use super::quantity::{COVERAGE, coverage_json, coverage_words, unexpandable};
 use super::{Answer, ColumnArgs, CommonArgs, disagreement};
-use crate::io::fourier::{FourierSetup, read_scans, told};
+use crate::io::fourier::{FourierSetup, LocatedScan, read_scans, told};
 use crate::io::{CsvTable, Message, Status};
 use crate::report::fourier::{FourierView, Method, Width, page};
 use crate::report::number;
+use missing::lacking;
 
 /// Orders kept where nothing is said.
 pub(super) const ORDERS: usize = 30;
@@ -105,13 +107,16 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         orders: setup.section.orders.unwrap_or(ORDERS),
     };
     let asked = setup.method.compensation;
-    let mut scans = Vec::new();
+    let mut located = Vec::new();
     for (index, path) in args.data.iter().enumerate() {
-        for located in read_scans(path, &args.columns.map(), spacings.get(index).copied())? {
-            located.check(section, asked)?;
-            scans.push(located.scan);
-        }
+        let spacing = spacings.get(index).copied();
+        located.extend(read_scans(path, &args.columns.map(), spacing)?);
     }
+    let missing = LocatedScan::fill(&mut located, section);
+    for scan in &located {
+        scan.check(section, asked)?;
+    }
+    let scans: Vec<Scan> = located.into_iter().map(|l| l.scan).collect();
     let combination = setup.method.combination;
     let answer = separate(&scans, section, asked, combination, setup.probe.noise)
         .map_err(|e| refused(&e, args))?;
@@ -120,7 +125,8 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         Width::of(&answer.slide_error())?,
     ];
     let methods = methods(&scans, section, asked, &answer);
-    let remarks = remarks(&answer, section, asked);
+    let mut remarks = remarks(&answer, section, asked);
+    remarks.extend(lacking(&missing));
     let name = args
         .data
         .iter()
@@ -333,6 +339,7 @@ fn as_json(
             "spacing": scan.spacing,
             "repeat": scan.repeat,
             "readings": scan.readings.len(),
+            "filled": scan.filled.iter().filter_map(|f| Some(scan.readings.get(f.index)?.x)).collect::<Vec<_>>(),
             "probes": if scan.has_third_probe() { 3 } else { 2 },
         })).collect::<Vec<_>>(),
         "noise": {"value": s.noise.0, "unit": "um", "source": s.noise.1, "first_probe": s.first_scatter},

@@ -1,5 +1,6 @@
 //! `errsep four-sensor` and `errsep simulate four-sensor` as a user runs them.
 
+mod missing;
 mod separated;
 mod told;
 

@@ -260,10 +260,9 @@ fn in_words(args: &Args, format: &str, exported: &Exported, about: &Path) -> Str
         text += &format!("  left out    {name}: {why}\n");
     }
     text += &format!("  sign        {}\n", exported.sign);
-    if let Some((missed, unit)) = exported.resampling {
-        let missed = crate::number::plain(missed, 2);
-        let unit = crate::io::units::symbol(unit);
-        text += &format!("  even points miss the measured values by {missed} {unit} at most\n");
+    let cost = export::in_words(&exported.missed, &exported.known, exported.position_unit);
+    for sentence in cost {
+        text += &format!("  points      {sentence}\n");
     }
     for step in &exported.load {
         text += &format!("  load        {step}\n");

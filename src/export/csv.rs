@@ -53,6 +53,9 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
         exported: tables.names(),
         not_exported: tables.errors.missing.clone(),
         rounding: (0.0, "mm or rad".to_owned()),
+        missed: tables.missed(),
+        known: tables.known(),
+        position_unit: "mm",
         load: Vec::new(),
         verify: "Convert one value by hand into the controller's form and verify it at one point."
             .to_owned(),

@@ -15,7 +15,7 @@ pub const FORMAT: Format = Format {
 fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
     let tables = tables(&FORMAT, content, request)?;
     let mut rounder = Rounder::default();
-    let mut text = String::new();
+    let mut text = tables.comments("//");
     for block in &tables.blocks {
         for column in &block.columns {
             text += &format!("[{}]\nGridpoints = {{\n", column.component);
@@ -38,6 +38,9 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
         exported: tables.names(),
         not_exported: tables.errors.missing.clone(),
         rounding: (rounder.largest, "mm or rad".to_owned()),
+        missed: tables.missed(),
+        known: tables.known(),
+        position_unit: "mm",
         load: vec![
             "in the list file: file[0] = the file, file_format[0] ETALON_EXCHANGE".to_owned(),
         ],

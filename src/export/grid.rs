@@ -1,6 +1,7 @@
 //! The errors of one axis at the positions that a file gets.
 
 use super::source::AxisErrors;
+use super::{Known, Missed};
 use crate::io::Message;
 
 /// An even grid from the first to the last position measured.
@@ -72,8 +73,10 @@ pub struct AxisTable {
     pub forward: Vec<f64>,
     /// The same backward.
     pub backward: Vec<f64>,
-    /// How far the grid misses a measured value at most.
-    pub resampling: Option<f64>,
+    /// How far the grid misses the means measured forward and backward at most, and where; mm or degrees.
+    pub missed: Option<[(f64, f64); 2]>,
+    /// Standard uncertainty of the forward and backward values, mm or degrees, where it is known.
+    pub std: Option<[Vec<f64>; 2]>,
 }
 
 impl AxisTable {
@@ -115,21 +118,61 @@ impl AxisTable {
                 .collect()
         };
         let (forward, backward) = (on(&errors.forward), on(&errors.backward));
-        let resampling = grid.map(|_| {
-            let missed = |table: &[f64], y: &[f64]| {
-                x.iter()
-                    .zip(y)
-                    .map(|(x, y)| (interpolate(&positions, table, *x) + zero - y).abs())
-                    .fold(0.0, f64::max)
-            };
-            missed(&forward, &errors.forward).max(missed(&backward, &errors.backward))
+        let missed = grid.map(|_| {
+            [(&forward, &errors.forward), (&backward, &errors.backward)].map(|(table, y)| {
+                let all = x.iter().zip(y).map(|(x, y)| {
+                    let missed = interpolate(&positions, table, *x) + zero - y;
+                    (*x, missed.abs())
+                });
+                all.fold(
+                    (first, 0.0),
+                    |worst, one| if one.1 > worst.1 { one } else { worst },
+                )
+            })
+        });
+        let known = errors.known.as_ref();
+        let std = known.map(|known| {
+            [0, 1].map(|d| {
+                let of =
+                    |at: &f64| known.std(x, [f64::from(d == 0), f64::from(d == 1)], *at, reference);
+                positions.iter().map(of).collect()
+            })
         });
         Ok(Self {
             positions,
             forward,
             backward,
-            resampling,
+            missed,
+            std,
         })
+    }
+
+    /// What is told of the table: what it misses and how well it is known, in `unit`, `per` of which are one mm or degree.
+    pub fn cost(
+        &self,
+        errors: &AxisErrors,
+        unit: &'static str,
+        per: f64,
+    ) -> (Vec<Missed>, Vec<Known>) {
+        let names: &[&str] = match errors.both {
+            true => &["mean forward", "mean backward"],
+            false => &["mean"],
+        };
+        let missed = self.missed.iter().flat_map(|both| names.iter().zip(both));
+        let missed = missed.map(|(of, (at, value))| Missed {
+            of: (*of).to_owned(),
+            value: value * per,
+            unit,
+            at: *at,
+        });
+        let known = self.std.iter().flat_map(|both| names.iter().zip(both));
+        let known = known.map(|(of, std)| Known {
+            of: (*of).to_owned(),
+            unit,
+            at: self.positions.clone(),
+            std: std.iter().map(|u| u * per).collect(),
+        });
+        (missed.collect(), known.collect())
     }
 
     /// The mean of both directions.
@@ -164,14 +207,22 @@ impl AxisTable {
 
 /// Straight lines between the values, constant outside.
 pub(super) fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
+    shares(x, at)
+        .into_iter()
+        .map(|(i, share)| share * y.get(i).copied().unwrap_or_default())
+        .sum()
+}
+
+/// Which values a straight line between takes, and the share of each.
+pub(super) fn shares(x: &[f64], at: f64) -> [(usize, f64); 2] {
     let next = x.partition_point(|x| *x <= at);
-    let of = |i: usize| (x.get(i).copied(), y.get(i).copied());
-    match (next.checked_sub(1).map(of), of(next)) {
-        (None, (_, Some(first))) => first,
-        (Some((_, Some(last))), (None, _)) => last,
-        (Some((Some(x0), Some(y0))), (Some(x1), Some(y1))) => {
-            y0 + (y1 - y0) * (at - x0) / (x1 - x0)
+    match (next.checked_sub(1), x.get(next)) {
+        (None, _) => [(0, 1.0), (0, 0.0)],
+        (Some(last), None) => [(last, 1.0), (last, 0.0)],
+        (Some(before), Some(x1)) => {
+            let x0 = x[before];
+            let share = (at - x0) / (x1 - x0);
+            [(before, 1.0 - share), (next, share)]
         }
-        _ => 0.0,
     }
 }

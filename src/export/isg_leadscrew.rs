@@ -71,6 +71,7 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
             text += &format!("kw.ssfk.table[{i}].{name} {value}\n");
         }
     }
+    let (missed, known) = table.cost(errors, "um", um_from_mm(1.0));
     Ok(Exported {
         text,
         axis: Some(number.to_string()),
@@ -80,7 +81,9 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
         exported: super::both_means(errors),
         not_exported: super::one_direction(errors),
         rounding: (rounder.largest, "0.1 um".to_owned()),
-        resampling: table.resampling.map(|r| (um_from_mm(r), "um")),
+        missed,
+        known,
+        position_unit: errors.position_unit(),
         load: vec!["lr_param.ssfk 1 in the list of the axis".to_owned()],
         verify: "Measure again with the list loaded: E and B must fall to the noise.".to_owned(),
         ..Exported::default()

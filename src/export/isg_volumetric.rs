@@ -50,7 +50,7 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
         parts.push(format!("{}\n{}\n", names.join(" "), values.join(" ")));
     }
     Ok(Exported {
-        text: parts.join("#\n"),
+        text: tables.comments("//") + &parts.join("#\n"),
         list: Some(list(&request.file_name, tables.errors.chain.as_deref())?),
         unit: "mm, rad".to_owned(),
         sign: SIGN.to_owned(),
@@ -58,6 +58,9 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
         exported: tables.names(),
         not_exported: tables.errors.missing.clone(),
         rounding: (rounder.largest, "mm or rad".to_owned()),
+        missed: tables.missed(),
+        known: tables.known(),
+        position_unit: "mm",
         load: vec![
             "in the list file: file[0] with the folder of the controller in which the file stands"
                 .to_owned(),

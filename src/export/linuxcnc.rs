@@ -52,6 +52,7 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
     } else {
         um_from_mm(1.0)
     };
+    let (missed, known) = table.cost(errors, super::deviation_unit(errors), per);
     Ok(Exported {
         text,
         axis,
@@ -63,7 +64,9 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
         exported: super::both_means(errors),
         not_exported: super::one_direction(errors),
         rounding: (rounder.largest, unit.to_owned()),
-        resampling: table.resampling.map(|r| (r * per, super::deviation_unit(errors))),
+        missed,
+        known,
+        position_unit: errors.position_unit(),
         load: vec![
             "[JOINT_n] COMP_FILE = the file, COMP_FILE_TYPE = 0, in the set-up of the controller".to_owned(),
             "BACKLASH of this joint is ignored beside it".to_owned(),

@@ -4,6 +4,7 @@
 //! of its file and says with what sign, what was left out and how far rounding moved a value.
 
 mod certificate;
+mod cost;
 mod csv;
 mod etalon;
 pub mod exact;
@@ -25,6 +26,7 @@ mod volumetric;
 use serde_json::{Value, json};
 
 pub use certificate::{Admin, Entry, Group, Numbers, Uncertainty};
+pub use cost::{Known, Missed, in_words};
 pub use grid::{AxisTable, Grid};
 pub use loaded::Loaded;
 pub use source::{AxisErrors, Content, MachineErrors, StraightnessProfile, read};
@@ -199,8 +201,12 @@ pub struct Exported {
     pub not_exported: Vec<(String, String)>,
     /// How far rounding moved a value at most, in `unit` or in what is named.
     pub rounding: (f64, String),
-    /// How far an even grid misses a measured value at most, µm or seconds of arc.
-    pub resampling: Option<(f64, &'static str)>,
+    /// How far the table misses each error between its points, where it has points of its own.
+    pub missed: Vec<Missed>,
+    /// How well the values are known, as far as the result tells.
+    pub known: Vec<Known>,
+    /// Unit of the positions of these: mm or deg.
+    pub position_unit: &'static str,
     /// What to do in the controller.
     pub load: Vec<String>,
     /// How to see that the sign is right.
@@ -226,10 +232,27 @@ impl Exported {
             "exported": self.exported,
             "not_exported": left,
             "largest_rounding": {"value": self.rounding.0, "unit": self.rounding.1},
-            "resampling": self.resampling.map(|(value, unit)| json!({"value": value, "unit": unit})),
+            "resampling": self.resampling(),
+            "uncertainty": self.known.iter().map(Known::as_json).collect::<Vec<_>>(),
+            "position_unit": (!self.position_unit.is_empty()).then_some(self.position_unit),
             "load": self.load,
             "verify": self.verify,
         })
+    }
+}
+
+impl Exported {
+    /// The worst of the unit that comes first (lengths before angles), and that of each error.
+    fn resampling(&self) -> Option<Value> {
+        let unit = self
+            .missed
+            .iter()
+            .map(|m| m.unit)
+            .min_by_key(|u| *u == "rad")?;
+        let own = self.missed.iter().filter(|m| m.unit == unit);
+        let mut told = own.max_by(|a, b| a.value.total_cmp(&b.value))?.as_json();
+        told["each"] = self.missed.iter().map(Missed::as_json).collect();
+        Some(told)
     }
 }
 

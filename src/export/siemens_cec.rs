@@ -27,6 +27,7 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
         forward: profile.deviations.clone(),
         backward: profile.deviations.clone(),
         both: false,
+        known: None,
     };
     let table = AxisTable::of(&errors, request.grid, request.reference)?;
     let step = table.step(FORMAT.name)?;
@@ -53,6 +54,11 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
         );
     }
     text += "$AN_CEC_DIRECTION[0]=0\n$AN_CEC_MULT_BY_TABLE[0]=0\n$AN_CEC_IS_MODULO[0]=0\nM17\n";
+    let (mut missed, mut known) = table.cost(&errors, "um", um_from_mm(1.0));
+    known.extend(profile.known(&table.positions));
+    missed
+        .iter_mut()
+        .for_each(|m| m.of.clone_from(&profile.name));
     Ok(Exported {
         text,
         axis: Some(format!("{input}:{output}")),
@@ -67,7 +73,9 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
             "the slope of a straightness is squareness or alignment, no straightness".to_owned(),
         )],
         rounding: (rounder.largest, unit.name().to_owned()),
-        resampling: table.resampling.map(|r| (um_from_mm(r), "um")),
+        missed,
+        known,
+        position_unit: errors.position_unit(),
         load: vec![
             "MD32710 $MA_CEC_ENABLE = 0 while loading, 1 afterwards".to_owned(),
             format!("MD18342 $MN_MM_CEC_MAX_POINTS[0] ≥ {}", table.positions.len()),

@@ -57,6 +57,7 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
     } else {
         um_from_mm(1.0)
     };
+    let (missed, known) = table.cost(errors, super::deviation_unit(errors), per);
     Ok(Exported {
         text,
         axis: Some(axis),
@@ -66,9 +67,9 @@ fn write(content: &Content, request: &Request) -> Result<Exported, Message> {
         exported: vec!["mean of both directions at each point".to_owned()],
         not_exported,
         rounding: (rounder.largest, unit.to_owned()),
-        resampling: table
-            .resampling
-            .map(|r| (r * per, super::deviation_unit(errors))),
+        missed,
+        known,
+        position_unit: errors.position_unit(),
         load: vec![
             "MD32700 $MA_ENC_COMP_ENABLE = 0 while loading, 1 afterwards".to_owned(),
             format!(

@@ -1,15 +1,18 @@
 //! What a result holds for a controller or a certificate.
 
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 
 use errsep_models::machine::{COMPONENTS, Component, ErrorFunction, Kind as ComponentKind, Side};
 use serde_json::Value;
 
+use super::Known;
 use super::certificate::Numbers;
+use super::grid;
 use super::loaded::Loaded;
 use crate::io::machine::read_filed;
-use crate::io::units::{ARCSEC_PER_DEG, UM_PER_MM, mm_from_um};
+use crate::io::units::{ARCSEC_PER_DEG, UM_PER_MM, mm_from_um, um_from_mm};
 use crate::io::{Message, source::Source};
 
 /// A longer file is no result, bytes.
@@ -43,6 +46,58 @@ pub struct AxisErrors {
     pub backward: Vec<f64>,
     /// Whether both directions were measured.
     pub both: bool,
+    /// How well the deviations are known, where the result tells it.
+    pub known: Option<Scatter>,
+}
+
+/// How well the means of a positioning test are known: mm, of a rotary axis degrees.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scatter {
+    /// Standard uncertainty of the mean at each target, forward and backward, from the scatter of the readings;
+    /// independent of each other.
+    pub means: [Vec<f64>; 2],
+    /// Whether both are the same mean.
+    pub one_direction: bool,
+    /// Standard uncertainty of the last deviation against the first, in proportion between.
+    pub of_length: f64,
+    /// Standard uncertainty of each mean beside its scatter.
+    pub of_mean: f64,
+}
+
+impl Scatter {
+    /// Standard uncertainty of `weights` of the forward and the backward mean at a place, straight lines between the
+    /// targets `x`, less the mean of both directions at the reference (else nothing).
+    pub(super) fn std(&self, x: &[f64], weights: [f64; 2], at: f64, reference: Option<f64>) -> f64 {
+        let mut shares: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+        let mut add = |place: f64, weights: [f64; 2]| {
+            for (i, share) in grid::shares(x, place) {
+                for (d, weight) in weights.into_iter().enumerate() {
+                    let d = if self.one_direction { 0 } else { d };
+                    *shares.entry((d, i)).or_default() += weight * share;
+                }
+            }
+        };
+        add(at, weights);
+        if let Some(zero) = reference {
+            add(zero, [-0.5, -0.5]);
+        }
+        let (first, last) = (x.first().copied(), x.last().copied());
+        let length = last.zip(first).map_or(1.0, |(last, first)| last - first);
+        let from = reference.or(first).unwrap_or_default();
+        let of = |((d, i), share): (&(usize, usize), &f64)| {
+            let mean = self.means[*d].get(*i).copied().unwrap_or_default();
+            share * share * (mean * mean + self.of_mean * self.of_mean)
+        };
+        let squares: f64 = shares.iter().map(of).sum();
+        (squares + (self.of_length * (at - from) / length).powi(2)).sqrt()
+    }
+}
+
+impl AxisErrors {
+    /// Unit of its positions: mm or deg.
+    pub(super) const fn position_unit(&self) -> &'static str {
+        if self.rotary { "deg" } else { "mm" }
+    }
 }
 
 /// A straightness profile, mm over mm.
@@ -54,6 +109,23 @@ pub struct StraightnessProfile {
     pub positions: Vec<f64>,
     /// Deviations.
     pub deviations: Vec<f64>,
+    /// Their standard uncertainties, where the result tells them.
+    pub std: Option<Vec<f64>>,
+}
+
+impl StraightnessProfile {
+    /// How well straight lines between its points are known: as well as these are at most, as what their errors have
+    /// in common is not told.
+    pub(super) fn known(&self, at: &[f64]) -> Option<Known> {
+        let std = self.std.as_ref()?;
+        let of = |x: &f64| um_from_mm(grid::interpolate(&self.positions, std, *x));
+        Some(Known {
+            of: self.name.clone(),
+            unit: "um",
+            at: at.to_vec(),
+            std: at.iter().map(of).collect(),
+        })
+    }
 }
 
 /// Component errors under their ISO 230-1 names: mm and rad over mm.
@@ -61,6 +133,8 @@ pub struct StraightnessProfile {
 pub struct MachineErrors {
     /// Functions of the coordinate of their axis, in µm and rad as the model has them.
     pub functions: Vec<(Component, ErrorFunction)>,
+    /// Standard uncertainties of the values of tables, in µm and rad, where the result tells them.
+    pub stds: Vec<(Component, Vec<f64>)>,
     /// A0Z, B0Z and C0Y, rad, where they are told.
     pub squareness: Vec<(Component, f64)>,
     /// What is not told, and why.
@@ -118,21 +192,33 @@ pub fn read(path: &Path) -> Result<Loaded, Message> {
 pub(super) fn for_controller(schema: &str, result: &Value) -> Option<Option<Content>> {
     Some(match schema {
         "errsep.positioning/1" => positioning(result).map(Content::Positioning),
-        "errsep.straightness/1" => {
-            straightness("straightness", &result["profile"], "x", "least_squares")
-        }
-        "errsep.reversal/1" => straightness("form M of the slide", &result["forms"], "x", "M"),
+        "errsep.straightness/1" => straightness(
+            "straightness",
+            &result["profile"],
+            "x",
+            "least_squares",
+            None,
+        ),
+        "errsep.reversal/1" => straightness(
+            "form M of the slide",
+            &result["forms"],
+            "x",
+            "M",
+            Some("M_std"),
+        ),
         "errsep.four-sensor/1" => straightness(
             "straightness S of the slide",
             &result["straightness"],
             "x",
             "S",
+            Some("S_std"),
         ),
         "errsep.fourier/1" => straightness(
             "straightness of the slide",
             &result["profiles"],
             "x",
             "slide",
+            Some("slide_std"),
         ),
         "errsep.step-diagonal/1" => step_diagonal(result).map(Content::Machine),
         "errsep.machine/1" => machine_result(result).map(Content::Machine),
@@ -174,6 +260,7 @@ fn positioning(result: &Value) -> Option<AxisErrors> {
     let positions: Option<Vec<f64>> = points.iter().map(|p| p["target"].as_f64()).collect();
     let (forward, backward) = (of("mean_forward"), of("mean_backward"));
     let both = forward.is_some() && backward.is_some();
+    let known = scatter(result, points, scale, both);
     let one = forward.clone().or_else(|| backward.clone())?;
     Some(AxisErrors {
         name: result["axis"]["name"].as_str().map(str::to_owned),
@@ -182,22 +269,69 @@ fn positioning(result: &Value) -> Option<AxisErrors> {
         forward: forward.unwrap_or_else(|| one.clone()),
         backward: backward.unwrap_or(one),
         both,
+        known,
     })
 }
 
-fn straightness(name: &str, profile: &Value, x: &str, y: &str) -> Option<Content> {
+/// From the scatter of one reading where that is alike everywhere and readings are independent, else from that at each
+/// target; nothing with one run.
+fn scatter(result: &Value, points: &[Value], scale: f64, both: bool) -> Option<Scatter> {
+    let told = &result["scatter"];
+    let not_alike = [
+        ("equal", "differs"),
+        ("independent", "depends"),
+        ("runs", "differ"),
+    ];
+    let pooled = told["std"].as_f64();
+    let pooled = pooled.filter(|_| not_alike.iter().all(|(key, is)| told[key][is] != true));
+    let of = |direction: &str| -> Option<Vec<f64>> {
+        points
+            .iter()
+            .map(|p| {
+                let count = p[format!("readings_{direction}")].as_f64();
+                let count = count
+                    .or_else(|| result["runs"].as_f64())
+                    .filter(|n| *n > 1.0)?;
+                let own = p[format!("s_{direction}")].as_f64()?;
+                Some(pooled.unwrap_or(own) / count.sqrt() / scale)
+            })
+            .collect()
+    };
+    let (forward, backward) = (of("forward"), of("backward"));
+    let one = forward.clone().or_else(|| backward.clone())?;
+    // As stated, k = 2.
+    let stated = |key: &str| 0.5 * result["uncertainty"][key].as_f64().unwrap_or_default() / scale;
+    let lengths = ["device", "misalignment", "expansion"].map(stated);
+    Some(Scatter {
+        means: [
+            forward.unwrap_or_else(|| one.clone()),
+            backward.unwrap_or(one),
+        ],
+        one_direction: !both,
+        of_length: lengths.iter().fold(0.0_f64, |sum, u| sum.hypot(*u)),
+        // It is of the difference of two means.
+        of_mean: stated("drift") / std::f64::consts::SQRT_2,
+    })
+}
+
+fn straightness(name: &str, profile: &Value, x: &str, y: &str, u: Option<&str>) -> Option<Content> {
     let (x, y) = (numbers(&profile[x])?, numbers(&profile[y])?);
     if x.len() != y.len() {
         return None;
     }
-    let mut points: Vec<(f64, f64)> = x.into_iter().zip(y).collect();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (positions, deviations): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+    let u = u
+        .and_then(|u| numbers(&profile[u]))
+        .filter(|u| u.len() == x.len());
+    let mut order: Vec<usize> = (0..x.len()).collect();
+    order.sort_by(|a, b| x[*a].total_cmp(&x[*b]));
+    let positions: Vec<f64> = order.iter().map(|i| x[*i]).collect();
+    let in_mm = |values: Vec<f64>| order.iter().map(|i| mm_from_um(values[*i])).collect();
     ascending(&positions).then(|| {
         Content::Straightness(StraightnessProfile {
             name: name.to_owned(),
+            deviations: in_mm(y),
+            std: u.map(in_mm),
             positions,
-            deviations: deviations.into_iter().map(mm_from_um).collect(),
         })
     })
 }
@@ -219,6 +353,9 @@ fn step_diagonal(result: &Value) -> Option<MachineErrors> {
                 };
                 function.check(component).ok()?;
                 found.functions.push((component, function));
+                found
+                    .stds
+                    .extend(numbers(&entry["std"]).map(|std| (component, std)));
                 if determined == "shape-only" {
                     let why = "the readings do not determine it".to_owned();
                     found.missing.push((format!("slope of {name}"), why));

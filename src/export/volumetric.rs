@@ -2,7 +2,7 @@
 
 use errsep_models::machine::{Axis, Component, ErrorFunction, Kind as ComponentKind};
 
-use super::{Content, Format, MachineErrors, Request};
+use super::{Content, Format, Known, MachineErrors, Missed, Request};
 use crate::io::Message;
 use crate::io::units::mm_from_um;
 
@@ -30,6 +30,22 @@ pub(super) fn unit_of(component: Component) -> &'static str {
     match component.kind {
         ComponentKind::Translation => "mm",
         _ => "rad",
+    }
+}
+
+/// The unit in which it was found.
+fn found_unit(component: Component) -> &'static str {
+    match component.kind {
+        ComponentKind::Translation => "um",
+        _ => "rad",
+    }
+}
+
+/// One of that unit in the unit of a file.
+fn own_unit(component: Component) -> f64 {
+    match component.kind {
+        ComponentKind::Translation => mm_from_um(1.0),
+        _ => 1.0,
     }
 }
 
@@ -158,7 +174,84 @@ fn positions(
     Ok(all)
 }
 
+/// Places between two points at which a curve is compared with the straight line.
+const BETWEEN: usize = 32;
+
 impl Tables<'_> {
+    /// How far straight lines between the points miss each error; nothing where every table stands as it is.
+    pub fn missed(&self) -> Vec<Missed> {
+        let of = |block: &Block, column: &Column| {
+            let function = self.function(column.component)?;
+            let (x, last) = (&block.positions, block.positions.last()?);
+            let within = |at: &f64| x.first().is_some_and(|first| first <= at) && at <= last;
+            let places: Vec<f64> = match function {
+                ErrorFunction::Table { positions, .. } => {
+                    positions.iter().copied().filter(within).collect()
+                }
+                ErrorFunction::Polynomial { .. } => {
+                    let between = |pair: &[f64]| {
+                        let (from, length) = (pair[0], pair[1] - pair[0]);
+                        (1..BETWEEN).map(move |k| from + length * k as f64 / BETWEEN as f64)
+                    };
+                    x.windows(2).flat_map(between).collect()
+                }
+            };
+            let missed = places.into_iter().filter_map(|at| {
+                let found = function.value(column.component, at).ok()?;
+                let line = super::grid::interpolate(x, &column.values, at);
+                Some((at, (line / own_unit(column.component) - found).abs()))
+            });
+            let name = column.component.to_string();
+            Missed::greatest(&name, found_unit(column.component), missed)
+        };
+        let blocks = self.blocks.iter();
+        let all: Vec<Missed> = blocks
+            .flat_map(|block| block.columns.iter().filter_map(move |c| of(block, c)))
+            .collect();
+        // Of a millionth of a micrometre and less nothing is told: that is rounding.
+        let told = all
+            .iter()
+            .any(|m| m.value > if m.unit == "um" { 1e-6 } else { 1e-12 });
+        if told { all } else { Vec::new() }
+    }
+
+    /// How well the values are known, where the result tells it.
+    pub fn known(&self) -> Vec<Known> {
+        let of = |block: &Block, column: &Column| {
+            let own = self
+                .errors
+                .stds
+                .iter()
+                .find(|(c, _)| *c == column.component)?;
+            let Some(ErrorFunction::Table { positions, .. }) = self.function(column.component)
+            else {
+                return None;
+            };
+            let std = |x: &f64| super::grid::interpolate(positions, &own.1, *x);
+            Some(Known {
+                of: column.component.to_string(),
+                unit: found_unit(column.component),
+                at: block.positions.clone(),
+                std: block.positions.iter().map(std).collect(),
+            })
+        };
+        let blocks = self.blocks.iter();
+        blocks
+            .flat_map(|block| block.columns.iter().filter_map(move |c| of(block, c)))
+            .collect()
+    }
+
+    /// What this costs as comments of a file, each line after `mark`.
+    pub fn comments(&self, mark: &str) -> String {
+        super::cost::comments(mark, &self.missed(), &self.known())
+    }
+
+    fn function(&self, component: Component) -> Option<&ErrorFunction> {
+        let mut all = self.errors.functions.iter();
+        all.find(|(c, _)| *c == component)
+            .map(|(_, function)| function)
+    }
+
     /// The names of what stands in the file.
     pub fn names(&self) -> Vec<String> {
         let functions = self.blocks.iter().flat_map(|b| &b.columns);

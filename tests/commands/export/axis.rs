@@ -21,6 +21,7 @@ fn axes() -> impl Strategy<Value = AxisErrors> {
             forward: cells.iter().map(|c| c.1).collect(),
             backward: cells.iter().map(|c| c.2).collect(),
             both: true,
+            known: None,
         }
     })
 }
@@ -135,6 +136,7 @@ proptest! {
             name: "straightness".to_owned(),
             positions: axis.positions.clone(),
             deviations: axis.forward.clone(),
+            std: None,
         };
         let request = Request {
             axis: Some("X:Z".to_owned()),
@@ -154,8 +156,16 @@ proptest! {
             let value: f64 = line.parse().unwrap();
             prop_assert!((value - lines(&measured, x)).abs() <= 0.5e-7 + 1e-12);
         }
-        let missed = out.resampling.unwrap().0;
-        prop_assert!(points > 2 || missed >= 0.0);
+        // The worst of the knots of what was measured, at one of them; epsilons.
+        let table: Vec<(f64, f64)> = (0..points)
+            .map(|i| first + (last - first) * i as f64 / (points - 1) as f64)
+            .map(|x| (x, lines(&measured, x)))
+            .collect();
+        let worst = measured.iter().map(|(x, y)| (lines(&table, *x) - y).abs()).fold(0.0, f64::max);
+        prop_assert_eq!(out.missed.len(), 1);
+        prop_assert!((out.missed[0].value - 1e3 * worst).abs() < 1e-9);
+        let there = measured.iter().find(|(x, _)| *x == out.missed[0].at).unwrap();
+        prop_assert!(((lines(&table, there.0) - there.1).abs() - worst).abs() < 1e-12);
     }
 }
 
@@ -189,6 +199,7 @@ fn straight(count: usize) -> AxisErrors {
         backward: positions.iter().map(|x| 1e-5 * x + 0.004).collect(),
         positions,
         both: true,
+        known: None,
     }
 }
 
@@ -229,7 +240,8 @@ fn a_controller_keeps_so_many_points() {
     let out = export("linuxcnc", &content, &fewer).unwrap();
     assert_eq!(linuxcnc(&out.text).0.len(), 256);
     // A straight line loses nothing on another grid; tolerance: epsilons, in µm.
-    assert!(out.resampling.unwrap().0 < 1e-9);
+    assert!(out.missed.iter().all(|m| m.value < 1e-9));
+    assert_eq!(out.missed.len(), 2);
     let step = Request {
         grid: Some(Grid::Step(2.0)),
         ..Request::default()

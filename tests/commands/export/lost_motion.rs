@@ -39,6 +39,7 @@ fn axis(cells: &[(f64, f64)], lost: f64) -> AxisErrors {
         forward: cells.iter().map(|c| c.0 - lost).collect(),
         backward: cells.iter().map(|c| c.1).collect(),
         both: true,
+        known: None,
     }
 }
 

@@ -3,6 +3,7 @@
 mod axis;
 mod certificate;
 mod command_line;
+mod cost;
 mod lost_motion;
 mod machine;
 mod skew;

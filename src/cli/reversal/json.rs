@@ -3,6 +3,7 @@
 use errsep_models::reversal::simultaneous::Reached;
 use errsep_models::reversal::staged::Value as Measured;
 use errsep_models::reversal::{Convention, NOT_SHOWN};
+use errsep_models::uncertainty::Quantity;
 use serde_json::{Map, Value, json};
 
 use super::effects;
@@ -29,6 +30,7 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
         })).collect::<Vec<_>>(),
         "contrasts": contrasts(o)?,
         "effects": effects::json(&o.effects),
+        "thickness": thickness(o)?,
         "covariance": o.covariances.as_ref().map(|c| {
             json!({"names": c.names, "units": c.units, "matrix": c.matrix})
         }),
@@ -103,6 +105,16 @@ pub fn reached(reached: &Reached, ending: &str) -> Value {
 /// An angle with its degrees of freedom and expanded uncertainty.
 fn angle(o: &Outcome, label: &str, v: Measured) -> Result<Value, Message> {
     quantity_json(&o.quantity(label, v).map_err(unexpandable)?)
+}
+
+/// The thickness that was fitted; null where it was not.
+fn thickness(o: &Outcome) -> Result<Value, Message> {
+    let Some(found) = o.thickness else {
+        return Ok(Value::Null);
+    };
+    let quantity = Quantity::new("thickness", found.value, found.std, "mm");
+    let quantity = quantity.map_err(unexpandable)?;
+    quantity_json(&quantity.with_degrees_of_freedom(o.noise_freedom))
 }
 
 /// Every tilt of the convention by its name; null where these channels do not determine it.

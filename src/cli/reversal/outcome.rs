@@ -105,6 +105,8 @@ pub struct Outcome {
     pub effects: Vec<FittedEffect>,
     /// What they change in each reading, µm, in the order of the data.
     pub effect_changes: Vec<f64>,
+    /// Thickness of the artefact, mm, where it was fitted.
+    pub thickness: Option<Value>,
     /// Of tilts and effects, where they come from one fit.
     pub covariances: Option<Covariances>,
 }

@@ -226,6 +226,7 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         },
         knots: Some(knots(fit, setup)),
         warnings: warnings(fit, closure.as_ref(), setup),
+        thickness: setup.fit_thickness.then(|| fit.thickness()),
         effects: fit.effects.clone(),
         effect_changes: fit.effect_changes.clone(),
         covariances: Some(fit.covariances()),

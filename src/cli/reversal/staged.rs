@@ -62,6 +62,7 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         channels: s.lines.iter().map(|l| l.channel).collect(),
         still: false,
         method: s.removal.name(),
+        thickness: None,
         covariances: None,
         convention: s.convention,
         tilts,

@@ -202,3 +202,39 @@ fn an_indicator_that_stands_still_is_told() {
         );
     }
 }
+
+/// A thickness that is fitted is in the answer for programs as in that for people; kind: k·u.
+#[test]
+fn a_fitted_thickness_is_in_the_answer() {
+    let folder = TempDir::new().unwrap();
+    let words = "simulate reversal --alpha 60000 --thickness 42 --noise 0.02 --seed 7";
+    let (code, made, err) = run(folder.path(), &words.split(' ').collect::<Vec<_>>());
+    assert_eq!(code, Some(0), "{err}");
+    fs::write(folder.path().join("data.csv"), made).unwrap();
+    let setup = "[artefact]\nthickness = 40.0\nfit_thickness = true\n";
+    fs::write(folder.path().join("s.toml"), setup).unwrap();
+    let fit = [
+        "reversal",
+        "data.csv",
+        "--simultaneous",
+        "--setup",
+        "s.toml",
+    ];
+    let answer = json(folder.path(), &fit);
+    let found = &answer["thickness"];
+    let of = |key: &str| found[key].as_f64().unwrap();
+    assert_eq!(
+        (&found["unit"], &found["label"]),
+        (&"mm".into(), &"thickness".into())
+    );
+    assert!((of("value") - 42.0).abs() < 4.0 * of("std"), "{found}");
+    assert!(of("std") < 5.0 && found["expanded"]["lower"].as_f64().unwrap() < of("value"));
+    // What is known is not fitted.
+    fs::write(
+        folder.path().join("s.toml"),
+        "[artefact]\nthickness = 42.0\n",
+    )
+    .unwrap();
+    assert!(json(folder.path(), &fit)["thickness"].is_null());
+    assert!(json(folder.path(), &["reversal", "data.csv"])["thickness"].is_null());
+}

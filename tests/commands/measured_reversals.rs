@@ -134,6 +134,44 @@ fn cad_model_with_its_cone_in_the_fit() {
     }
 }
 
+/// The fit has the cone within its uncertainty. The diagnosis is of first order: traces at angles of ± α ± γ climb by
+/// 1 + α² + γ² times the cone on average.
+#[test]
+fn a_cone_of_first_order_is_that_of_the_fit_at_its_tilts() {
+    let Some(file) = data("cad_reversal/cad_reversal_2.csv") else {
+        return;
+    };
+    let file = file.to_str().unwrap();
+    let fit = [
+        "reversal",
+        file,
+        "--columns",
+        CAD_COLUMNS,
+        "--simultaneous",
+        "--with",
+        "taper",
+    ];
+    let fit = json(&fit);
+    let cone = &fit["effects"][0]["parameters"][0];
+    let [value, std] = ["value", "std"].map(|key| cone[key].as_f64().unwrap());
+    // Kind: k·u.
+    assert!((value - 0.05_f64.to_radians()).abs() < 3.0 * std, "{cone}");
+    let diagnosis = json(&["diagnose", file, "--columns", CAD_COLUMNS]);
+    let found = diagnosis["candidates"][0]["parameters"][0]["value"]
+        .as_f64()
+        .unwrap();
+    let squares: f64 = ["alpha", "gamma"]
+        .map(|t| degrees(&fit["tilts"][t]).to_radians().powi(2))
+        .iter()
+        .sum();
+    // Certified digits: readings rounded to 1e-5 mm over 100 mm in eleven positions of four traces.
+    assert!(
+        (found - value * (1.0 + squares)).abs() < 2.0 * std,
+        "{found} {value}"
+    );
+    assert!((found - value).abs() > 10.0 * std);
+}
+
 #[test]
 fn cad_model_whose_slide_was_shifted_not_tilted() {
     let Some(file) = data("cad_reversal/cad_reversal_1.csv") else {

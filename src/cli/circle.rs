@@ -193,7 +193,8 @@ fn form_in_words(alike: Option<f64>, arc: f64, points: usize) -> Option<String> 
         };
         format!(
             "Neighbouring deviations are alike (probability by chance {chance}): they hold form, which the \
-             uncertainties take for independent noise."
+             uncertainties take for independent noise. `errsep diagnose --model circle` looks for what makes it: lobes of \
+             the part, errors of the axes, a radius or a centre that drifts from point to point."
         )
     });
     let even = std::f64::consts::TAU / points.max(1) as f64;

@@ -277,3 +277,74 @@ fn the_zone_is_the_distance_of_two_circles_and_three_points_show_none() {
         "{told}"
     );
 }
+
+/// A radius that grows, or a centre that moves, evenly from the first point to the last: a spiral of our own making is named.
+/// One turn shows the step where it closes and little else, which either makes; four turns tell them apart.
+#[test]
+fn a_spiral_is_named() {
+    let folder = Folder::with(&[]);
+    for (turns, radius, along) in [
+        ("1", 0.010, [0.0, 0.0]),
+        ("4", 0.010, [0.0, 0.0]),
+        ("4", 0.0, [0.008, -0.005]),
+    ] {
+        let words = [
+            "simulate",
+            "circle",
+            "--positions",
+            "72",
+            "--repeats",
+            turns,
+            "--seed",
+            "3",
+        ];
+        let made = run(&folder, &words);
+        assert_eq!(made.status, 0, "{}", made.stderr);
+        let rows: Vec<&str> = made
+            .stdout
+            .lines()
+            .filter(|l| !l.starts_with('#'))
+            .collect();
+        let header: Vec<&str> = rows[0].split(',').collect();
+        let [at_x, at_y] = ["x", "y"].map(|name| header.iter().position(|h| *h == name).unwrap());
+        let mut text = rows[0].to_owned() + "\n";
+        for (k, row) in rows[1..].iter().enumerate() {
+            let mut fields: Vec<String> = row.split(',').map(str::to_owned).collect();
+            let [x, y]: [f64; 2] = [at_x, at_y].map(|i| fields[i].parse().unwrap());
+            let share = k as f64 / (rows.len() - 2) as f64;
+            let grown = 1.0 + share * radius / x.hypot(y);
+            fields[at_x] = (grown * x + share * along[0]).to_string();
+            fields[at_y] = (grown * y + share * along[1]).to_string();
+            text += &(fields.join(",") + "\n");
+        }
+        folder.write("spiral.csv", &text);
+        let answer = json(
+            &folder,
+            &[
+                "diagnose",
+                "spiral.csv",
+                "--model",
+                "circle",
+                "--format",
+                "json",
+            ],
+        );
+        let verdict = &answer["verdict"];
+        let (name, size) = match radius > 0.0 {
+            true => ("radius-growth", 10.0),
+            false => ("centre-drift", 8.0),
+        };
+        assert_eq!(verdict["effects"], serde_json::json!([name]), "{verdict}");
+        if turns == "1" {
+            let group = verdict["indistinguishable"].to_string();
+            assert!(group.contains("centre-drift"), "{group}");
+            let told = run(&folder, &["circle", "spiral.csv"]).stdout;
+            assert!(told.contains("`errsep diagnose --model circle`"), "{told}");
+        }
+        let candidates = answer["candidates"].as_array().unwrap();
+        let own = candidates.iter().find(|c| c["effect"] == name).unwrap();
+        let [value, std] = ["value", "std"].map(|key| own["parameters"][0][key].as_f64().unwrap());
+        // Kind: k·u.
+        assert!((value - size).abs() < 4.0 * std, "{own}");
+    }
+}

@@ -29,6 +29,8 @@ pub struct Known {
     pub at: Vec<f64>,
     /// Standard uncertainty of the value there, in `unit`.
     pub std: Vec<f64>,
+    /// Degrees of freedom of these, where they come from the scatter of a few readings.
+    pub degrees_of_freedom: Option<f64>,
 }
 
 impl Missed {
@@ -54,7 +56,10 @@ impl Missed {
 
 impl Known {
     pub(super) fn as_json(&self) -> Value {
-        json!({"of": self.of, "unit": self.unit, "at": self.at, "std": self.std})
+        json!({
+            "of": self.of, "unit": self.unit, "at": self.at, "std": self.std,
+            "degrees_of_freedom": self.degrees_of_freedom,
+        })
     }
 
     fn greatest(&self) -> Option<(f64, f64)> {

@@ -171,6 +171,7 @@ impl AxisTable {
             unit,
             at: self.positions.clone(),
             std: std.iter().map(|u| u * per).collect(),
+            degrees_of_freedom: errors.known.as_ref().map(|known| known.degrees_of_freedom),
         });
         (missed.collect(), known.collect())
     }

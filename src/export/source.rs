@@ -56,6 +56,8 @@ pub struct Scatter {
     /// Standard uncertainty of the mean at each target, forward and backward, from the scatter of the readings;
     /// independent of each other.
     pub means: [Vec<f64>; 2],
+    /// Degrees of freedom of the least known of them.
+    pub degrees_of_freedom: f64,
     /// Whether both are the same mean.
     pub one_direction: bool,
     /// Standard uncertainty of the last deviation against the first, in proportion between.
@@ -124,6 +126,7 @@ impl StraightnessProfile {
             unit: "um",
             at: at.to_vec(),
             std: at.iter().map(of).collect(),
+            degrees_of_freedom: None,
         })
     }
 }
@@ -284,19 +287,27 @@ fn scatter(result: &Value, points: &[Value], scale: f64, both: bool) -> Option<S
     ];
     let pooled = told["std"].as_f64();
     let pooled = pooled.filter(|_| not_alike.iter().all(|(key, is)| told[key][is] != true));
+    let count = |p: &Value, direction: &str| -> Option<f64> {
+        let own = p[format!("readings_{direction}")].as_f64();
+        own.or_else(|| result["runs"].as_f64()).filter(|n| *n > 1.0)
+    };
     let of = |direction: &str| -> Option<Vec<f64>> {
         points
             .iter()
             .map(|p| {
-                let count = p[format!("readings_{direction}")].as_f64();
-                let count = count
-                    .or_else(|| result["runs"].as_f64())
-                    .filter(|n| *n > 1.0)?;
                 let own = p[format!("s_{direction}")].as_f64()?;
-                Some(pooled.unwrap_or(own) / count.sqrt() / scale)
+                Some(pooled.unwrap_or(own) / count(p, direction)?.sqrt() / scale)
             })
             .collect()
     };
+    // Of the target that was read least, where each has its own.
+    let counts = points
+        .iter()
+        .flat_map(|p| ["forward", "backward"].map(|d| count(p, d)));
+    let own_freedom = counts.flatten().fold(f64::INFINITY, f64::min) - 1.0;
+    let pooled_freedom = told["degrees_of_freedom"]
+        .as_f64()
+        .filter(|_| pooled.is_some());
     let (forward, backward) = (of("forward"), of("backward"));
     let one = forward.clone().or_else(|| backward.clone())?;
     // As stated, k = 2.
@@ -307,6 +318,7 @@ fn scatter(result: &Value, points: &[Value], scale: f64, both: bool) -> Option<S
             forward.unwrap_or_else(|| one.clone()),
             backward.unwrap_or(one),
         ],
+        degrees_of_freedom: pooled_freedom.unwrap_or(own_freedom),
         one_direction: !both,
         of_length: lengths.iter().fold(0.0_f64, |sum, u| sum.hypot(*u)),
         // It is of the difference of two means.

@@ -233,6 +233,7 @@ impl Tables<'_> {
                 unit: found_unit(column.component),
                 at: block.positions.clone(),
                 std: block.positions.iter().map(std).collect(),
+                degrees_of_freedom: None,
             })
         };
         let blocks = self.blocks.iter();

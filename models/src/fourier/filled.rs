@@ -115,7 +115,7 @@ impl Grid {
         let samples = steps as usize;
         let joint = scan
             .has_third_probe()
-            .then(|| section.length - scan.spacing - 1e-6 * step);
+            .then_some(section.length - scan.spacing - 1e-6 * step);
         let mut places = vec![None; samples];
         for (at, r) in scan.readings.iter().enumerate() {
             let k = (r.x / step).round();

@@ -124,6 +124,8 @@ fn values_are_as_well_known_as_their_means() {
         );
         let known = about(&folder, data)["uncertainty"].clone();
         assert_eq!(known[0]["of"], "mean forward");
+        let freedom = |a: &Value| a["degrees_of_freedom"].as_f64().unwrap();
+        assert_eq!(freedom(&known[0]), freedom(&answer["scatter"]));
         let (at, forward) = (numbers(&known[0]["at"]), numbers(&known[0]["std"]));
         let of_mean = |k: usize| std * std / if k == 2 { 4.0 } else { 5.0 };
         for (i, (x, u)) in at.iter().zip(&forward).enumerate() {

@@ -19,7 +19,8 @@
 //! of noise κ = n ν/v is taken as anywhere from 0 to 1 with equal probability (Strawderman 1971, Daniels 1999), each q as
 //! probable as the others. Given A and q the detail of that step has the mean square s² D + s n ν, s = 1 − κ, and what those
 //! C cells do not follow either B²(C) − B²(N) at the positions, which N cells follow exactly; the mean of the sum over A and q
-//! is what is cut off. That detail was not seen does not say that there is none: the fewer coefficients the step has, the more
+//! is what is cut off. Of the steps among coarser cells the last one alone counts: waves that these do not carry yet fall less
+//! than those after them, and would make the end of the law too flat. That detail was not seen does not say that there is none: the fewer coefficients the step has, the more
 //! may hide in its noise.
 
 /// By which powers of the number of cells the mean square of what they cut off may fall.
@@ -59,8 +60,8 @@ fn between(cells: [usize; 2], power: f64) -> f64 {
 pub(super) struct Detail {
     /// From the cells that were taken to finer ones.
     pub cut: Step,
-    /// Among coarser ones, up to those that were taken.
-    pub seen: Vec<Step>,
+    /// To the cells that were taken from half as many or fewer, if there are any.
+    pub seen: Option<Step>,
     /// Cells that follow a form at every position, no fewer than the finer ones.
     pub carried: usize,
     /// Mean square of the noise a coefficient, µm².
@@ -122,7 +123,7 @@ mod tests {
         let seen = |cells: [usize; 2]| step(cells, of(cells[0]) - of(cells[1]));
         let detail = Detail {
             cut: seen([24, 48]),
-            seen: vec![seen([12, 24]), seen([6, 12]), seen([3, 6])],
+            seen: Some(seen([12, 24])),
             carried: 100,
             noise: 1e-9,
         };
@@ -137,7 +138,7 @@ mod tests {
         let hidden = |n: usize, noise: f64| {
             let detail = Detail {
                 cut: step([n, 2 * n], n as f64 * noise),
-                seen: Vec::new(),
+                seen: None,
                 carried: 1000,
                 noise,
             };
@@ -158,7 +159,7 @@ mod tests {
     fn without_noise_all_that_differs_is_detail() {
         let detail = Detail {
             cut: step([4, 8], 0.25),
-            seen: Vec::new(),
+            seen: None,
             carried: 8,
             noise: 0.0,
         };

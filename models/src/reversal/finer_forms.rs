@@ -114,19 +114,13 @@ impl FinerForms {
                 square(coarse, fine, at)
             }),
         };
-        let mut seen = Vec::new();
-        let mut above = &self.taken;
-        for coarse in self.ladder.iter().rev() {
-            if TIMES * cells(coarse) <= cells(above) {
-                seen.push(step(coarse, above));
-                above = coarse;
-            }
-        }
+        let mut coarser = self.ladder.iter().rev();
+        let half = coarser.find(|coarse| TIMES * cells(coarse) <= cells(&self.taken));
         let few = thinned(&self.places, VARIANCES);
         let noise = mean(few.iter().map(on_axis), variance);
         let detail = Detail {
             cut: step(&self.taken, &self.finer),
-            seen,
+            seen: half.map(|coarse| step(coarse, &self.taken)),
             carried: self.carried.max(cells(&self.finer)),
             // Straight lines apart a spline has one coefficient more than cells.
             noise: noise / (cells(&self.taken) + 1) as f64,

@@ -1,7 +1,9 @@
 //! Traces that drift, each by a slope of its own.
 
 use crate::scene::{diagnosed, scene};
-use errsep::diagnosis::Kind;
+use errsep::diagnosis::{Kind, Options, joined};
+use errsep_models::model::FittedModel;
+use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::exact_readings::Injection;
 use errsep_models::reversal::{Channel, Direction, Observations};
 use rand::{RngExt, SeedableRng};
@@ -87,4 +89,31 @@ fn causes_are_named_beside_drifts() {
             verdict.verdict.statement
         );
     }
+}
+
+/// *Simulated truth*, k·u: an effect that is given is known as well as the drifts let it be. Twelve half-angles over their
+/// uncertainties have a root mean square of 1, known to 1/√24; three of these.
+#[test]
+fn a_given_effect_is_as_sure_as_drifts_let_it_be() {
+    let half_angle = 2e-6;
+    let mut truth = scene(33, 3e-5);
+    let travel = truth.travel();
+    truth.effects = vec![Injection::Taper(half_angle)];
+    let options = Options {
+        draws: 200,
+        ..Options::default()
+    };
+    let mut squares = 0.0;
+    for seed in 0..12 {
+        let readings = drifting(truth.measured(seed), travel, seed);
+        let model = Linearised::new(&readings, Assumptions::default()).unwrap();
+        let names = ["taper".to_owned()];
+        let fit = joined(&model, model.effects(), &names, &options).unwrap();
+        let drifts = |note: &String| note.contains("drifts by a slope");
+        assert!(fit.notes.iter().any(drifts), "{seed}: {:?}", fit.notes);
+        let size = &fit.effects[0].parameters[0];
+        squares += ((size.value - half_angle) / size.std).powi(2);
+    }
+    let rms = (squares / 12.0_f64).sqrt();
+    assert!((rms - 1.0).abs() < 3.0 / 24.0_f64.sqrt(), "{rms}");
 }

@@ -60,8 +60,9 @@ pub(crate) const LIKELIER: f64 = 12.0;
 /// that are named, for no name to be strong.
 pub(crate) const LIKELIER_BY_JUMPS: f64 = 3.0;
 /// *Tuned.* Logarithm of how much likelier the repeats must be where whole traces may drift than where none does, for
-/// drifts to be noise. Beside the causes of 192 measurements without drifts it is 0.2 at most (seed 92 of the independent
-/// maker), 12.3 where a slow cause is withheld (one of 60); drifts of six standard deviations of a reading make 27 to 70.
+/// drifts to be noise. Beside the causes of 244 measurements without drifts it is 0.2 at most (seeds 92 to 95 of the
+/// independent maker), 12.3 where a slow cause is withheld (one of 60); drifts of six standard deviations of a reading make
+/// 27 to 70.
 pub(crate) const LIKELIER_BY_DRIFTS: f64 = 12.0;
 /// *Limit.* Jumps of so little height that are taken out of all readings; of more none is.
 pub(crate) const MOST_JUMPS: usize = 3;

@@ -4,9 +4,10 @@
 //! A cause that goes on in time (a warm-up, a slow cycle of the room) tilts traces too, and would be noise under a law in
 //! which they drift. So causes are sought under laws without drifts first, and what they come to is then weighed: how likely
 //! are the repeats without the causes where no trace drifts, how likely are they with all that is in them where each may?
-//! The unknowns of the law are integrated out, those of the causes cost nothing.
+//! The unknowns of the law are integrated out; each unknown of the causes costs half the logarithm of the number of readings
+//! (Schwarz, Ann. Statist. 6 (1978) 461).
 
-use crate::attribution::context::Context;
+use crate::attribution::context::{Cause, Context};
 use crate::attribution::examined::Examined;
 use crate::detection::estimate::evidence;
 use crate::levels::LIKELIER_BY_DRIFTS;
@@ -39,5 +40,7 @@ pub(crate) fn drifts_instead(context: &Context<'_>, examined: &Examined<'_>) -> 
     let Some((by_causes, beside_causes)) = gains() else {
         return false;
     };
-    beside_causes > LIKELIER_BY_DRIFTS || by_drifts > by_causes
+    let unknowns: usize = causes.iter().map(Cause::unknowns).sum();
+    let cost = 0.5 * unknowns as f64 * (readings.len() as f64).ln();
+    beside_causes > LIKELIER_BY_DRIFTS || by_drifts > by_causes - cost
 }

@@ -37,13 +37,14 @@ fn drifting(mut observations: Observations, travel: f64, seed: u64) -> Observati
     observations
 }
 
-/// *Simulated truth*: where nothing else is in the readings nothing is named, and the drifts are told. A slope is uniform
-/// within ± 0.8 µm a travel: its standard deviation is 0.46, which the eight contrasts of two repeats each know to a quarter;
-/// four of them.
+/// *Simulated truth*: where nothing else is in the readings nothing is named, and the drifts are told, but where they do not
+/// stand out of other laws. k·u: a slope is uniform within ± 0.8 µm a travel, its standard deviation 0.46, which eight
+/// contrasts know to a quarter; three of them.
 #[test]
 fn drifts_of_traces_are_no_cause() {
     let truth = scene(31, 3e-5);
     let travel = truth.travel();
+    let mut drifts = Vec::new();
     for seed in 0..6 {
         let readings = drifting(truth.measured(seed), travel, seed);
         let verdict = diagnosed(&readings, &[]);
@@ -53,15 +54,16 @@ fn drifts_of_traces_are_no_cause() {
             "{seed}: {}",
             verdict.verdict.statement
         );
-        let told = verdict
+        if verdict
             .notes
             .iter()
-            .any(|note| note.contains("drifts by a slope"));
-        if told {
-            let drift = verdict.noise.drift * travel;
-            assert!(drift > 0.1 && drift < 1.0, "{seed}: {drift}");
+            .any(|note| note.contains("drifts by a slope"))
+        {
+            drifts.push(verdict.noise.drift * travel);
         }
     }
+    assert!(drifts.len() >= 4, "{drifts:?}");
+    assert!(drifts.iter().all(|d| *d > 0.115 && *d < 0.81), "{drifts:?}");
 }
 
 /// *Simulated truth*: what does not go on in time is named beside them; what does is, where traces do not drift.

@@ -2,7 +2,7 @@
 //!
 //! One reading = white noise + a part correlated along its trace (Ornstein–Uhlenbeck: variance
 //! o, correlation exp(−|Δx|/ℓ)) + a shift of the whole trace + a drift of the whole trace by a slope of its own, where
-//! that explains the repeats better than causes do (`drift.rs`). Repeats of a trace differ by noise,
+//! that explains the repeats better than causes do (`attribution/drifting.rs`). Repeats of a trace differ by noise,
 //! but also by whatever drifts steadily between them; contrasts orthogonal to {1, t} hold neither
 //! the model nor the drift, so their likelihood estimates the noise alone.
 
@@ -51,7 +51,7 @@ pub struct NoiseLaw {
     pub freedom: f64,
     /// Where it comes from.
     pub source: NoiseSource,
-    /// Whether drifts of whole traces were thought of.
+    /// Whether drifts of whole traces were among the laws that it is the mean of.
     pub(crate) drifts: Drifts,
     /// Laws drawn from what the repeats allow; empty where only the white variance is in doubt.
     possible: Arc<Vec<Law>>,

@@ -37,6 +37,8 @@ struct Case {
     taper: f64,
     /// Uneven steps between positions.
     jitter: f64,
+    /// By how much the slide runs elsewhere in each pass: correlated over 60 mm, and a line at its ends, µm.
+    slide: [f64; 2],
 }
 
 /// Wavelength of the longest wave, mm, and how many there are, amplitudes as the squares of the wavelengths.
@@ -57,6 +59,7 @@ const BASE: Case = Case {
     knots: 10,
     taper: 0.0,
     jitter: 0.0,
+    slide: [0.0; 2],
 };
 
 const CASES: &[Case] = &[
@@ -202,6 +205,20 @@ const CASES: &[Case] = &[
         noise: [NOISE_UM, 0.0, 3.0],
         cells: 0,
         knots: 0,
+        ..BASE
+    },
+    Case {
+        name: "4 repeats, the slide elsewhere in each pass, knots chosen",
+        repeats: 4,
+        slide: [3.0 * NOISE_UM, 0.0],
+        cells: 0,
+        knots: 0,
+        ..BASE
+    },
+    Case {
+        name: "4 repeats, the slide askew in each pass",
+        repeats: 4,
+        slide: [0.0, 6.0 * NOISE_UM],
         ..BASE
     },
     Case {
@@ -406,7 +423,37 @@ impl Case {
                 }
             }
         }
+        self.move_slide(&mut observations, &mut random);
         Some((observations, truth))
+    }
+
+    /// What the slide does anew in each pass, which both indicators read from opposite sides.
+    fn move_slide(&self, observations: &mut Observations, random: &mut ChaCha8Rng) {
+        let [correlated, line] = self.slide;
+        if correlated <= 0.0 && line <= 0.0 {
+            return;
+        }
+        let law = Law {
+            white: 0.0,
+            correlated: correlated * correlated,
+            length: 60.0,
+            shift: 0.0,
+            drift: (2.0 * line / LENGTH_MM).powi(2),
+        };
+        let x: Vec<f64> = (0..self.positions)
+            .map(|k| LENGTH_MM * k as f64 / (self.positions - 1) as f64)
+            .collect();
+        for channels in [[Channel::C1A, Channel::C1B], [Channel::C2A, Channel::C2B]] {
+            for repeat in 1..=self.repeats {
+                let mut moved = vec![0.0; x.len()];
+                law.draw(&x, random, &mut moved);
+                let readings = observations.readings.iter_mut();
+                for r in readings.filter(|r| channels.contains(&r.channel) && r.repeat == repeat) {
+                    let at = x.partition_point(|p| *p < r.x - 1e-9);
+                    r.value += r.channel.indicator_sign() * moved[at];
+                }
+            }
+        }
     }
 }
 

@@ -49,6 +49,12 @@ const CASES: &[Case] = &[
         ..PLAIN
     },
     Case {
+        name: "four repeats, the slide askew in each pass",
+        repeats: 4,
+        readings: slide_askew,
+        ..PLAIN
+    },
+    Case {
         name: "one reading at an end missing",
         readings: |o, _| {
             o.readings
@@ -181,6 +187,21 @@ fn tallies(plan: &Plan, truth: &Truth, solution: &Staged) -> Option<[Tally; 7]> 
         }
     }
     Some(tallies)
+}
+
+/// A line anew in each pass, of 0.3 µm at its ends, which both indicators read from opposite sides.
+fn slide_askew(observations: &mut Observations, random: &mut ChaCha8Rng) {
+    for first in [true, false] {
+        for repeat in 1..=4 {
+            let line: f64 = StandardNormal.sample(random);
+            for r in &mut observations.readings {
+                let is_first = matches!(r.channel, Channel::C1A | Channel::C1B);
+                if is_first == first && r.repeat == repeat {
+                    r.value += 0.3 * line * r.channel.indicator_sign() * (2.0 * r.x / LENGTH - 1.0);
+                }
+            }
+        }
+    }
 }
 
 pub fn rows(seeds: u64) -> Vec<Row> {

@@ -136,13 +136,20 @@ fn answer(args: &Args, samples: usize, turning: &Turning, data: &Observations) -
             "the spindle angle is not told: the spindle strays by about {degrees}° from the wave, so that 1A and 2B stay half a turn apart but see other sides along the bar; `errsep diagnose` follows such a turn"
         )
     };
+    let travel = (data.readings.iter().map(|r| r.x))
+        .fold((f64::MAX, f64::MIN), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+    let slope = turning.slope_std(args.angle.to_radians(), travel.1 - travel.0);
     let mut text = String::new();
     let _ = write!(
         text,
         "{}: {samples} samples over {:.1} turns at {} turns a minute\n\
          Once-per-turn wave: amplitude {} µm in the middle of the run; {}\n\
          Left by background, wave and second harmonic: {} µm rms\n\
-         {near} readings at {}° (1A) and {far} half a turn later (2B)\n",
+         {near} readings at {}° (1A) and {far} half a turn later (2B)\n\
+         Oval of the section: {} µm; as far as the spindle angle is open it tilts both traces by {} µrad (standard uncertainty), which no scatter of them \
+         shows: add it to u of alpha, or take the whole run at once with errsep diagnose\n",
         args.run.display(),
         turning.turns,
         measured(rpm.0, Some(rpm.1)),
@@ -150,6 +157,8 @@ fn answer(args: &Args, samples: usize, turning: &Turning, data: &Observations) -
         angle,
         plain(turning.rest_rms, 3),
         args.angle,
+        plain(turning.oval.norm(), 2),
+        plain(1e6 * slope, 2),
     );
     let of = |f: fn(&errsep_models::reversal::Reading) -> f64| {
         data.readings.iter().map(f).collect::<Vec<_>>()
@@ -182,6 +191,8 @@ fn answer(args: &Args, samples: usize, turning: &Turning, data: &Observations) -
             "amplitude": {"value": turning.amplitude, "unit": "um"},
             "angle": {"value": args.angle.to_radians(), "std": turning.tells_angle().then_some(turning.angle_std_rad), "unit": "rad"},
             "rest": {"rms": turning.rest_rms, "unit": "um"},
+            "oval": {"value": turning.oval.norm(), "unit": "um"},
+            "slope": {"std": slope, "unit": "rad"},
             "readings": {"1A": near, "2B": far},
         }),
         page: page(args, turning, data),

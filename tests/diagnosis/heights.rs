@@ -100,3 +100,23 @@ fn heights_with_a_cause_stay() {
     }
     assert_eq!(levelled(&readings), None);
 }
+
+/// One pass each way, every zero set anew: the heights of the passes are unknowns.
+#[test]
+fn one_pass_each_way_that_is_zeroed_anew_is_no_gap() {
+    let mut truth = scene(101, 3e-5);
+    let once = |readings: Observations| Observations {
+        readings: (readings.readings.into_iter())
+            .filter(|r| r.repeat == 1)
+            .collect(),
+    };
+    let readings = zeroed_anew(once(truth.measured(1)), 5, true);
+    assert!(levelled(&readings).is_some());
+    assert_eq!(diagnosed(&readings, &[]).verdict.kind, Kind::None);
+    truth.effects = vec![Injection::Taper(2e-6)];
+    let verdict = diagnosed(&zeroed_anew(once(truth.measured(2)), 6, true), &[]);
+    assert_eq!(verdict.verdict.effects, ["taper"]);
+    // A play of the indicators lifts both channels of each alike, and stays a cause.
+    truth.effects = vec![Injection::Hysteresis(1.0)];
+    assert_eq!(levelled(&once(truth.measured(3))), None);
+}

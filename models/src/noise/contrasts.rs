@@ -55,6 +55,13 @@ impl Contrasts {
     }
 }
 
+impl Contrasts {
+    /// Adds those of others.
+    pub fn extend(&mut self, others: &Self) {
+        self.groups.extend(others.groups.iter().cloned());
+    }
+}
+
 impl NoiseValues for Contrasts {
     fn count(&self) -> usize {
         let of = |g: &Group| g.positions.len() * g.rows.len();

@@ -9,9 +9,11 @@
 mod contrasts;
 mod law;
 mod likelihood;
+mod moments;
 mod posterior;
 
 pub use contrasts::Contrasts;
 pub use law::{Law, about_middle, decays, drift_form, markov_form};
 pub use likelihood::{Likelihood, Likelihoods, OfWhole};
+pub use moments::Moments;
 pub use posterior::{NoiseValues, Possible, Posterior};

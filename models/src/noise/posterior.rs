@@ -2,16 +2,19 @@
 //!
 //! Eight kinds of law are weighed: white alone or with a correlated part, each without more, with shifts, with drifts of whole
 //! traces, with both; all alike beforehand (where shifts are not seen there are two kinds). Beforehand, too, the
-//! correlated part's share of the standard deviation beside the white one, those of shift and of drift (at the ends of the
-//! travel) of the whole and the logarithm of the correlation length are uniform, and that of the scale everywhere. The
-//! scale is integrated in closed form; the others on a grid that closes in on where the probability lies.
+//! correlated part's share of the standard deviation beside the white one is uniform, and so are the logarithms of its length, of the
+//! scale, and of 1 + r, r the standard deviation of the shift or of the drift (at the ends of the travel) in that of the rest: a few
+//! traces that shift by much more than their readings scatter then tell their shifts with as many degrees of freedom as
+//! there are traces. The scale is integrated in closed form; the others on a grid that closes in on where the probability lies.
 
 use super::law::Law;
 use super::likelihood::{Likelihood, OfWhole};
+use super::moments::Moments;
+use statrs::function::gamma::ln_gamma;
 
 /// Fewest values in contrasts from which a law can be told.
 const FEWEST: usize = 8;
-/// Sides of the grid: the share of the correlated part, the logarithm of its length, the shares of shift and drift.
+/// Sides of the grid: the share of the correlated part, the logarithms of its length and of 1 + r of shift and drift.
 const SIDES: usize = 4;
 /// Points along each; those of shift and drift cost no further pass.
 const COUNTS: [usize; SIDES] = [9, 9, 15, 11];
@@ -23,10 +26,10 @@ const NEGLIGIBLE: f64 = 1e-4;
 const CLOSE: f64 = 0.7;
 /// Greatest share of the correlated part: without any white noise the filter's weights would be infinite.
 const MOST: f64 = 0.999;
-/// Greatest share of the shift, two thousand times the rest.
-const MOST_SHIFT: f64 = 1.0 - 1e-7;
-/// Greatest share of the drift at the ends of the travel, seven hundred times the rest.
-const MOST_DRIFT: f64 = 1.0 - 1e-6;
+/// Greatest shift, in the rest.
+const MOST_SHIFT: f64 = 2000.0;
+/// Greatest drift at the ends of the travel, in the rest.
+const MOST_DRIFT: f64 = 700.0;
 
 /// A law, its scale left open, that the contrasts allow.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +48,7 @@ pub struct Possible {
 pub struct Posterior {
     possible: Vec<Possible>,
     count: f64,
+    log_evidence: f64,
 }
 
 /// A side of the grid: from, to.
@@ -111,9 +115,16 @@ impl Posterior {
         for p in &mut possible {
             p.probability /= sum;
         }
+        // The scale s with 1/s beforehand: ∫ s^(−n/2 − 1) e^(−q/2s) ds = Γ(n/2) (q/2)^(−n/2).
+        let half = 0.5 * values.count() as f64;
+        let of_scale = ln_gamma(half) - half * half.ln();
+        let all = (2 * kinds.len()) as f64;
+        let kinds = if lengths.is_some() { all } else { 0.5 * all };
+        let log_evidence = of_scale + top + (sum / kinds).ln() - plain.minus_log;
         (sum > 0.0 && sum.is_finite()).then_some(Self {
             possible,
             count: values.count() as f64,
+            log_evidence,
         })
     }
 
@@ -126,7 +137,13 @@ impl Posterior {
                 quadratic: variance * (count.max(FEWEST) as f64 - 2.0),
             }],
             count: count.max(FEWEST) as f64,
+            log_evidence: 0.0,
         }
+    }
+
+    /// Logarithm of the probability of the values, whatever the law, up to a constant that is the same for any values.
+    pub fn log_evidence(&self) -> f64 {
+        self.log_evidence
     }
 
     /// The laws, their probabilities adding up to one.
@@ -158,10 +175,8 @@ impl Posterior {
         }
     }
 
-    /// The scale v and the degrees of freedom ν of the scaled inverse χ² law, v ν/χ², that has mean and
-    /// variance of the posterior of a variance: what is normal with that variance divides by √v to
-    /// Student's law with ν. `of` are the variances under each of [`Self::possible`], scale one.
-    pub fn variance(&self, of: &[f64]) -> (f64, f64) {
+    /// What is known of a variance; `of` is it under each of [`Self::possible`], scale one.
+    pub fn moments(&self, of: &[f64]) -> Moments {
         let n = self.count;
         let (mut mean, mut square) = (0.0, 0.0);
         for (p, v) in self.possible.iter().zip(of) {
@@ -169,12 +184,16 @@ impl Posterior {
             mean += p.probability * scaled / (n - 2.0);
             square += p.probability * scaled * scaled / ((n - 2.0) * (n - 4.0));
         }
-        let variance = square - mean * mean;
-        if !(variance > 0.0) {
-            return (mean, n);
+        Moments {
+            mean,
+            variance: square - mean * mean,
+            most_freedom: n,
         }
-        let freedom = 4.0 + 2.0 * mean * mean / variance;
-        (mean * (freedom - 2.0) / freedom, freedom)
+    }
+
+    /// Scale and degrees of freedom of a variance; see [`Moments::student`].
+    pub fn variance(&self, of: &[f64]) -> (f64, f64) {
+        self.moments(of).student()
     }
 }
 
@@ -191,8 +210,8 @@ fn explore(
     let limits = [
         whole(lengths.map(|_| (0.0, MOST))),
         whole(lengths),
-        whole(shift.then_some((0.0, MOST_SHIFT))),
-        whole(drift.then_some((0.0, MOST_DRIFT))),
+        whole(shift.then_some((0.0, MOST_SHIFT.ln_1p()))),
+        whole(drift.then_some((0.0, MOST_DRIFT.ln_1p()))),
     ];
     let half_travel = values.reach().map_or(1.0, |(_, travel)| 0.5 * travel);
     let mut sides = limits;
@@ -247,16 +266,16 @@ fn on_grid(
     sides: &[Side; SIDES],
     reference: f64,
 ) -> Vec<([f64; SIDES], Possible)> {
-    let beside = |share: f64| share * share / (1.0 - share * share);
-    let mut shares = Vec::new();
+    let beside = |log: f64| log.exp_m1().powi(2);
+    let mut logs = Vec::new();
     for shift in middles(sides[2], COUNTS[2]) {
-        shares.extend(
+        logs.extend(
             middles(sides[3], COUNTS[3])
                 .into_iter()
                 .map(|drift| [shift, drift]),
         );
     }
-    let whole: Vec<OfWhole> = shares
+    let whole: Vec<OfWhole> = logs
         .iter()
         .map(|[shift, drift]| OfWhole {
             shift: beside(*shift),
@@ -269,7 +288,7 @@ fn on_grid(
             let own = a * a;
             let length = if correlated { b.exp() } else { 1.0 };
             let found = values.likelihoods(1.0 - own, own, length, &whole);
-            for ((likelihood, share), of) in found.into_iter().zip(&shares).zip(&whole) {
+            for ((likelihood, log), of) in found.into_iter().zip(&logs).zip(&whole) {
                 let law = Law {
                     white: 1.0 - own,
                     correlated: own,
@@ -282,7 +301,7 @@ fn on_grid(
                     probability: reference - likelihood.minus_log,
                     quadratic: likelihood.quadratic,
                 };
-                points.push(([a, b, share[0], share[1]], possible));
+                points.push(([a, b, log[0], log[1]], possible));
             }
         }
     }

@@ -7,7 +7,7 @@
 //! side, as in the channels 1A and 2B of the reversal.
 
 use errsep_solvers::linear::limited::svd;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::TAU;
 use thiserror::Error;
 
@@ -41,6 +41,10 @@ pub struct Turning {
     pub amplitude: f64,
     /// Standard uncertainty of the spindle angle at a reading, root mean square over the run, rad.
     pub angle_std_rad: f64,
+    /// The same as far as it changes along the run, rad.
+    pub stray_rad: f64,
+    /// Second harmonic of the section, a + ib of a cos 2ψ + b sin 2ψ, ψ from the direction in which the bar runs out, µm.
+    pub oval: Complex<f64>,
     /// Root mean square of what background, wave and its harmonics leave, µm.
     pub rest_rms: f64,
     /// Turns in the run.
@@ -55,6 +59,15 @@ impl Turning {
     /// Standard uncertainty of the wave's frequency as that of the spindle.
     pub fn frequency_std(&self) -> f64 {
         self.spindle_std.hypot(self.spindle - self.frequency)
+    }
+
+    /// What an unknown angle adds to the standard uncertainty of the slope that two traces half a turn apart have in common
+    /// (α of the reversal), rad: an oval section reads the same on both sides, and turns along the `travel_mm` with the
+    /// angle by which the spindle may stray from the wave. As a line in time holds the most of such a stray, it is taken as one.
+    pub fn slope_std(&self, angle_rad: f64, travel_mm: f64) -> f64 {
+        let turned = self.oval.conj() * Complex::from_polar(1.0, -2.0 * angle_rad);
+        let um_per_rad = 2.0 * turned.im.abs();
+        um_per_rad * 12f64.sqrt() * self.stray_rad / travel_mm * 1e-3
     }
 
     /// Whether the spindle stands at about one angle where the wave does. Traces half a turn of the wave apart are about
@@ -158,16 +171,16 @@ pub fn find_turning(samples: &[Sample], about: Option<f64>) -> Result<Turning, N
     let apart = (spindle - frequency).hypot(spindle_std) * TAU * span / 12f64.sqrt();
     // A stray of that size may hold a line in time.
     let of_stray = wave.unsteadiness * 12f64.sqrt() / (TAU * span);
-    let angle = (noise / wave.amplitude)
-        .hypot(apart)
-        .hypot(wave.unsteadiness);
+    let stray = apart.hypot(wave.unsteadiness);
     Ok(Turning {
         frequency,
         spindle,
         spindle_std: spindle_std.hypot(of_stray),
         highest_at: wave.highest_at,
         amplitude: wave.amplitude,
-        angle_std_rad: angle,
+        angle_std_rad: (noise / wave.amplitude).hypot(stray),
+        stray_rad: stray,
+        oval: wave.oval,
         rest_rms: wave.rest,
         turns: span * frequency,
     })

@@ -318,7 +318,7 @@ pub fn notes(model: &Linearised) -> Vec<String> {
     }
     if let Some(greatest) = model.levelled_um {
         notes.push(format!(
-            "The repeats of a channel differ in height, by up to {} µm from their mean, as where an indicator is set to zero before each of them; their heights are unknowns of the fit, the gap is what is left beside them, and what shows in heights alone is not seen.",
+            "The traces of a channel differ in height, by up to {} µm from their mean, as where an indicator is set to zero before each of them; their heights are unknowns of the fit, the gap is what is left beside them, and what shows in heights alone is not seen.",
             number::plain(greatest, 2)
         ));
     }

@@ -42,12 +42,13 @@ pub fn json(data: &ReversalData, o: &Outcome) -> Result<Value, Message> {
             "rms": o.residual_rms,
             "noise": o.noise,
             "noise_source": o.noise_words,
-            "noise_law": o.noise_law.map(|law| json!({
+            "noise_law": o.noise_law.map(|(law, correlation)| json!({
                 "white": law.white.sqrt(),
                 "correlated": law.correlated.sqrt(),
                 "length": law.length,
                 "shift": law.shift.sqrt(),
                 "drift": 1e-3 * law.drift.sqrt(),
+                "between_indicators": correlation,
             })),
             "degrees_of_freedom": o.degrees_of_freedom,
             "channels": o.channel_noise.iter().map(|(c, s)| (c.name().to_owned(), json!(s))).collect::<Map<_, _>>(),

@@ -22,16 +22,17 @@ pub fn words(
         "the channels differ"
     };
     let source = match origin {
-        NoiseOrigin::Repeats(law) => {
+        NoiseOrigin::Repeats { law, shared } => {
             let part = |variance: f64| number::plain(variance.sqrt(), 2);
             return format!(
                 "from the repeats, {of}: white {} µm, correlated along a trace {} µm over {} mm, \
-                 shift of a trace {} µm, slope by which a trace drifts {} µrad",
+                 shift of a trace {} µm, slope by which a trace drifts {} µrad{}",
                 part(law.white),
                 part(law.correlated),
                 number::plain(law.length, 2),
                 part(law.shift),
-                number::plain(1e3 * law.drift.sqrt(), 2)
+                number::plain(1e3 * law.drift.sqrt(), 2),
+                shared.map_or(String::new(), |s| together(s.correlation))
             );
         }
         NoiseOrigin::Declared => "declared in the set-up".to_owned(),
@@ -49,6 +50,19 @@ pub fn words(
         ),
         None => source,
     }
+}
+
+/// That opposite indicators share what repeats differ by.
+fn together(correlation: f64) -> String {
+    let means = if correlation < 0.0 {
+        "one reads more as the other reads less, as where the slide runs elsewhere in each pass"
+    } else {
+        "they rise together, as where the artefact grows"
+    };
+    format!(
+        "; opposite indicators share it in one pass (correlation {}): {means}",
+        number::plain(correlation, 2)
+    )
 }
 
 /// What a fit that misses more than the noise is told to mean; `missed` in µm.

@@ -84,8 +84,9 @@ pub struct Outcome {
     pub noise_words: String,
     pub channel_noise: Vec<(Channel, f64)>,
     pub degrees_of_freedom: f64,
-    /// Variances of the parts of the noise of one reading, µm², where repeats tell them.
-    pub noise_law: Option<Law>,
+    /// Variances of the parts of the noise of one reading, µm², where repeats tell them, and the correlation of opposite
+    /// indicators where they share it.
+    pub noise_law: Option<(Law, Option<f64>)>,
     /// How well the standard uncertainties of the angles are known: infinite where the noise was
     /// declared.
     pub noise_freedom: DegreesOfFreedom,

@@ -207,7 +207,7 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         channel_noise: fit.noise.iter().map(|n| (n.channel, n.sigma)).collect(),
         degrees_of_freedom: fit.degrees_of_freedom,
         noise_law: match fit.noise_origin {
-            NoiseOrigin::Repeats(law) => Some(law),
+            NoiseOrigin::Repeats { law, shared } => Some((law, shared.map(|s| s.correlation))),
             _ => None,
         },
         noise_freedom: freedom(fit.tilts().iter().map(|t| t.degrees_of_freedom)),
@@ -309,8 +309,9 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
 /// That repeats were brought to one height.
 pub(super) fn levelled(greatest_um: f64) -> String {
     format!(
-        "repeats differ as a whole, by up to {} µm from their mean, and were not read at the same positions: they were brought to one height \
-         first, as without that the forms would have steps between their readings",
+        "the traces of a channel differ as a whole, by up to {} µm from their mean, as where an indicator is set to zero before each of them: \
+         they were brought to one height first, without which the forms would have steps between their readings, or the misfit would count as \
+         noise",
         number::plain(greatest_um, 3)
     )
 }
@@ -318,7 +319,7 @@ pub(super) fn levelled(greatest_um: f64) -> String {
 /// That the heights of repeats are unknowns beside effects.
 fn heights_beside(greatest_um: f64) -> String {
     format!(
-        "repeats differ as a whole, by up to {} µm from their mean, as where an indicator is set to zero before each of them: their heights \
+        "the traces of a channel differ as a whole, by up to {} µm from their mean, as where an indicator is set to zero before each of them: their heights \
          are unknowns of the fit beside the effects",
         number::plain(greatest_um, 3)
     )

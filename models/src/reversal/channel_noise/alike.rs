@@ -4,6 +4,8 @@
 //! and tilt whole traces. That is no detail of a form, yet beside it a criterion takes detail for noise; and a mean over
 //! repeats of which one ends before the others has a step.
 
+use std::borrow::Cow;
+
 use super::survey::Survey;
 use super::traces::{self, CellTrace, Group};
 
@@ -27,8 +29,20 @@ pub struct Levelled {
     /// The greatest height taken out, µm.
     pub greatest: f64,
     /// Whether repeats stand apart that were not read at the same positions: elsewhere heights change a mean over repeats by a
-    /// constant.
+    /// constant. Or whether these are the heights of both passes.
     pub matters: bool,
+    /// Whether these are the heights of both passes, where nothing is repeated.
+    pub by_pass: bool,
+}
+
+impl Levelled {
+    /// How many numbers of a channel were taken out that no repeats account for.
+    pub fn taken_out(&self, channel: usize) -> usize {
+        match self.by_pass {
+            true => self.heights[channel],
+            false => 0,
+        }
+    }
 }
 
 /// Height, µm, and slope, µm per half the channel's travel, of what a trace lies above the others.
@@ -54,19 +68,26 @@ impl Survey<'_> {
         .collect()
     }
 
-    /// The readings of every channel less the heights by which the repeats of one direction differ, their mean left.
-    /// `None` where nothing is repeated.
+    /// The readings of every channel less the heights by which the repeats of one direction differ, or both passes where nothing
+    /// is repeated and these are zeroed anew; their mean is left. `None` where there is neither.
     pub fn levelled(&self) -> Option<Levelled> {
-        if self.repeats.is_empty() {
+        let zeroed = self.passes_are_zeroed();
+        let both = || traces::groups_of_channels(&self.x, &self.traces);
+        let groups = match zeroed {
+            true => Cow::Owned(both()),
+            false => Cow::Borrowed(&self.repeats[..]),
+        };
+        if groups.is_empty() {
             return None;
         }
         let mut level = Levelled {
             values: self.values.iter().map(|v| v.to_vec()).collect(),
             heights: vec![0; self.values.len()],
             greatest: 0.0,
-            matters: false,
+            matters: zeroed,
+            by_pass: zeroed,
         };
-        for group in &self.repeats {
+        for group in groups.iter() {
             let traces = &self.traces[group.channel];
             let own = &mut level.values[group.channel];
             let means = group.means(traces, self.x[group.channel], own);

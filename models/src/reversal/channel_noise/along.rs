@@ -10,25 +10,26 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::supposed::Counted;
+use super::gathered::{Cells, Derivatives, Gathered, ones};
+use super::laws::{Laws, Products};
+use super::pairs::{Pair, Pairs};
+use super::sum_of_squares;
 use super::survey::Survey;
-use super::traces::Group;
-use super::{rms, sum_of_squares};
-use crate::noise::{Contrasts, Law, Posterior, about_middle, decays, drift_form, markov_form};
+use crate::noise::{Contrasts, Law, Moments, Posterior, about_middle, decays};
+use crate::reversal::simultaneous::SharedNoise;
 
-/// Readings of a cell whose derivatives stand for all of it.
-const MOST_ROWS: usize = 4;
 /// Draws behind the share of the noise that the fit takes up.
 const PROBES: usize = 32;
 /// Their seed: an answer must not depend on chance.
 const SEED: u64 = 0x7472_6163;
+/// What two indicators share is judged beforehand as likely as that they share nothing, and the ratio of the variances of
+/// sum and difference as anything from one over this to this.
+const RATIO: f64 = 100.0;
+/// Probability below which it is not thought of.
+const NEGLIGIBLE: f64 = 1e-3;
 /// The means of the repeats leave more than noise where their sum of squares exceeds what the noise
 /// explains by so many standard deviations.
 const CLEAR: f64 = 4.0;
-
-/// The derivatives of what one reading would be: by unknowns of the band (one may appear twice) and by
-/// all of the border.
-pub type Derivatives = (Vec<(usize, f64)>, Vec<f64>);
 
 /// A fit at its minimum.
 pub struct AtRest<'a, R> {
@@ -42,154 +43,27 @@ pub struct AtRest<'a, R> {
     pub counts: (usize, usize, usize),
 }
 
-/// The derivatives of the sum of a cell's readings, over their standard deviation.
-#[derive(Debug, Clone)]
-struct Row {
-    band: Vec<(usize, f64)>,
-    border: Vec<f64>,
-    count: f64,
-}
-
-/// A trace on cells.
-#[derive(Debug, Clone)]
-struct Cells {
-    positions: Vec<f64>,
-    /// The same from the middle of the trace.
-    about_middle: Vec<f64>,
-    /// What a shift of one is in weighted units, against readings of the mean weight.
-    one: f64,
-    rows: Vec<Row>,
-    /// The place of each cell among all channels', directions' and positions'; repeats share it.
-    places: Vec<usize>,
-}
-
-/// The rows of all traces, gathered on cells.
-#[derive(Debug, Clone)]
-pub struct Gathered {
-    traces: Vec<Cells>,
-    places: usize,
-}
-
-impl Gathered {
-    /// Gathers the readings of groups around a solution.
-    pub fn new(
-        row: impl Fn(usize, usize) -> Result<Derivatives, NoValue>,
-        survey: &Survey,
-        groups: &[Group],
-        weights: &[f64],
-    ) -> Result<Self, NoValue> {
-        let ones = ones(weights);
-        let mut traces = Vec::new();
-        let mut places = 0;
-        for group in groups {
-            for (trace, on_cells) in group.traces.iter().zip(&group.on_cells) {
-                let rows_of = &survey.traces[group.channel][*trace];
-                let mut cells = Cells {
-                    positions: Vec::with_capacity(on_cells.cells.len()),
-                    about_middle: Vec::new(),
-                    one: ones[group.channel],
-                    rows: Vec::with_capacity(on_cells.cells.len()),
-                    places: Vec::with_capacity(on_cells.cells.len()),
-                };
-                for (cell, range) in &on_cells.cells {
-                    let taken = range.len().min(MOST_ROWS);
-                    let count = range.len() as f64;
-                    let factor = weights[group.channel] * count / taken as f64;
-                    let mut sum = Row {
-                        band: Vec::new(),
-                        border: Vec::new(),
-                        count,
-                    };
-                    for k in 0..taken {
-                        let at = range.start + (2 * k + 1) * range.len() / (2 * taken);
-                        let (band, border) = row(group.channel, rows_of.row(at))?;
-                        sum.band.extend(band.iter().map(|(j, v)| (*j, factor * v)));
-                        sum.border.resize(border.len(), 0.0);
-                        for (sum, v) in sum.border.iter_mut().zip(&border) {
-                            *sum += factor * v;
-                        }
-                    }
-                    cells.positions.push(group.positions[*cell]);
-                    cells.rows.push(sum);
-                    cells.places.push(places + cell);
-                }
-                cells.about_middle = about_middle(&cells.positions);
-                traces.push(cells);
-            }
-            places += group.positions.len();
-        }
-        Ok(Self { traces, places })
-    }
-
-    /// What the readings of each cell count for, trace by trace, for a combination of unknowns whose
-    /// covariances with all unknowns these are.
-    fn counting(&self, (band, border): &(Vec<f64>, Vec<f64>)) -> Vec<Vec<f64>> {
-        let of = |row: &Row| {
-            let near: f64 = row.band.iter().map(|(j, v)| v * band[*j]).sum();
-            near + row
-                .border
-                .iter()
-                .zip(border)
-                .map(|(v, z)| v * z)
-                .sum::<f64>()
-        };
-        self.traces
-            .iter()
-            .map(|trace| trace.rows.iter().map(of).collect())
-            .collect()
-    }
-
-    /// Σ of squares of what repeats of one place count for together.
-    fn shared_squares(&self, counting: &[Vec<f64>]) -> f64 {
-        let mut sums = vec![0.0; self.places];
-        for (trace, own) in self.traces.iter().zip(counting) {
-            for (place, w) in trace.places.iter().zip(own) {
-                sums[*place] += w;
-            }
-        }
-        sum_of_squares(&sums)
-    }
-
-    /// What the cells count for in a combination of unknowns of the border, trace by trace.
-    pub fn counted(
-        &self,
-        covariance: &BorderedCovariance,
-        border: &[(usize, f64)],
-    ) -> Vec<Counted> {
-        let counting = self.counting(&covariance.times(&[], border));
-        let traces = self.traces.iter().zip(counting);
-        traces
-            .map(|(trace, counting)| Counted {
-                positions: trace.positions.clone(),
-                counting,
-                readings: trace.rows.iter().map(|row| row.count).collect(),
-            })
-            .collect()
-    }
-}
-
-/// What a shift of one is in the weighted units of each channel, against channels of the mean weight: an indicator that is
-/// zeroed anew, or drifts, does so by as much whether it is noisy or not.
-fn ones(weights: &[f64]) -> Vec<f64> {
-    let sigmas: Vec<f64> = weights.iter().map(|w| 1.0 / w).collect();
-    let mean = rms(&sigmas);
-    weights.iter().map(|w| w * mean).collect()
-}
-
 /// The laws that repeats allow, and the variance of what the model misses.
 #[derive(Debug, Clone)]
 pub struct AlongTraces {
     gathered: Gathered,
-    posterior: Posterior,
-    /// The lengths that occur among the laws, with the decays of every trace.
-    lengths: Vec<(f64, Vec<Vec<f64>>)>,
-    /// Which of them each law has.
-    length_of: Vec<usize>,
+    /// Every trace with noise of its own.
+    apart: Laws,
+    together: Option<Together>,
     /// Variance, in weighted units, of what the model misses at a place in all repeats alike, and its
     /// degrees of freedom.
     missed: (f64, f64),
     /// Readings of a trace in a cell, on average.
     readings_a_cell: f64,
+}
+
+/// Opposite indicators that may share what they read in one pass.
+#[derive(Debug, Clone)]
+struct Together {
+    pairs: Pairs,
+    /// Of what both say together, and of one against the other.
+    laws: [Laws; 2],
+    probability: f64,
 }
 
 impl AlongTraces {
@@ -213,36 +87,23 @@ impl AlongTraces {
             let repeats = survey.complete_means(group, &weighted);
             contrasts.add(&positions, &repeats, ones[group.channel]);
         }
-        let Some(posterior) = Posterior::of(&contrasts) else {
+        let Some(apart) = Posterior::of(&contrasts) else {
             return Ok(None);
         };
         let gathered = Gathered::new(&fit.row, survey, &survey.repeats, fit.weights)?;
-        let mut lengths: Vec<(f64, Vec<Vec<f64>>)> = Vec::new();
-        let length_of = posterior
-            .possible()
-            .iter()
-            .map(|p| {
-                let length = p.law.length;
-                lengths
-                    .iter()
-                    .position(|l| l.0 == length)
-                    .unwrap_or_else(|| {
-                        let of = |t: &Cells| decays(&t.positions, length);
-                        lengths.push((length, gathered.traces.iter().map(of).collect()));
-                        lengths.len() - 1
-                    })
-            })
-            .collect();
+        let together = Pairs::of(survey, &gathered, fit.weights)
+            .and_then(|pairs| Together::new(pairs, survey, &weighted, &ones));
         let (cells, readings) = gathered
             .traces
             .iter()
             .flat_map(|t| &t.rows)
             .fold((0.0, 0.0), |(c, r), row| (c + 1.0, r + row.count));
+        let positions = gathered.traces.iter().map(|t| &t.positions[..]);
+        let apart = Laws::new(apart, positions);
         let mut along = Self {
             gathered,
-            posterior,
-            lengths,
-            length_of,
+            apart,
+            together,
             missed: (0.0, 1.0),
             readings_a_cell: readings / f64::max(cells, 1.0),
         };
@@ -258,35 +119,13 @@ impl AlongTraces {
         border: &[(usize, f64)],
     ) -> (f64, f64) {
         let counting = self.gathered.counting(&covariance.times(band, border));
-        let white: f64 = counting.iter().map(|own| sum_of_squares(own)).sum();
-        let traces = || self.gathered.traces.iter().zip(&counting);
-        let shift: f64 = traces()
-            .map(|(trace, own)| (trace.one * own.iter().sum::<f64>()).powi(2))
-            .sum();
-        let drift: f64 = traces()
-            .map(|(trace, own)| trace.one.powi(2) * drift_form(&trace.about_middle, own, own))
-            .sum();
-        let correlated: Vec<f64> = self
-            .lengths
-            .iter()
-            .map(|(_, decays)| {
-                let traces = decays.iter().zip(&counting);
-                traces.map(|(d, own)| markov_form(d, own, own)).sum()
-            })
-            .collect();
-        let of: Vec<f64> = self
-            .posterior
-            .possible()
-            .iter()
-            .zip(&self.length_of)
-            .map(|(p, l)| {
-                p.law.white * white
-                    + p.law.correlated * correlated[*l]
-                    + p.law.shift * shift
-                    + p.law.drift * drift
-            })
-            .collect();
-        let (noise, freedom) = self.posterior.variance(&of);
+        let traces = self.gathered.traces.iter().map(Cells::whole);
+        let apart = self.apart.moments(traces, &counting);
+        let moments = match &self.together {
+            None => apart,
+            Some(together) => apart.or(together.moments(&counting), together.probability),
+        };
+        let (noise, freedom) = moments.student();
         let (missed, missed_freedom) = self.missed;
         if missed <= 0.0 {
             return (noise, freedom);
@@ -300,11 +139,32 @@ impl AlongTraces {
 
     /// The law of one reading of the mean weight in weighted units: the mean of what the repeats allow.
     pub fn law(&self) -> Law {
-        let law = self.posterior.mean();
+        let law = self.apart.mean();
         Law {
             white: law.white * self.readings_a_cell,
             ..law
         }
+    }
+
+    /// What opposite indicators share in one reading, where that is likelier than that they share nothing; `unit` is the
+    /// variance of a weighted unit, µm².
+    pub fn shared(&self, unit: f64) -> Option<SharedNoise> {
+        let shared = self.likelier()?;
+        let [together, against] = shared.means().map(|law| Law {
+            white: law.white * self.readings_a_cell,
+            ..law
+        });
+        let [both, one] = [&together, &against].map(|law| shared.variance_of_a_reading(law));
+        Some(SharedNoise {
+            correlation: (both - one) / (both + one),
+            together: together.times(unit),
+            against: against.times(unit),
+        })
+    }
+
+    /// What indicators share, where it is likelier than that they share nothing.
+    fn likelier(&self) -> Option<&Together> {
+        self.together.as_ref().filter(|t| t.probability > 0.5)
     }
 
     /// Variance of what the model misses, in weighted units; zero where nothing stands out.
@@ -318,14 +178,16 @@ impl AlongTraces {
     /// With V the covariance of the noise and H the hat matrix their sum of squares is expected to be
     /// tr V − tr HV; the last is found by drawn signs, ηᵀHVη.
     fn missed<R>(&self, fit: &AtRest<R>, survey: &Survey, weighted: &[Vec<f64>]) -> (f64, f64) {
-        let mean_law = self.posterior.mean();
+        let mean_law = self.apart.mean();
+        let shared = self.likelier().map(Together::means);
         let (mut squares, mut expected, mut variance) = (0.0, 0.0, 0.0);
         let (mut readings, mut cells) = (0.0, 0.0);
         let mut first = 0;
         for group in &survey.repeats {
             let traces = &self.gathered.traces[first..first + group.traces.len()];
             first += group.traces.len();
-            let law = mean_law.where_whole_is(traces.first().map_or(1.0, |t| t.one));
+            let one = traces.first().map_or(1.0, |t| t.one);
+            let law = mean_law.where_whole_is(one);
             let mut sums = vec![(0.0, 0.0, 0.0); group.positions.len()];
             for (t, trace) in traces.iter().enumerate() {
                 let means = survey.cell_means(group, t, weighted);
@@ -358,12 +220,18 @@ impl AlongTraces {
                 seen.iter().map(of).sum::<f64>() / seen.len().max(1) as f64
             };
             let (repeats, count) = (mean(|s| s.1), mean(|s| s.2));
-            variance += 2.0
-                * (count / repeats).powi(2)
-                * (law.squares(
+            let squares_of = |law: &Law| {
+                let law = law.where_whole_is(one);
+                law.squares(
                     &decays(&group.positions, law.length),
                     &decays(&group.positions, 0.5 * law.length),
-                ) + (law.drift * drifting).powi(2));
+                ) + (law.drift * drifting).powi(2)
+            };
+            let of_group = match &shared {
+                None => squares_of(&mean_law),
+                Some(both) => 0.5 * both.iter().map(squares_of).sum::<f64>(),
+            };
+            variance += 2.0 * (count / repeats).powi(2) * of_group;
         }
         let unknowns = fit.counts.2 as f64;
         let freedom = cells - unknowns;
@@ -371,8 +239,7 @@ impl AlongTraces {
             return (0.0, 1.0);
         }
         expected -= self.taken_up(fit.covariance, fit.counts, &mean_law);
-        let ones = vec![1.0; self.posterior.possible().len()];
-        let (_, known) = self.posterior.variance(&ones);
+        let known = self.apart.freedom();
         let doubt = (variance + 2.0 / known * expected * expected).sqrt();
         if squares - expected <= CLEAR * doubt {
             return (0.0, 1.0);
@@ -392,10 +259,6 @@ impl AlongTraces {
     ) -> f64 {
         let mut random = ChaCha8Rng::seed_from_u64(SEED);
         let traces = &self.gathered.traces;
-        let along: Vec<Vec<f64>> = traces
-            .iter()
-            .map(|t| decays(&t.positions, law.length))
-            .collect();
         let probes: Vec<Vec<Vec<f64>>> = (0..PROBES)
             .map(|_| {
                 let mut sign = || if random.random::<bool>() { 1.0 } else { -1.0 };
@@ -403,6 +266,9 @@ impl AlongTraces {
                 traces.iter().map(of).collect()
             })
             .collect();
+        let apart: Vec<&[f64]> = traces.iter().map(|t| &t.positions[..]).collect();
+        let apart = Products::new(*law, &apart);
+        let shared = self.likelier().map(Together::products);
         let sum: f64 = probes
             .par_iter()
             .map(|signs| {
@@ -421,17 +287,69 @@ impl AlongTraces {
                 let band: Vec<(usize, f64)> = band.into_iter().enumerate().collect();
                 let border: Vec<(usize, f64)> = border.into_iter().enumerate().collect();
                 let taken = self.gathered.counting(&covariance.times(&band, &border));
-                let own = taken.iter().zip(signs).zip(&along).zip(traces);
-                own.map(|(((taken, signs), d), trace)| {
-                    let law = law.where_whole_is(trace.one);
-                    law.form(d, taken, signs)
-                        + law.drift * drift_form(&trace.about_middle, taken, signs)
-                })
-                .sum::<f64>()
+                match (&shared, &self.together) {
+                    (Some(products), Some(together)) => {
+                        let taken = together.pairs.combined(&taken);
+                        let signs = together.pairs.combined(signs);
+                        let whole = || together.pairs.pairs.iter().map(Pair::whole);
+                        let of = |k: usize| products[k].form(whole(), &taken[k], &signs[k]);
+                        of(0) + of(1)
+                    }
+                    _ => apart.form(traces.iter().map(Cells::whole), &taken, signs),
+                }
             })
             .collect::<Vec<f64>>()
             .iter()
             .sum();
         sum / PROBES as f64
+    }
+}
+
+impl Together {
+    /// `None` where it is not worth a thought beside independent traces, or nothing is repeated in both.
+    fn new(pairs: Pairs, survey: &Survey, weighted: &[Vec<f64>], ones: &[f64]) -> Option<Self> {
+        let [both, against] = pairs.contrasts(survey, weighted, ones);
+        let mut whole = both.clone();
+        whole.extend(&against);
+        let whole = Posterior::of(&whole)?.log_evidence();
+        let [both, against] = [Posterior::of(&both)?, Posterior::of(&against)?];
+        let odds = both.log_evidence() + against.log_evidence() - whole - (2.0 * RATIO.ln()).ln();
+        let probability = 1.0 / (1.0 + (-odds).exp());
+        if probability < NEGLIGIBLE {
+            return None;
+        }
+        let laws =
+            [both, against].map(|own| Laws::new(own, pairs.pairs.iter().map(|p| &p.positions[..])));
+        Some(Self {
+            pairs,
+            laws,
+            probability,
+        })
+    }
+
+    fn moments(&self, counting: &[Vec<f64>]) -> Moments {
+        let combined = self.pairs.combined(counting);
+        let whole = || self.pairs.pairs.iter().map(Pair::whole);
+        let of = |k: usize| self.laws[k].moments(whole(), &combined[k]);
+        of(0).and(of(1))
+    }
+
+    fn means(&self) -> [Law; 2] {
+        [0, 1].map(|k| self.laws[k].mean())
+    }
+
+    fn products(&self) -> [Products; 2] {
+        let positions: Vec<&[f64]> = self.pairs.pairs.iter().map(|p| &p.positions[..]).collect();
+        self.means().map(|law| Products::new(law, &positions))
+    }
+
+    /// Variance of one reading under a law, on average over the traces.
+    fn variance_of_a_reading(&self, law: &Law) -> f64 {
+        let (mut squares, mut count) = (0.0, 0.0);
+        for pair in &self.pairs.pairs {
+            squares += sum_of_squares(&pair.about_middle);
+            count += pair.about_middle.len() as f64;
+        }
+        law.variance() + law.drift * squares / f64::max(count, 1.0)
     }
 }

@@ -4,7 +4,8 @@
 //! scatter. As noise such a shift would be the greatest of all by far and known from a few repeats only, and whatever is
 //! looked for would be looked for beside it. As an unknown of the fit it takes nothing from what a trace shows along itself.
 //! What shows in heights alone, a lost motion between directions or a drift from repeat to repeat, is then not seen; so heights
-//! are left to noise and effects unless nearly all channels have them, and they follow no course.
+//! are left to noise and effects unless nearly all channels have them, and they follow no course. Where nothing is repeated but
+//! read once each way, see [`passes`](super::passes).
 
 use std::collections::BTreeMap;
 
@@ -133,12 +134,11 @@ fn are_by_pass(repeats: &[Repeats]) -> bool {
 
 impl Survey<'_> {
     /// Whether the heights of the repeats are unknowns, and if so whether both directions of a repeat have heights of their
-    /// own; `indicator` is that of a channel, `time` that of one of its readings.
-    pub fn free_heights(
-        &self,
-        indicator: impl Fn(usize) -> usize,
-        time: impl Fn(usize, usize) -> f64,
-    ) -> Option<bool> {
+    /// own; `time` is that of one of a channel's readings.
+    pub fn free_heights(&self, time: impl Fn(usize, usize) -> f64) -> Option<bool> {
+        if self.passes_are_zeroed() {
+            return Some(true);
+        }
         let repeats: Vec<Repeats> = (self.repeats.iter())
             .map(|group| {
                 let traces = &self.traces[group.channel];
@@ -168,7 +168,7 @@ impl Survey<'_> {
             .collect();
         let courses: Vec<Course> = (0..self.channels())
             .map(|c| Course {
-                indicator: indicator(c),
+                indicator: self.indicator(c),
                 heights: self.course(c, |row| time(c, row)),
             })
             .collect();

@@ -7,8 +7,12 @@
 
 pub mod alike;
 pub mod along;
+pub mod gathered;
 pub mod heights;
+pub mod laws;
 pub mod levels;
+pub mod pairs;
+pub mod passes;
 pub mod scatter;
 pub mod settle;
 pub mod supposed;
@@ -21,6 +25,8 @@ use errsep_solvers::options::Options as Minimisation;
 use errsep_solvers::problem::NoValue;
 use errsep_solvers::structured::{Parameters, StructuredFit, StructuredProblem};
 
+use super::designs::channel::{DesignChannel, is_same};
+
 /// The readings of one channel in growing order of position.
 pub trait SortedReadings: Sync {
     /// Positions, mm, not falling.
@@ -29,6 +35,38 @@ pub trait SortedReadings: Sync {
     fn value(&self) -> &[f64];
     /// Where a reading stands in the observations.
     fn source(&self, row: usize) -> usize;
+    /// How indicator and spindle stand.
+    fn seat(&self) -> Seat;
+}
+
+/// How indicator and spindle stand in a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seat {
+    /// Direction of the indicator about the spindle axis, degrees.
+    pub indicator: f64,
+    /// Position of the spindle, degrees.
+    pub spindle: f64,
+}
+
+impl From<&DesignChannel> for Seat {
+    fn from(channel: &DesignChannel) -> Self {
+        Self {
+            indicator: channel.indicator,
+            spindle: channel.spindle,
+        }
+    }
+}
+
+impl Seat {
+    /// Whether one indicator reads both.
+    pub fn has_indicator_of(&self, other: &Self) -> bool {
+        is_same(self.indicator, other.indicator)
+    }
+
+    /// Whether two indicators that stand opposite each other read both at one position of the spindle.
+    pub fn is_opposite(&self, other: &Self) -> bool {
+        is_same(self.spindle, other.spindle) && is_same(self.indicator + 180.0, other.indicator)
+    }
 }
 
 /// A reversal whose channels have weights: a part of the rows of [`StructuredProblem`] is a channel.

@@ -1,8 +1,9 @@
 //! The readings of all channels by trace, and their repeats.
 
-use super::SortedReadings;
 use super::levels::Levels;
+use super::passes::{self, BothWays};
 use super::traces::{self, Group, Trace};
+use super::{Seat, SortedReadings};
 use crate::reversal::Direction;
 use crate::reversal::simultaneous::Noise;
 use crate::reversal::straight_line;
@@ -16,6 +17,8 @@ pub struct Survey<'a> {
     pub traces: Vec<Vec<Trace>>,
     /// The repeats of each channel and direction; empty where nothing was repeated.
     pub repeats: Vec<Group>,
+    /// By channel, how indicator and spindle stand.
+    pub(super) seats: Vec<Seat>,
 }
 
 impl<'a> Survey<'a> {
@@ -40,7 +43,47 @@ impl<'a> Survey<'a> {
             values: channels.iter().map(SortedReadings::value).collect(),
             traces,
             repeats,
+            seats: channels.iter().map(SortedReadings::seat).collect(),
         }
+    }
+
+    /// Whether nothing is repeated, but read once each way, and every pass zeroed anew.
+    pub fn passes_are_zeroed(&self) -> bool {
+        self.repeats.is_empty() && passes::are_zeroed(&self.both_ways())
+    }
+
+    /// The passes of the channels that have two, one each way.
+    fn both_ways(&self) -> Vec<BothWays> {
+        let of = |c: usize| {
+            let (x, traces) = (self.x[c], &self.traces[c]);
+            let group = traces::of_channel(c, x, traces);
+            let [first, second] = group.traces[..] else {
+                return None;
+            };
+            let (backward, forward) = match [first, second].map(|t| traces[t].backward) {
+                [true, false] => (0, 1),
+                [false, true] => (1, 0),
+                _ => return None,
+            };
+            let means = group.means(traces, x, self.values[c]);
+            let (low, high) = (group.positions.first()?, group.positions.last()?);
+            let mut below = vec![None; group.positions.len()];
+            for (cell, mean) in &means[forward] {
+                below[*cell] = Some(*mean);
+            }
+            let both = means[backward].iter().filter_map(|(cell, mean)| {
+                let along = (group.positions[*cell] - low) / (high - low);
+                Some((2.0 * along - 1.0, mean - below[*cell]?))
+            });
+            BothWays::of(self.indicator(c), &both.collect::<Vec<_>>())
+        };
+        (0..self.channels()).filter_map(of).collect()
+    }
+
+    /// Which of the indicators reads a channel: the first channel of the same.
+    pub(super) fn indicator(&self, channel: usize) -> usize {
+        let of_one = |seat: &Seat| seat.has_indicator_of(&self.seats[channel]);
+        self.seats.iter().position(of_one).unwrap_or(channel)
     }
 
     /// Number of channels.
@@ -55,6 +98,22 @@ impl<'a> Survey<'a> {
             let ends = |t: &Trace| [x[t.row(0)], x[t.row(t.len() - 1)]];
             traces.iter().filter(|t| t.len() > 0).map(ends)
         }))
+    }
+
+    /// The channel of the opposite indicator that has a trace of the same number, direction and positions.
+    pub fn read_together(&self, channel: usize, trace: &Trace) -> Option<usize> {
+        let is_partner = |other: &Trace| {
+            (other.backward, other.repeat, other.len())
+                == (trace.backward, trace.repeat, trace.len())
+        };
+        (0..self.channels()).find(|other| {
+            let same = |partner: &Trace| {
+                (0..trace.len())
+                    .all(|k| self.x[channel][trace.row(k)] == self.x[*other][partner.row(k)])
+            };
+            self.seats[channel].is_opposite(&self.seats[*other])
+                && (self.traces[*other].iter()).any(|own| is_partner(own) && same(own))
+        })
     }
 
     /// The mean of a channel's values in each cell of a trace of a group; NaN in empty cells.

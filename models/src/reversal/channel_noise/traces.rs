@@ -132,6 +132,13 @@ pub fn of_channel(channel: usize, x: &[f64], traces: &[Trace]) -> Group {
     group(channel, x, traces, own.collect())
 }
 
+/// All traces of each channel that was read, in whatever direction, on common cells.
+pub fn groups_of_channels(x: &[&[f64]], traces: &[Vec<Trace>]) -> Vec<Group> {
+    let read = |c: &usize| traces[*c].iter().any(|t| t.len() > 0);
+    let all = (0..x.len()).filter(read);
+    all.map(|c| of_channel(c, x[c], &traces[c])).collect()
+}
+
 fn group(c: usize, x: &[f64], traces: &[Trace], own: Vec<usize>) -> Group {
     let longest = own.iter().map(|t| traces[*t].len()).max().unwrap_or(0);
     let x_of = |t: usize| (0..traces[t].len()).map(move |k| x[traces[t].row(k)]);

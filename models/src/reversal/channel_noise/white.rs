@@ -5,7 +5,8 @@ use std::sync::Arc;
 use errsep_solvers::loss::Loss;
 use errsep_solvers::problem::NoValue;
 
-use super::along::{AlongTraces, AtRest, Derivatives};
+use super::along::{AlongTraces, AtRest};
+use super::gathered::Derivatives;
 use super::scatter::Scatter;
 use super::settle::{Left, Settled, robust_unit, weighted_squares};
 use super::survey::Survey;
@@ -97,7 +98,10 @@ impl Told {
         Ok(Some(Self {
             unit: law.of_readings().sqrt(),
             shift_um2: law.shift * mean_square,
-            origin: NoiseOrigin::Repeats(law.times(mean_square)),
+            origin: NoiseOrigin::Repeats {
+                law: law.times(mean_square),
+                shared: along.shared(mean_square),
+            },
             agreement: Agreement {
                 disagree: Some(missed > 0.0),
                 missed: (missed * mean_square).sqrt(),

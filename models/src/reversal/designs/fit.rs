@@ -44,7 +44,14 @@ pub fn fit(
     let level = survey
         .levelled()
         .filter(|level| level.matters && !kept)
-        .map(|level| (with_values(&read, level.values), level.greatest));
+        .map(|level| {
+            let taken_out: Vec<usize> = (0..read.len()).map(|c| level.taken_out(c)).collect();
+            let mut traces = with_values(&read, level.values);
+            for (trace, taken_out) in traces.iter_mut().zip(taken_out) {
+                trace.taken_out = taken_out;
+            }
+            (traces, level.greatest)
+        });
     let (traces, survey) = match &level {
         None => (&read, survey),
         Some((traces, _)) => {

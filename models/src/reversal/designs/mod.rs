@@ -12,7 +12,7 @@
 //! [`fit`] the exact geometry. See `docs/theory/reversal-designs.md`.
 
 mod analysis;
-mod channel;
+pub(crate) mod channel;
 mod closure;
 mod determined;
 mod disturbance;

@@ -2,7 +2,7 @@
 
 use super::channel::Design;
 use crate::reversal::Direction;
-use crate::reversal::channel_noise::SortedReadings;
+use crate::reversal::channel_noise::{Seat, SortedReadings};
 
 /// One indicator reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,6 +47,10 @@ pub struct Trace {
     pub value: Vec<f64>,
     /// Where each reading stands among the observations.
     pub source: Vec<usize>,
+    /// How indicator and spindle stand.
+    pub seat: Seat,
+    /// Numbers that were fitted to the readings and taken out of them before.
+    pub taken_out: usize,
 }
 
 impl SortedReadings for Trace {
@@ -61,13 +65,18 @@ impl SortedReadings for Trace {
     fn source(&self, row: usize) -> usize {
         self.source[row]
     }
+
+    fn seat(&self) -> Seat {
+        self.seat
+    }
 }
 
 impl Trace {
     /// The traces of all channels, in their order.
     pub fn sort(observations: &DesignObservations) -> Vec<Self> {
         let readings = &observations.readings;
-        (0..observations.design.channels().len())
+        let channels = observations.design.channels();
+        (0..channels.len())
             .map(|c| {
                 let mut source: Vec<usize> = (0..readings.len())
                     .filter(|i| readings[*i].channel == c)
@@ -77,6 +86,8 @@ impl Trace {
                     x: source.iter().map(|i| readings[*i].x).collect(),
                     value: source.iter().map(|i| readings[*i].value).collect(),
                     source,
+                    seat: Seat::from(&channels[c]),
+                    taken_out: 0,
                 }
             })
             .collect()

@@ -14,13 +14,13 @@ use super::problem::crest::Beside;
 use super::problem::{Body, DesignProblem, Splines};
 use super::readings::{DesignObservations, Trace};
 use crate::basis::bspline::{Cubic, horner};
-use crate::reversal::channel_noise::along::Gathered;
+use crate::reversal::channel_noise::gathered::Gathered;
 use crate::reversal::channel_noise::scatter::Scatter;
 use crate::reversal::channel_noise::settle::Settled;
 use crate::reversal::channel_noise::supposed::against_white;
 use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::channel_noise::white::Told;
-use crate::reversal::channel_noise::{rms, traces};
+use crate::reversal::channel_noise::{freedom_left, rms, traces};
 use crate::reversal::finer_forms::FinerForms;
 use crate::reversal::forward::Attitude;
 use crate::reversal::simultaneous::fitted_knots::FittedKnots;
@@ -144,7 +144,7 @@ impl DesignFit {
             noise_um,
             noise_origin: told.origin,
             agreement: told.agreement,
-            degrees_of_freedom: readings as f64 - problem.layout.free_count() as f64,
+            degrees_of_freedom: freedom_left(problem),
             residuals,
             levelled_um: None,
             by_channel,

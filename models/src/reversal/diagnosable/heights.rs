@@ -9,6 +9,7 @@ use super::arrangement::Seat;
 use super::sorting::{Sorted, TraceKey, trace_key};
 use crate::model::Place;
 use crate::reversal::channel_noise::heights::{Course, Height, Repeats, are_free};
+use crate::reversal::channel_noise::passes::{BothWays, are_zeroed};
 use crate::reversal::designs::DesignObservations;
 
 /// The heights of a model.
@@ -22,7 +23,11 @@ pub(super) struct Heights {
 impl Heights {
     /// The heights of readings, where they are to be free.
     pub fn of(sorted: &Sorted, seats: &[Seat]) -> Option<Self> {
-        let by_pass = are_free(&repeated(sorted), &courses(sorted, seats))?;
+        let repeated = repeated(sorted);
+        let by_pass = match repeated.is_empty() {
+            true => are_zeroed(&both_ways(sorted, seats)).then_some(true),
+            false => are_free(&repeated, &courses(sorted, seats)),
+        }?;
         Some(Self::free(&sorted.places, &sorted.traces, by_pass))
     }
 
@@ -174,4 +179,30 @@ fn courses(sorted: &Sorted, seats: &[Seat]) -> Vec<Course> {
         }
     };
     channels.into_iter().map(in_order).collect()
+}
+
+/// The passes of the channels that have two, one each way.
+fn both_ways(sorted: &Sorted, seats: &[Seat]) -> Vec<BothWays> {
+    let (Some(low), Some(high)) = (sorted.positions.first(), sorted.positions.last()) else {
+        return Vec::new();
+    };
+    let mut channels: BTreeMap<usize, Vec<&Range<usize>>> = BTreeMap::new();
+    for (trace, channel) in sorted.traces.iter().zip(&sorted.trace_channels) {
+        channels.entry(*channel).or_default().push(trace);
+    }
+    let of = |(channel, traces): (usize, Vec<&Range<usize>>)| {
+        let is_back = |t: &Range<usize>| sorted.places[t.start].direction < 0.0;
+        let (forward, backward) = match traces[..] {
+            [a, b] if is_back(b) && !is_back(a) => (a, b),
+            [a, b] if is_back(a) && !is_back(b) => (b, a),
+            _ => return None,
+        };
+        let pairs = forward.clone().zip(backward.clone());
+        let differences = pairs.zip(&sorted.positions).map(|((f, b), x)| {
+            let along = (x - low) / (high - low);
+            (2.0 * along - 1.0, sorted.values[b] - sorted.values[f])
+        });
+        BothWays::of(seats[channel].indicator, &differences.collect::<Vec<_>>())
+    };
+    channels.into_iter().filter_map(of).collect()
 }

@@ -10,7 +10,7 @@ use errsep_solvers::structured::{Parameters, StructuredFit, fit_structured};
 
 use super::closure;
 use super::descent::{approach, minimise};
-use super::effects::{CATALOGUE, HEIGHTS, Heights, Indicator, Setting, times};
+use super::effects::{CATALOGUE, HEIGHTS, Heights, Setting, times};
 use super::error::ReversalError;
 use super::fitted_knots::FittedKnots;
 use super::ground::{Begun, Breaks, Ground};
@@ -68,8 +68,7 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
             ground.thickness_free,
         );
         let time = |channel: usize, row: usize| times[channels[channel].source[row] as usize];
-        let indicator = |channel: usize| Indicator::of(channels[channel].channel) as usize;
-        let heights = survey.free_heights(indicator, time).map(|by_pass| {
+        let heights = survey.free_heights(time).map(|by_pass| {
             let heights = Heights::of(observations, by_pass);
             let none = vec![0.0; heights.unknowns().len()];
             (HEIGHTS, heights, none)

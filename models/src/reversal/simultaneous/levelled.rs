@@ -1,4 +1,5 @@
-//! Repeats brought to one height before the fit: a mean over repeats of which one ends before the others would have a step.
+//! Repeats brought to one height before the fit, as a mean over repeats of which one ends before the others would have a step; and
+//! passes each way that are zeroed anew.
 
 use super::options::Options;
 use super::readings::ChannelReadings;
@@ -13,14 +14,19 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// Where repeats stand apart that were not read at the same positions. Effects know readings as they are.
+    /// Where repeats stand apart that were not read at the same positions, or passes are zeroed anew. Effects know readings as they are.
     pub(super) fn of(survey: &Survey, read: &[ChannelReadings], options: &Options) -> Option<Self> {
         if !options.effects.is_empty() {
             return None;
         }
         let level = survey.levelled().filter(|level| level.matters)?;
+        let taken_out: Vec<usize> = (0..read.len()).map(|c| level.taken_out(c)).collect();
+        let mut channels = with_values(read, level.values);
+        for (channel, taken_out) in channels.iter_mut().zip(taken_out) {
+            channel.taken_out = taken_out;
+        }
         Some(Self {
-            channels: with_values(read, level.values),
+            channels,
             greatest: level.greatest,
         })
     }

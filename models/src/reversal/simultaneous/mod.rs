@@ -59,7 +59,7 @@ pub use readings::ChannelReadings;
 pub use seed::{lines, start, tilts};
 pub use solution::{
     Agreement, ChannelNoise, Closure, Convergence, NoiseOrigin, Profile, ResidualRecord,
-    Simultaneous, Tilt,
+    SharedNoise, Simultaneous, Tilt,
 };
 pub use told::{EffectParameter, FittedEffect};
 pub use unknowns::{Form, Unknowns};

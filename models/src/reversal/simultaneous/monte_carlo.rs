@@ -1,6 +1,8 @@
 //! Uncertainty by propagation of distributions (JCGM 101:2008, clause 7): readings are drawn anew
 //! around the fitted model with the estimated noise, and fitted again on the same knots.
 
+use std::collections::BTreeMap;
+
 use errsep_solvers::options::Options as Minimisation;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -10,10 +12,11 @@ use super::effects::times;
 use super::error::ReversalError;
 use super::fit::not_converged;
 use super::readings::ChannelReadings;
-use super::solution::{NoiseOrigin, Simultaneous};
+use super::solution::{NoiseOrigin, SharedNoise, Simultaneous};
 use crate::noise::Law;
 use crate::reversal::Observations;
 use crate::reversal::channel_noise::survey::Survey;
+use crate::reversal::channel_noise::traces::Trace;
 
 /// What the trials say of one quantity.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,6 +73,10 @@ pub fn monte_carlo(
         .collect();
     let sigmas: Vec<f64> = solution.noise.iter().map(|n| n.sigma).collect();
     let laws = laws(solution);
+    let shared = match solution.noise_origin {
+        NoiseOrigin::Repeats { shared, .. } => shared,
+        NoiseOrigin::Declared | NoiseOrigin::Residuals => None,
+    };
     let times = times(observations);
     let joined = solution.joined(observations, &times);
     let sorted = channels.clone();
@@ -78,13 +85,13 @@ pub fn monte_carlo(
     let mut tilts: Vec<Vec<f64>> = Vec::new();
     let mut forms: Vec<Vec<f64>> = Vec::new();
     for _ in 0..trials {
+        let mut noise = Noise::new(&laws, shared, &survey);
         for (c, (channel, model)) in channels.iter_mut().zip(&models).enumerate() {
             for trace in &survey.traces[c] {
                 let rows: Vec<usize> = (0..trace.len()).map(|k| trace.row(k)).collect();
                 let x: Vec<f64> = rows.iter().map(|row| channel.x[*row]).collect();
-                let mut noise = vec![0.0; rows.len()];
-                laws[c].draw(&x, &mut rng, &mut noise);
-                for (row, noise) in rows.into_iter().zip(noise) {
+                let drawn = noise.of_trace(c, trace, &x, &mut rng);
+                for (row, noise) in rows.into_iter().zip(drawn) {
                     channel.value[row] = model[row] + noise;
                 }
             }
@@ -139,12 +146,57 @@ pub fn monte_carlo(
     })
 }
 
+/// Draws the noise of all traces of a trial.
+struct Noise<'a> {
+    laws: &'a [Law],
+    shared: Option<SharedNoise>,
+    survey: &'a Survey<'a>,
+    /// Of traces whose partner has been drawn: channel, direction, repeat.
+    waiting: BTreeMap<(usize, bool, u32), Vec<f64>>,
+}
+
+impl<'a> Noise<'a> {
+    fn new(laws: &'a [Law], shared: Option<SharedNoise>, survey: &'a Survey<'a>) -> Self {
+        Self {
+            laws,
+            shared,
+            survey,
+            waiting: BTreeMap::new(),
+        }
+    }
+
+    /// The noise of a trace at these positions.
+    fn of_trace(&mut self, c: usize, trace: &Trace, x: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
+        if let Some(noise) = (self.waiting).remove(&(c, trace.backward, trace.repeat)) {
+            return noise;
+        }
+        let mut draw = |law: &Law| {
+            let mut noise = vec![0.0; x.len()];
+            law.draw(x, rng, &mut noise);
+            noise
+        };
+        let partner = self.survey.read_together(c, trace).zip(self.shared);
+        let Some((other, shared)) = partner else {
+            return draw(&self.laws[c]);
+        };
+        let (both, against) = (draw(&shared.together), draw(&shared.against));
+        let combined = |sign: f64| {
+            let of = both.iter().zip(&against);
+            of.map(|(s, d)| (s + sign * d) * std::f64::consts::FRAC_1_SQRT_2)
+                .collect::<Vec<f64>>()
+        };
+        let key = (other, trace.backward, trace.repeat);
+        self.waiting.insert(key, combined(-1.0));
+        combined(1.0)
+    }
+}
+
 /// The law of each channel's readings.
 fn laws(solution: &Simultaneous) -> Vec<Law> {
     let variances = || solution.noise.iter().map(|n| n.sigma * n.sigma);
     match solution.noise_origin {
         // Shifts and drifts are as great in channels of any noise.
-        NoiseOrigin::Repeats(law) => variances()
+        NoiseOrigin::Repeats { law, .. } => variances()
             .map(|v| {
                 let own = (v - law.shift) / law.of_readings().max(f64::MIN_POSITIVE);
                 Law {

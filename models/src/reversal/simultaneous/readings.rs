@@ -15,6 +15,8 @@ pub struct ChannelReadings {
     pub value: Vec<f64>,
     /// Where each reading stands in the observations.
     pub source: Vec<u32>,
+    /// Numbers that were fitted to the readings and taken out of them before.
+    pub taken_out: usize,
 }
 
 impl ChannelReadings {
@@ -34,6 +36,7 @@ impl ChannelReadings {
                     x: Vec::with_capacity(count),
                     value: Vec::with_capacity(count),
                     source: Vec::with_capacity(count),
+                    taken_out: 0,
                 };
                 for (i, reading) in (0_u32..).zip(&observations.readings) {
                     if reading.channel == channel {
@@ -66,6 +69,7 @@ impl ChannelReadings {
             x: Vec::new(),
             value: Vec::new(),
             source: Vec::new(),
+            taken_out: self.taken_out,
         };
         for pair in starts.windows(2) {
             let count = pair[1].saturating_sub(pair[0]);

@@ -7,7 +7,7 @@ use super::placed::Placed;
 use super::predict::Prediction;
 use super::problem::Reversal;
 use super::solution::Simultaneous;
-use crate::reversal::channel_noise::along::Derivatives;
+use crate::reversal::channel_noise::gathered::Derivatives;
 
 /// Where rows come from: of a position alone, or of a reading where effects tell readings apart.
 pub struct RowSource<'s> {

@@ -86,8 +86,24 @@ pub enum NoiseOrigin {
     Declared,
     /// White, from what the fit leaves of the readings.
     Residuals,
-    /// From what differs between repeats: variances of the parts of one reading, µm².
-    Repeats(Law),
+    /// From what differs between repeats.
+    Repeats {
+        /// Variances of the parts of one reading, µm².
+        law: Law,
+        /// What opposite indicators share, where that is likelier than that they share nothing.
+        shared: Option<SharedNoise>,
+    },
+}
+
+/// Noise of two opposite indicators that read one pass together; a and b are their readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SharedNoise {
+    /// Correlation of what both read: towards −1 where the slide runs elsewhere in each pass.
+    pub correlation: f64,
+    /// Law of (a + b)/√2, µm².
+    pub together: Law,
+    /// Law of (a − b)/√2, µm².
+    pub against: Law,
 }
 
 /// What the redundancy of four channels says.

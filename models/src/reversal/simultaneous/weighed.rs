@@ -9,7 +9,8 @@ use super::descent;
 use super::error::ReversalError;
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
-use crate::reversal::channel_noise::{SortedReadings, Weighed};
+use crate::reversal::channel_noise::{Seat, SortedReadings, Weighed};
+use crate::reversal::designs::channel::DesignChannel;
 
 impl SortedReadings for ChannelReadings {
     fn x(&self) -> &[f64] {
@@ -22,6 +23,10 @@ impl SortedReadings for ChannelReadings {
 
     fn source(&self, row: usize) -> usize {
         self.source[row] as usize
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::from(&DesignChannel::from(self.channel))
     }
 }
 
@@ -41,7 +46,7 @@ impl Weighed for Reversal<'_> {
     }
 
     fn free_count(&self) -> usize {
-        self.unknowns.free_count()
+        self.unknowns.free_count() + self.channels.iter().map(|c| c.taken_out).sum::<usize>()
     }
 
     fn residuals(&self, at: &Parameters) -> Result<Vec<Vec<f64>>, NoValue> {

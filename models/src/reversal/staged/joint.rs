@@ -17,6 +17,7 @@ use super::designs::Designs;
 use super::gauge::LinePart;
 use super::grid::Grid;
 use super::line::Line;
+use super::resample::Stencil;
 use super::trace::Trace;
 
 /// As many conditions as unknowns: two for each of at most four channels.
@@ -43,6 +44,18 @@ pub struct Joint<'a> {
     columns: Vec<Vec<Column>>,
     /// Readings at each point, by trace.
     counts: Vec<&'a [f64]>,
+    /// By trace, its partner: the opposite indicator at the same position of the spindle.
+    partners: Vec<Option<Partner>>,
+}
+
+/// What a trace shares with its partner.
+#[derive(Debug, Clone)]
+struct Partner {
+    trace: usize,
+    /// Correlation of readings.
+    correlation: f64,
+    /// By point, that of the partner at the same place.
+    points: Vec<Option<usize>>,
 }
 
 impl<'a> Joint<'a> {
@@ -147,7 +160,44 @@ impl<'a> Joint<'a> {
             products,
             columns,
             counts: traces.iter().map(|t| &t.count[..]).collect(),
+            partners: vec![None; n],
         })
+    }
+
+    /// The same, where readings of these pairs of traces at one place are correlated.
+    #[must_use]
+    pub fn sharing(mut self, traces: &[Trace], pairs: &[(usize, usize)], correlation: f64) -> Self {
+        if correlation == 0.0 {
+            return self;
+        }
+        let same = self.grid.same;
+        let n = 2 * self.lines.len();
+        for (a, b) in pairs {
+            for (own, other) in [(*a, *b), (*b, *a)] {
+                let (x, at) = (&traces[own].x, &traces[other].x);
+                let partner = |x: &f64| {
+                    let near = at.partition_point(|p| *p < x - same);
+                    at.get(near).is_some_and(|p| *p <= x + same).then_some(near)
+                };
+                let points: Vec<Option<usize>> = x.iter().map(partner).collect();
+                for (i, j) in points.iter().enumerate() {
+                    let Some(j) = *j else { continue };
+                    let counts = (self.counts[own][i] * self.counts[other][j]).sqrt();
+                    let (left, right) = (&self.columns[own][i], &self.columns[other][j]);
+                    for p in 0..n {
+                        for q in 0..n {
+                            self.products[(p, q)] += correlation * counts * left[p] * right[q];
+                        }
+                    }
+                }
+                self.partners[own] = Some(Partner {
+                    trace: other,
+                    correlation,
+                    points,
+                });
+            }
+        }
+        self
     }
 
     /// The covariance of the slopes (µm/mm) for noise 1.
@@ -155,6 +205,12 @@ impl<'a> Joint<'a> {
         let n = self.lines.len();
         let rows = self.inverse.rows(0, n);
         rows * &self.products * rows.transpose() / (self.scale * self.scale)
+    }
+
+    /// The partner of a trace, and its point where this one is.
+    fn partner(&self, trace: usize, point: usize) -> Option<(&Partner, usize)> {
+        let partner = self.partners[trace].as_ref()?;
+        Some((partner, partner.points[point]?))
     }
 
     /// The variance of Σ weight·rest of the channels at position k of the grid, for noise 1.
@@ -175,6 +231,24 @@ impl<'a> Joint<'a> {
                 for row in 0..2 * n {
                     with_conditions[row] += weight * a * self.columns[c][i][row];
                 }
+                let Some((partner, j)) = self.partner(c, i) else {
+                    continue;
+                };
+                let counts = self.counts[partner.trace][j] / self.counts[c][i];
+                for row in 0..2 * n {
+                    with_conditions[row] += partner.correlation
+                        * weight
+                        * a
+                        * counts.sqrt()
+                        * self.columns[partner.trace][j][row];
+                }
+                let seen = self.grid.sights[partner.trace][k].iter();
+                let there = seen
+                    .flat_map(Stencil::terms)
+                    .filter(|(point, _)| *point == j);
+                let other: f64 = there.map(|(_, a)| weights[partner.trace] * a).sum();
+                own += partner.correlation * weight * a * other
+                    / (self.counts[c][i] * self.counts[partner.trace][j]).sqrt();
             }
         }
         let through = self.inverse.tr_mul(&by_line);

@@ -209,7 +209,10 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
     let grid = Grid::of(&traces, &designs, options.interpolation)?;
     let measured = Union::of(traces.iter().map(|t| &t.x[..]));
     let (gauge, left_out) = LinePart::gauge(&grid, measured, options.interpolation);
-    let joint = Joint::solve(&traces, &first, &grid, &designs, &gauge)?;
+    let pairs = drift::opposite(&traces);
+    let shared = drift::shared(observations, &traces);
+    let joint =
+        Joint::solve(&traces, &first, &grid, &designs, &gauge)?.sharing(&traces, &pairs, shared);
     let fits = &joint.lines;
     let estimates = estimate_errors(&traces, fits, options);
     let early_noise = noise_figures(options, &traces, None);

@@ -20,8 +20,8 @@ pub(super) struct Tilts {
 }
 
 impl Tilts {
-    /// With what the drifts of repeats add to the variance of each channel's slope, (µm/mm)².
-    pub(super) fn of(joint: &Joint, sigma: f64, drifts: &[f64]) -> Self {
+    /// With what the drifts of repeats add to the covariance of the channels' slopes, (µm/mm)².
+    pub(super) fn of(joint: &Joint, sigma: f64, drifts: &DMatrix<f64>) -> Self {
         let values: Vec<f64> = joint
             .lines
             .iter()
@@ -33,10 +33,10 @@ impl Tilts {
             .collect();
         let slopes = joint.slopes();
         let mut covariance = slopes.map_with_location(|r, c, v| v * gain[r] * gain[c]);
-        for (c, variance) in drifts.iter().enumerate() {
-            let gain = mm_from_um(1.0) * values[c].cos().powi(2);
-            covariance[(c, c)] += variance * gain * gain;
-        }
+        let gain: Vec<f64> = (values.iter())
+            .map(|tilt| mm_from_um(1.0) * tilt.cos().powi(2))
+            .collect();
+        covariance += drifts.map_with_location(|r, c, v| v * gain[r] * gain[c]);
         Self { values, covariance }
     }
 

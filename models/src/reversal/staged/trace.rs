@@ -48,6 +48,10 @@ impl Trace {
         let of = |(channel, heights): (&ChannelReadings, usize)| {
             let mut trace = Self::of(&brought, channel.channel)?;
             trace.scatter_freedom = trace.scatter_freedom.saturating_sub(heights);
+            if level.by_pass {
+                let read = Self::of(observations, channel.channel)?;
+                trace.direction_difference = read.direction_difference;
+            }
             Some(trace)
         };
         let greatest = level.matters.then_some(level.greatest);

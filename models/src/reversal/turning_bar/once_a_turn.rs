@@ -36,6 +36,9 @@ pub struct OnceATurn {
     pub highest_at: f64,
     /// Amplitude in the middle, µm.
     pub amplitude: f64,
+    /// Second harmonic of the section in the middle, a + ib of a cos 2ψ + b sin 2ψ, ψ from the direction in which the bar runs
+    /// out, µm.
+    pub oval: Complex<f64>,
     /// Standard deviation of what background, wave and second harmonic leave, µm.
     pub rest: f64,
 }
@@ -98,6 +101,8 @@ pub fn once_a_turn(run: &Run, about_hz: Option<f64>) -> Result<OnceATurn, Turnin
         .map_or((frequency.value, f64::INFINITY), |told| {
             (told.value, told.std)
         });
+    let spread = Spread::new(&bar, &noise, Slow::default());
+    let oval = (bar.harmonics(&spread).iter().find(|h| h.k == 2)).map(|h| h.middle);
     let middle = survey.frame.middle;
     let direction = bar.axis_direction(middle_of(run));
     // Highest where ψ = −θ is the direction of the run-out.
@@ -108,6 +113,7 @@ pub fn once_a_turn(run: &Run, about_hz: Option<f64>) -> Result<OnceATurn, Turnin
         unsteadiness: surveyed.unsteadiness(noise.variance(), run.len()),
         highest_at: middle + ahead / (TAU * frequency.value),
         amplitude: bar.amplitude(middle_of(run)),
+        oval: oval.unwrap_or_default(),
         rest: (bar.squares / bar.freedom()).sqrt(),
     })
 }

@@ -7,4 +7,5 @@ mod minimum;
 mod noise;
 mod plan;
 mod refusals;
+mod together;
 mod uncertainty;

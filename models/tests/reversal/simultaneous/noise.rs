@@ -166,7 +166,7 @@ fn repeats_tell_correlated_noise() {
         let (quiet, truth) = simulate(&plan, &[]).unwrap();
         let data = with_noise(quiet, &law, seed);
         let solution = fit(&data, &options(&basis, 42.0, Noise::Estimated)).unwrap();
-        let NoiseOrigin::Repeats(found) = solution.noise_origin else {
+        let NoiseOrigin::Repeats { law: found, .. } = solution.noise_origin else {
             panic!("{:?}", solution.noise_origin);
         };
         assert!(
@@ -216,7 +216,7 @@ fn repeats_whose_positions_differ_are_compared() {
     }
     let data = with_noise(data, &law, 4);
     let solution = fit(&data, &options(&basis, 42.0, Noise::Estimated)).unwrap();
-    let NoiseOrigin::Repeats(found) = solution.noise_origin else {
+    let NoiseOrigin::Repeats { law: found, .. } = solution.noise_origin else {
         panic!("{:?}", solution.noise_origin);
     };
     assert!(

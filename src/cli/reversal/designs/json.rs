@@ -84,16 +84,17 @@ pub fn json(o: &Outcome) -> Result<Value, Message> {
             "noise_source": match fit.noise_origin {
                 NoiseOrigin::Declared => "declared",
                 NoiseOrigin::Residuals => "residuals",
-                NoiseOrigin::Repeats(_) => "repeats",
+                NoiseOrigin::Repeats { .. } => "repeats",
             },
             "noise_words": o.noise_words(),
             "noise_law": match fit.noise_origin {
-                NoiseOrigin::Repeats(law) => json!({
+                NoiseOrigin::Repeats { law, shared } => json!({
                     "white": law.white.sqrt(),
                     "correlated": law.correlated.sqrt(),
                     "length": law.length,
                     "shift": law.shift.sqrt(),
                     "drift": 1e-3 * law.drift.sqrt(),
+                    "between_indicators": shared.map(|s| s.correlation),
                 }),
                 _ => Value::Null,
             },

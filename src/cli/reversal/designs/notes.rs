@@ -173,7 +173,7 @@ pub(super) fn warnings(
     }
     if fit.knots.verdict == KnotVerdict::TooFew {
         let counted = match fit.noise_origin {
-            NoiseOrigin::Repeats(_) => "; the uncertainties follow the law of the repeats",
+            NoiseOrigin::Repeats { .. } => "; the uncertainties follow the law of the repeats",
             _ if fit.agreement.disagree == Some(true) => "",
             _ => "; the uncertainties are too small then",
         };

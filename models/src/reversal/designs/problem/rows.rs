@@ -8,7 +8,7 @@ use errsep_solvers::structured::{Parameters, StructuredFit, fit_structured};
 use super::columns::Batch;
 use super::{DesignProblem, Prepared};
 use crate::reversal::channel_noise::Weighed;
-use crate::reversal::channel_noise::along::Derivatives;
+use crate::reversal::channel_noise::gathered::Derivatives;
 use crate::reversal::designs::error::DesignFitError;
 use crate::reversal::designs::readings::Trace;
 use crate::reversal::simultaneous::rows::Run;
@@ -73,7 +73,7 @@ impl Weighed for DesignProblem<'_> {
     }
 
     fn free_count(&self) -> usize {
-        self.layout.free_count()
+        self.layout.free_count() + self.traces.iter().map(|t| t.taken_out).sum::<usize>()
     }
 
     fn residuals(&self, at: &Parameters) -> Result<Vec<Vec<f64>>, NoValue> {

@@ -135,7 +135,7 @@ fn four_channels_have_the_noise_of_the_four_channel_fit() {
             },
         )
         .unwrap();
-        let told = matches!(new.noise_origin, NoiseOrigin::Repeats(_));
+        let told = matches!(new.noise_origin, NoiseOrigin::Repeats { .. });
         assert_eq!(told, repeats > 1, "{:?}", new.noise_origin);
         for (own, theirs) in new.by_channel.iter().zip(&old.noise) {
             // Exact limit: sigmas settle at the same weights, to the rounding of two minima.

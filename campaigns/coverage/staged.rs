@@ -147,6 +147,8 @@ const POINTS_APART: usize = 7;
 
 fn solved(case: &Case, seed: u64) -> Option<(Plan, Truth, Staged)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
+    // The noise of the plan has the first stream.
+    random.set_stream(1);
     let mut plan = Plan::even(0.0, LENGTH, 61, NOISE_UM);
     (plan.alpha_rad, plan.beta_rad, plan.gamma_rad) = (40e-6, -15e-6, 25e-6);
     plan.m = TrueForm::random_waves(&mut random, 0.5, LENGTH, 5);
@@ -167,6 +169,7 @@ fn solved(case: &Case, seed: u64) -> Option<(Plan, Truth, Staged)> {
 
 fn tallies(plan: &Plan, truth: &Truth, solution: &Staged) -> Option<[Tally; 7]> {
     let freedom = (solution.noise.degrees_of_freedom).unwrap_or(f64::INFINITY);
+    let of_slopes = solution.slope_freedom.unwrap_or(f64::INFINITY);
     let mut tallies = [Tally::default(); 7];
     let tilts = [
         (Contrast::Alpha, plan.alpha_rad),
@@ -175,10 +178,10 @@ fn tallies(plan: &Plan, truth: &Truth, solution: &Staged) -> Option<[Tally; 7]> 
     ];
     for (k, (contrast, value)) in tilts.into_iter().enumerate() {
         let found = solution.tilt(contrast)?;
-        tallies[k].add(found.value - value, found.std, freedom);
+        tallies[k].add(found.value - value, found.std, of_slopes);
     }
     let slope = solution.closure.as_ref()?.slope;
-    tallies[3].add(slope.value, slope.std, freedom);
+    tallies[3].add(slope.value, slope.std, of_slopes);
     for (k, form) in [&truth.m, &truth.s_a, &truth.s_b].into_iter().enumerate() {
         let found = solution.form(k)?;
         let points = solution.x.iter().zip(&found.values).zip(&found.std);

@@ -69,7 +69,7 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         contrasts: s.contrasts,
         closure: s.closure.as_ref().map(|c| Closure {
             slope: Some(c.slope),
-            freedom: freedom(s.noise.degrees_of_freedom),
+            freedom: freedom(s.slope_freedom),
             x: c.x.clone(),
             profile: c.profile.clone(),
             rms: c.rms,
@@ -82,7 +82,7 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         channel_noise: Vec::new(),
         degrees_of_freedom: s.residual.degrees_of_freedom as f64,
         noise_law: None,
-        noise_freedom: freedom(s.noise.degrees_of_freedom),
+        noise_freedom: freedom(s.slope_freedom),
         form_freedom: freedom(s.noise.degrees_of_freedom),
         disagree: profile_exceeds_noise(&s),
         missed: 0.0,
@@ -111,8 +111,8 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
     }
 }
 
-fn freedom(of_noise: Option<f64>) -> DegreesOfFreedom {
-    of_noise.map_or(DegreesOfFreedom::Infinite, |n| {
+fn freedom(known: Option<f64>) -> DegreesOfFreedom {
+    known.map_or(DegreesOfFreedom::Infinite, |n| {
         DegreesOfFreedom::Finite(n.max(1.0))
     })
 }

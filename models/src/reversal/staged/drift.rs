@@ -35,15 +35,26 @@ struct Slopes {
 /// Direction and number of a trace.
 type Key = (Direction, u32);
 
+/// What drifts of repeats add to the slopes of the channels.
+pub(super) struct Drifts {
+    /// To their covariance, (µm/mm)².
+    pub(super) covariance: DMatrix<f64>,
+    /// Degrees of freedom that it is known with.
+    pub(super) freedom: f64,
+}
+
 /// Takes the lines by which repeats differ out of the scatter where they stand out of it, and gives what they add
-/// to the covariance of the channels' slopes, (µm/mm)²; zeros where they do not.
-pub(super) fn take_out(observations: &Observations, traces: &mut [Trace]) -> DMatrix<f64> {
+/// to the slopes of the channels; zeros where they do not.
+pub(super) fn take_out(observations: &Observations, traces: &mut [Trace]) -> Drifts {
     let all: Vec<Slopes> = traces.iter().map(|t| slopes(observations, t)).collect();
     let freedom: usize = all.iter().map(|s| s.freedom).sum();
     let scatter: f64 = traces.iter().map(|t| t.scatter).sum();
     let whole: usize = traces.iter().map(|t| t.scatter_freedom).sum();
     let of_readings: f64 = all.iter().map(|s| s.of_readings).sum();
-    let mut added = DMatrix::zeros(traces.len(), traces.len());
+    let mut added = Drifts {
+        covariance: DMatrix::zeros(traces.len(), traces.len()),
+        freedom: f64::INFINITY,
+    };
     if freedom == 0 || whole <= freedom || scatter <= of_readings {
         return added;
     }
@@ -64,7 +75,7 @@ pub(super) fn take_out(observations: &Observations, traces: &mut [Trace]) -> DMa
     }
     let count = |c: usize| all[c].by_trace.len().max(1) as f64;
     for c in 0..traces.len() {
-        added[(c, c)] = variance / count(c);
+        added.covariance[(c, c)] = variance / count(c);
     }
     let pairs = opposite(traces);
     let both = |a: usize, b: usize| {
@@ -73,11 +84,17 @@ pub(super) fn take_out(observations: &Observations, traces: &mut [Trace]) -> DMa
     };
     let lost = pairs.len() as f64 * (slopes().count() - freedom) as f64 / traces.len() as f64;
     let products = pairs.iter().flat_map(|(a, b)| both(*a, *b));
-    let shared = correlation(products, lost, SEEN);
+    // Noise of readings is in the squares, and not in the products.
+    let shared = correlation(products, lost, SEEN) * (variance + of_noise);
+    let shared = shared.clamp(-variance, variance);
     for (a, b) in pairs {
-        let covariance = shared * variance / (count(a) * count(b)).sqrt();
-        (added[(a, b)], added[(b, a)]) = (covariance, covariance);
+        let covariance = shared / (count(a) * count(b)).sqrt();
+        added.covariance[(a, b)] = covariance;
+        added.covariance[(b, a)] = covariance;
     }
+    // Of two traces that share theirs one tells no more than the other.
+    let alone = 1.0 - 0.5 * shared.abs() / variance.max(f64::MIN_POSITIVE);
+    added.freedom = freedom as f64 * alone;
     added
 }
 
@@ -103,9 +120,11 @@ pub(super) fn shared(observations: &Observations, traces: &[Trace]) -> f64 {
         let other = &left[*b];
         (left[*a].iter()).filter_map(move |(key, own)| Some((*own, *other.get(key)?)))
     });
-    let places: std::collections::BTreeSet<u64> =
-        left.iter().flat_map(|l| l.keys().map(|k| k.1)).collect();
-    correlation(both, (pairs.len() * places.len()) as f64, CLEAR)
+    let means: BTreeSet<(Direction, u64)> = left
+        .iter()
+        .flat_map(|l| l.keys().map(|((direction, _), x)| (*direction, *x)))
+        .collect();
+    correlation(both, (pairs.len() * means.len()) as f64, CLEAR)
 }
 
 /// Channels that opposite indicators read at one position of the spindle.

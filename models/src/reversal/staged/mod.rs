@@ -163,6 +163,8 @@ pub struct Staged {
     pub lines: Vec<ChannelLine>,
     /// The tilts or their combinations, orthogonal to each other.
     pub tilts: Vec<Tilt>,
+    /// Degrees of freedom of their uncertainties, where these are not known without doubt.
+    pub slope_freedom: Option<f64>,
     /// All four contrasts of the slopes; only four channels have them.
     pub contrasts: Option<[(Contrast, Value); 4]>,
     /// Positions of the forms, mm.
@@ -236,7 +238,8 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
     let closing = (traces.len() == 4).then(|| together.closure(&designs, &joint));
     let noise_figures = noise_figures(options, &traces, closing.as_ref());
     let noise = *noise_figures.first().ok_or(NoSolution::NoReadings)?;
-    let tilts = Tilts::of(&joint, noise.sigma, &drifts);
+    let known = noise.degrees_of_freedom.unwrap_or(f64::INFINITY);
+    let tilts = Tilts::of(&joint, (noise.sigma, known), &drifts);
     let lines = channel_lines(&traces, fits, estimates, &tilts);
     let forms = together.forms(&designs, &joint, noise.sigma);
     let contrasts = (traces.len() == 4).then(|| contrasts(&tilts));
@@ -264,6 +267,7 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
         convention: options.convention,
         removal,
         tilts: solve_tilts(&tilts, &channels, options.convention),
+        slope_freedom: Some(tilts.freedom).filter(|f| f.is_finite()),
         contrasts,
         residual: residual_freedom(closure.as_ref()),
         lines,

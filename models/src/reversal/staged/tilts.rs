@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::drift::Drifts;
 use super::estimates::{ErrorEstimates, rms};
 use super::joint::Joint;
 use super::line::Line;
@@ -17,11 +18,13 @@ use crate::units::mm_from_um;
 pub(super) struct Tilts {
     pub(super) values: Vec<f64>,
     covariance: DMatrix<f64>,
+    /// Degrees of freedom, where the noise of one reading is known with as many as were given.
+    pub(super) freedom: f64,
 }
 
 impl Tilts {
     /// With what the drifts of repeats add to the covariance of the channels' slopes, (µm/mm)².
-    pub(super) fn of(joint: &Joint, sigma: f64, drifts: &DMatrix<f64>) -> Self {
+    pub(super) fn of(joint: &Joint, (sigma, freedom): (f64, f64), drifts: &Drifts) -> Self {
         let values: Vec<f64> = joint
             .lines
             .iter()
@@ -36,8 +39,20 @@ impl Tilts {
         let gain: Vec<f64> = (values.iter())
             .map(|tilt| mm_from_um(1.0) * tilt.cos().powi(2))
             .collect();
-        covariance += drifts.map_with_location(|r, c, v| v * gain[r] * gain[c]);
-        Self { values, covariance }
+        let added = (drifts.covariance).map_with_location(|r, c, v| v * gain[r] * gain[c]);
+        // Welch and Satterthwaite, the least of the channels.
+        let of = |c: usize| {
+            let (white, drift) = (covariance[(c, c)], added[(c, c)]);
+            let doubt = white * white / freedom + drift * drift / drifts.freedom;
+            (white + drift).powi(2) / doubt
+        };
+        let least = (0..values.len()).map(of).fold(f64::INFINITY, f64::min);
+        covariance += &added;
+        Self {
+            values,
+            covariance,
+            freedom: least,
+        }
     }
 
     /// Σ weight·tilt.

@@ -3,6 +3,7 @@
 mod agreement;
 #[path = "../command/mod.rs"]
 mod command;
+mod curved;
 mod designs;
 mod different_grids;
 mod drifts;

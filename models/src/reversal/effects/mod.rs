@@ -49,7 +49,7 @@ pub fn all(channels: &Arrangement) -> Vec<Box<dyn Effect<Linearised>>> {
         Box::new(gravity_sag::GravitySag),
         Box::new(hysteresis::Hysteresis(indicators())),
         Box::new(indexing_error::IndexingError::new(channels)),
-        Box::new(indicator_nonlinearity::IndicatorNonlinearity(indicators())),
+        Box::new(indicator_nonlinearity::IndicatorNonlinearity::new(channels)),
         Box::new(lateral_backlash::LateralBacklash::new(channels)),
         Box::new(local_contamination::LocalContamination::new(channels)),
         Box::new(off_crest::OffCrest::new(channels)),
@@ -85,10 +85,11 @@ pub fn amplitude_of_design(design: &Design, effect: &str) -> Option<Parameter> {
 
 /// Whether `simultaneous::effects` has an effect too, in the variant that a diagnosis tells in words: a
 /// lost motion that grows along the screw, lines of the slide with forms of their own, dirt that stays once it
-/// has come and curves of two powers are diagnosed, but are no unknowns of the fit.
+/// has come, and curves of two powers or about another point in each channel are diagnosed, but are no unknowns of the fit.
 pub fn joins_the_fit(effect: &str, variant: Option<&str>) -> bool {
-    const APART: [&str; 4] = [
+    const APART: [&str; 5] = [
         axis_backlash::GROWS,
+        indicator_nonlinearity::ABOUT_ANOTHER,
         indicator_nonlinearity::MIXED,
         lateral_backlash::LEANS,
         lateral_backlash::OWN_FORMS,

@@ -273,10 +273,17 @@ fn noise_words(fit: &Simultaneous, data: &Observations, x: &[f64]) -> String {
 }
 
 /// What the noise alone gives a closure of so many points, each the mean of its share of a channel's
-/// readings, µm.
+/// readings, µm. Of opposite indicators it holds the sum, (1 + correlation) of the variance.
 fn expected_closure(fit: &Simultaneous, points: usize) -> f64 {
     let variance_of_mean = |n: &ChannelNoise| n.sigma * n.sigma * points as f64 / n.readings as f64;
-    fit.noise.iter().map(variance_of_mean).sum::<f64>().sqrt() / 4.0
+    let share = match fit.noise_origin {
+        NoiseOrigin::Repeats {
+            shared: Some(shared),
+            ..
+        } => 1.0 + shared.correlation,
+        _ => 1.0,
+    };
+    (share * fit.noise.iter().map(variance_of_mean).sum::<f64>()).sqrt() / 4.0
 }
 
 fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {

@@ -95,7 +95,7 @@ mod tests {
     fn channel(indicator: usize, above: f64, drift: f64) -> BothWays {
         let at = |k: u32| {
             let xi = -1.0 + f64::from(k) / 19.5;
-            let scatter = if k % 2 == 0 { 0.1 } else { -0.1 };
+            let scatter = if k.is_multiple_of(2) { 0.1 } else { -0.1 };
             (xi, above - drift * xi + scatter)
         };
         BothWays::of(indicator, &(0..40).map(at).collect::<Vec<_>>()).unwrap()

@@ -27,6 +27,9 @@ const KINDS: [&[i32]; 4] = [&[2], &[3], &[2, 3], &[2]];
 /// The kind that is read about another point in each channel.
 const ELSEWHERE: usize = 3;
 
+/// How far from its middle a curve is read at most, in the greatest reading of all: beyond, it is a gain.
+const FARTHEST: f64 = 2.0;
+
 /// Variants in words.
 pub(super) const MIXED: &str = "quadratic and cubic";
 /// See [`MIXED`].
@@ -109,29 +112,33 @@ impl Effect<Linearised> for IndicatorNonlinearity {
         columns
     }
 
-    /// The reading rises with what the indicator sees: 1 + Σ p aₚ qᵖ⁻¹/R > 0 for q from −1 to 1.
+    /// The reading rises with what the indicator sees: 1 + Σ p aₚ qᵖ⁻¹/R > 0 for q from −1 to 1. About another point, m from the
+    /// middle of the curve, the gain is 2 a m/R².
     fn possible(&self, model: &Linearised, shape: &Shape, amplitudes: &[f64]) -> bool {
         let reach = model.reading_reach();
         let (count, gains) = self.counts(shape, amplitudes);
         let least = gains.iter().copied().fold(0.0, f64::min);
-        (0..count).all(|own| {
-            let terms = self
-                .powers(shape)
-                .iter()
-                .zip(amplitudes[own..].iter().step_by(count));
-            let (mut square, mut cube) = (0.0, 0.0);
-            for (power, a) in terms {
-                *(if *power == 2 { &mut square } else { &mut cube }) = *a;
-            }
-            let slope = |q: f64| 1.0 + least + (2.0 * square * q + 3.0 * cube * q * q) / reach;
-            // The parabola's vertex, where it lies inside.
-            let vertex = if cube > 0.0 {
-                (-square / (3.0 * cube)).clamp(-1.0, 1.0)
-            } else {
-                1.0
-            };
-            [-1.0, vertex, 1.0].into_iter().all(|q| slope(q) > 0.0)
-        })
+        let most = gains.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
+        let reached = 2.0 * FARTHEST * amplitudes[..count].iter().fold(0.0, |a, b| b.abs().max(a));
+        most * reach <= reached + f64::MIN_POSITIVE
+            && (0..count).all(|own| {
+                let terms = self
+                    .powers(shape)
+                    .iter()
+                    .zip(amplitudes[own..].iter().step_by(count));
+                let (mut square, mut cube) = (0.0, 0.0);
+                for (power, a) in terms {
+                    *(if *power == 2 { &mut square } else { &mut cube }) = *a;
+                }
+                let slope = |q: f64| 1.0 + least + (2.0 * square * q + 3.0 * cube * q * q) / reach;
+                // The parabola's vertex, where it lies inside.
+                let vertex = if cube > 0.0 {
+                    (-square / (3.0 * cube)).clamp(-1.0, 1.0)
+                } else {
+                    1.0
+                };
+                [-1.0, vertex, 1.0].into_iter().all(|q| slope(q) > 0.0)
+            })
     }
 
     /// The deviation is told at the greatest reading.

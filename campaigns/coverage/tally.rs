@@ -1,6 +1,6 @@
 //! Counts of truths inside intervals, and the table that is made of them.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use errsep_solvers::uncertainty::student_quantile;
 
 /// The share of a normal distribution within one standard deviation.
 pub const ONE_SIGMA: f64 = 0.682_689_492_137_085_9;
@@ -21,8 +21,7 @@ impl Tally {
     pub fn add(&mut self, error: f64, std: f64, freedom: f64) {
         let factor = |share: f64| {
             if freedom.is_finite() {
-                StudentsT::new(0.0, 1.0, freedom)
-                    .map_or(f64::NAN, |t| t.inverse_cdf(0.5 + share / 2.0))
+                student_quantile(0.5 + share / 2.0, freedom)
             } else if share > 0.9 {
                 1.959_963_984_540_054
             } else {

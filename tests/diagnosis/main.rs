@@ -8,6 +8,7 @@ mod designs;
 mod different_grids;
 mod drifts;
 mod effect_signatures;
+mod far_shifts;
 mod heights;
 mod invariance;
 mod laws;

@@ -42,11 +42,18 @@ impl SmoothProfile {
 
     /// The value at a spot by the cubic between neighbours; straight beyond the ends.
     pub fn at(&self, spot: &Spot) -> f64 {
-        let Spot { left, right, of } = *spot;
+        let Spot {
+            left, right, of, ..
+        } = *spot;
         of[0] * self.values[left]
             + of[1] * self.values[right]
             + of[2] * self.slopes[left]
             + of[3] * self.slopes[right]
+    }
+
+    /// The slope at a spot, between those at its neighbours.
+    pub fn slope_at(&self, spot: &Spot) -> f64 {
+        self.slopes[spot.left] * (1.0 - spot.part) + self.slopes[spot.right] * spot.part
     }
 }
 
@@ -57,6 +64,8 @@ pub struct Spot {
     left: usize,
     right: usize,
     of: [f64; 4],
+    /// The part of the way from left to right.
+    part: f64,
 }
 
 /// Positions that are tried one by one before halving.
@@ -90,6 +99,7 @@ impl Spot {
                 left: end,
                 right: end,
                 of: [1.0, 0.0, x - positions[end], 0.0],
+                part: 0.0,
             };
         }
         let left = right - 1;
@@ -105,6 +115,7 @@ impl Spot {
                 h * t * u * u,
                 -h * t * t * u,
             ],
+            part: t,
         }
     }
 }

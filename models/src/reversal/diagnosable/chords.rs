@@ -26,13 +26,22 @@ impl Linearised {
     /// Change of the artefact's form under a channel when the probed point moves along it by
     /// `shift` mm, per mm.
     pub fn side_chord(&self, place: &Place, shift: f64) -> f64 {
-        if shift.abs() < 1e-9 * self.travel() {
-            return self.side_slope(place);
-        }
-        let side = self.side(place.channel);
+        self.chord_of(self.side(place.channel), place, shift)
+    }
+
+    /// The same of a form of its own.
+    pub(in crate::reversal) fn chord_of(
+        &self,
+        form: &SmoothProfile,
+        place: &Place,
+        shift: f64,
+    ) -> f64 {
         let k = self.at(place);
+        if shift.abs() < 1e-9 * self.travel() {
+            return form.slopes[k];
+        }
         let spot = Spot::new(&self.positions, k, place.x + shift);
-        (side.at(&spot) - side.values[k]) / shift
+        (form.at(&spot) - form.values[k]) / shift
     }
 
     /// Change of the smooth value of a reading when the slide stands `shift` mm further, per mm.

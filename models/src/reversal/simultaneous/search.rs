@@ -180,25 +180,47 @@ impl<'g, 'a> Search<'g, 'a> {
         starts: &[(Arc<dyn JoinedEffect>, Vec<f64>)],
         present: &[Found],
     ) -> Result<Option<Found>, ReversalError> {
+        let fits: Result<Vec<Option<(f64, Found)>>, ReversalError> = starts
+            .par_iter()
+            .map(|start| self.by_fit(name, start, present))
+            .collect();
         let mut best: Option<(f64, Found)> = None;
-        for (effect, values) in starts {
-            let mut all = present.to_vec();
-            all.push((name, Arc::clone(effect), values.clone()));
-            let begun = Begun::new(self.ground.observations, self.times, &all);
-            let (mut problem, start) = self.ground_problem(Some(&begun))?;
-            let options = &self.ground.options.minimisation;
-            let fit = approach(&problem, start, options)
-                .and_then(|start| minimise(&mut problem, start, options));
-            let Ok(fit) = fit else {
-                continue;
-            };
-            if best.as_ref().is_none_or(|b| fit.cost < b.0) {
-                let own = problem.unknowns.effect_values(&fit.parameters.border);
-                let own = own[own.len() - values.len()..].to_vec();
-                best = Some((fit.cost, (name, Arc::clone(effect), own)));
+        for fit in fits?.into_iter().flatten() {
+            if best.as_ref().is_none_or(|b| fit.0 < b.0) {
+                best = Some(fit);
             }
         }
         Ok(best.map(|b| b.1))
+    }
+
+    /// The cost of the fit from a start, and where it ends; `None` where it does not.
+    fn by_fit(
+        &self,
+        name: &'static str,
+        (effect, values): &(Arc<dyn JoinedEffect>, Vec<f64>),
+        present: &[Found],
+    ) -> Result<Option<(f64, Found)>, ReversalError> {
+        let mut all = present.to_vec();
+        all.push((name, Arc::clone(effect), values.clone()));
+        let begun = Begun::new(self.ground.observations, self.times, &all);
+        let (problem, start) = self.ground_problem(Some(&begun))?;
+        let thin;
+        let mut problem = match thinned(&problem) {
+            // What a play does hangs on every reading before.
+            Some(readings) if !begun.joined.plays() => {
+                thin = readings;
+                problem.over(&thin)
+            }
+            _ => problem,
+        };
+        let options = &self.ground.options.minimisation;
+        let fit = approach(&problem, start, options)
+            .and_then(|start| minimise(&mut problem, start, options));
+        Ok(fit.ok().map(|fit| {
+            let own = problem.unknowns.effect_values(&fit.parameters.border);
+            let own = own[own.len() - values.len()..].to_vec();
+            (fit.cost, (name, Arc::clone(effect), own))
+        }))
     }
 
     fn ground_problem<'s>(
@@ -218,14 +240,13 @@ impl<'g, 'a> Search<'g, 'a> {
     ) -> Result<Option<Found>, ReversalError> {
         let begun = Begun::new(self.ground.observations, self.times, present);
         let (problem, start) = self.ground_problem(Some(&begun))?;
-        let readings: usize = problem.channels.iter().map(ChannelReadings::len).sum();
         let thin;
-        let mut problem = if readings > MOST_READINGS {
-            let cells = problem.cell_count() * problem.channels.len();
-            thin = problem.thinned((MOST_READINGS / cells.max(1)).max(4));
-            problem.over(&thin)
-        } else {
-            problem
+        let mut problem = match thinned(&problem) {
+            Some(readings) => {
+                thin = readings;
+                problem.over(&thin)
+            }
+            None => problem,
         };
         let options = &self.ground.options.minimisation;
         let start = approach(&problem, start, options)?;
@@ -258,6 +279,15 @@ impl<'g, 'a> Search<'g, 'a> {
             .rfind(|s| s.0 >= most - SAME_GAIN * most.abs());
         Ok(best.map(|b| b.1))
     }
+}
+
+/// At most so many readings that starts can be compared over, where there are more.
+fn thinned(problem: &Reversal) -> Option<Vec<ChannelReadings>> {
+    let readings: usize = problem.channels.iter().map(ChannelReadings::len).sum();
+    (readings > MOST_READINGS).then(|| {
+        let cells = problem.cell_count() * problem.channels.len();
+        problem.thinned((MOST_READINGS / cells.max(1)).max(4))
+    })
 }
 
 /// What it takes to score starts beside a fit.

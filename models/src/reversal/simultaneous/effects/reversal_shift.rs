@@ -2,6 +2,10 @@
 
 use super::{Circumstances, Entry, JoinedEffect, Move, Unknown, only, welcome};
 
+/// The fit finds a shift from a start that is no farther from it than the forms' detail is wide: starts in mm, of both
+/// signs.
+const STARTS: [f64; 9] = [1.0, 2.0, 3.0, 4.5, 6.0, 8.0, 10.5, 13.5, 17.0];
+
 /// See the head of the file.
 pub const ENTRY: Entry = Entry {
     name: "reversal-shift",
@@ -16,6 +20,11 @@ struct ReversalShift;
 impl JoinedEffect for ReversalShift {
     fn unknowns(&self) -> Vec<Unknown> {
         vec![Unknown::size("shift", "mm", 20.0)]
+    }
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        let apart = STARTS.iter().flat_map(|shift| [vec![*shift], vec![-shift]]);
+        std::iter::once(vec![0.0]).chain(apart).collect()
     }
 
     fn moves(&self, at: &Circumstances) -> Option<Move> {

@@ -103,7 +103,19 @@ fn one<M: FittedModel + 'static>(
     } else {
         &own.elsewhere.iter().find(|e| right(&e.variant))?.parameters
     };
-    let truth = size * told_of_put(effect);
+    let clean = make(&[], seed, 0.0);
+    let readings = clean.linearised();
+    let mut truth = size * told_of_put(effect);
+    if effect == "nonlinearity" {
+        // Put in at a reading of 30 µm, told at the greatest reading of the sensor.
+        let own = clean
+            .places()
+            .iter()
+            .zip(readings.iter())
+            .filter(|(p, _)| p.channel == 2);
+        let reach = own.map(|(_, value)| value.abs()).fold(0.0, f64::max);
+        truth *= (reach / 30.0).powi(2);
+    }
     let told = parameters.first()?;
     let freedom = fit.noise.degrees_of_freedom.unwrap_or(f64::INFINITY);
     let mut tallies = [Tally::default(); 2];
@@ -112,12 +124,10 @@ fn one<M: FittedModel + 'static>(
         let error = (told.value - truth).abs().min((told.value + truth).abs());
         tallies[0].add(error, told.std, freedom);
     }
-    let clean = make(&[], seed, 0.0);
     // What is told from the circle through the readings has no truth of its own.
     if clean.name() == "circle" {
         return Some(tallies);
     }
-    let readings = clean.linearised();
     for (quantity, bias) in clean.quantities().iter().zip(&fit.quantities) {
         let truth = quantity.weights.dot(&readings);
         // The mean along an axis less the offset along it is zero by definition.

@@ -132,6 +132,13 @@ impl DiagonalRuns {
         place.time / self.duration
     }
 
+    /// Where the run of a reading is zeroed on an axis (X, Y, Z), as a part of its travel, by how the readings show that axis.
+    pub(super) fn zeroed_at(&self, place: &Place, axis: usize) -> f64 {
+        let diagonal = self.channels[place.channel].0;
+        let start = diagonal.start(&self.zone)[axis] / self.zone.travel[axis];
+        start * diagonal.direction(&self.zone)[axis]
+    }
+
     /// Σ weight(parameter) · sensitivity of a reading, µm.
     pub(super) fn weighted(&self, row: usize, weight: impl Fn(&Parameter) -> f64) -> f64 {
         self.terms[row].iter().map(|(p, s)| weight(p) * s).sum()

@@ -43,11 +43,12 @@ impl Effect<DiagonalRuns> for AxisGrowth {
         };
         let steps = model.steps() as f64;
         vec![Column::from_places(model.places(), |row, place| {
-            let grown = model.weighted(row, |parameter| match parameter {
+            let run = model.weighted(row, |parameter| match parameter {
                 Parameter21::Node(c, index) if *c == component => *index as f64 / steps,
                 _ => 0.0,
             });
-            model.moment(place) * grown
+            // Where a run is zeroed at the far end, that end grows on while the run lasts.
+            model.moment(place) * (run + model.zeroed_at(place, shape.variant))
         })]
     }
 }

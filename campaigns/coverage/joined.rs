@@ -131,7 +131,7 @@ fn one<M: FittedModel + 'static>(
     for (quantity, bias) in clean.quantities().iter().zip(&fit.quantities) {
         let truth = quantity.weights.dot(&readings);
         // The mean along an axis less the offset along it is zero by definition.
-        if bias.after_std <= 1e-9 * bias.std {
+        if bias.after_std <= 1e-6 * bias.std {
             continue;
         }
         tallies[1].add(bias.after - truth, bias.after_std, freedom);

@@ -137,16 +137,21 @@ pub fn gap_right(said: &Said, case: &Case) -> bool {
     (said.gap / case.gap - 1.0).abs() <= 0.15
 }
 
-/// How far the size is off in standard uncertainties, where the answer states one in the same sense;
-/// signs are a convention and left aside.
+/// A size of less than so many standard uncertainties is none, where the answer states one for each indicator.
+const NONE: f64 = 3.0;
+
+/// How far the size is off in standard uncertainties, where the answer states one in the same sense; of an answer that
+/// states one for each indicator, that of the first that has any. Signs are a convention and left aside.
 pub fn size_off(said: &Said, case: &Case) -> Option<f64> {
     let truth = case.truths.first()?;
     let (size, unit) = truth.size?;
     let unit_of = |unit: &str| unit.replace("um", "µm").replace("μm", "µm");
     let same = |told: &str| unit_of(told) == unit || (unit == "1" && told.is_empty());
-    let (_, value, std, _) = said
-        .sizes
-        .iter()
-        .find(|(effect, _, _, told)| effect == truth.name && same(told))?;
+    let own = said.sizes.iter();
+    let own = own.filter(|(effect, _, _, told)| effect == truth.name && same(told));
+    let has = own
+        .clone()
+        .find(|(_, value, std, _)| value.abs() > NONE * std);
+    let (_, value, std, _) = has.or_else(|| own.clone().next())?;
     Some((value.abs() - size.abs()) / std)
 }

@@ -93,6 +93,9 @@ pub(crate) const EARNED: f64 = 0.002;
 pub(crate) const ADEQUATE: [f64; 3] = [0.001, 0.001, 0.01];
 /// *Limit.* Standard deviations of chi-squared beyond which no doubt about the state excuses a remainder.
 pub(crate) const FAR: f64 = 6.0;
+/// *Limit.* Part of the misfit that causes may leave where what they leave is clearly more than the noise, whatever of it the
+/// doubt about the state excuses: less than half is not what they explain.
+pub(crate) const LEAVES: f64 = 0.5;
 /// *Limit.* Part of the probability of what is adequate: where few draws of the state leave less than it, many do not
 /// leave enough. Of 198 remainders that were looked at none came to another end by it.
 pub(crate) const PAST_DOUBT: f64 = 1e-2;

@@ -9,7 +9,7 @@ use crate::attribution::limits::is_beyond_limit;
 use crate::attribution::shrink::held_out_square;
 use crate::attribution::sizes::{Sizes, first_amplitude};
 use crate::detection::space::{Space, orthonormal};
-use crate::levels::{EARNED, STANDS, WEIGHTY};
+use crate::levels::{EARNED, FAR, LEAVES, STANDS, WEIGHTY};
 use crate::noise::law::{NoiseLaw, NoiseSource};
 
 /// Whether each of some causes is needed beside the others, is no other effect at its limit, and has a size
@@ -27,9 +27,20 @@ pub(crate) fn stand_together(
             })
             && predicts(context, readings, causes);
     needed
+        && explain_most(context, readings, causes)
         && has_possible_sizes(context, readings, causes, 0..causes.len())
         && (0..causes.len()).all(|k| is_beyond_limit(context, readings, causes, k))
         && sized(context, readings, causes)
+}
+
+/// Whether causes leave less of the misfit than they explain, or no more than noise may be. What the model does not know
+/// of the state excuses a remainder, and of forms that are rough between the positions it excuses nearly all that an
+/// effect may leave which sees them there.
+fn explain_most(context: &Context<'_>, readings: &DVector<f64>, causes: &[Cause]) -> bool {
+    let freedom = context.space.degrees_of_freedom() as f64;
+    let beyond = |causes: &[Cause]| context.misfit(readings, causes) - freedom;
+    let left = beyond(causes);
+    left <= FAR * (2.0 * freedom).sqrt() || left <= LEAVES * beyond(&[])
 }
 
 /// Whether of every cause one size at least is beyond its standard uncertainty, of several causes

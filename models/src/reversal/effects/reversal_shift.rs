@@ -162,7 +162,7 @@ impl Effect<Linearised> for ReversalShift {
         About {
             physics: "the artefact sits at another axial position after the spindle has turned, so its form returns shifted",
             confirm: "touch the end face of the artefact with an indicator in all spindle positions",
-            source: "first-order Taylor expansion of S(x - shift) in a spindle position",
+            source: "chord of S(x - shift) in a spindle position; Taylor expansion to first order where it is short",
         }
     }
 
@@ -304,7 +304,7 @@ impl Effect<Linearised> for ReversalShift {
         let shifts = self.shifts(shape);
         let stds = shape.values.get(shifts.len() + 1..).unwrap_or_default();
         for (estimate, (shift, std)) in estimates.iter_mut().zip(shifts.iter().zip(stds)) {
-            if *std < estimate.std {
+            if *std > 0.0 && *std < estimate.std {
                 (estimate.value, estimate.std) = (*shift, *std);
             }
         }

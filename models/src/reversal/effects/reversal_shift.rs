@@ -5,7 +5,9 @@
 //!
 //! A form that is bent within the shift is not its slope times the shift, and a state that was fitted to shifted
 //! readings holds the mean of both forms. How far the artefact was shifted is found from the readings themselves
-//! where that shows, and a state that still holds the shift is parted into the forms as they are.
+//! where that shows, and a state that still holds the shift is parted into the forms as they are. The values of such a
+//! shape: the shifts; 1 where its state holds them still, else 0; their standard uncertainties; and by pairs the cells
+//! that read beyond the ends of the forms, with the surface there. No search moves them.
 
 use std::borrow::Cow;
 
@@ -28,7 +30,7 @@ const EVERY: usize = 0;
 /// Greatest shift, mm.
 const REACH: f64 = 20.0;
 
-/// A shift is taken from the readings where it leaves no more than this part of what differs between the positions,
+/// A shift is taken from the readings where it leaves less than this part of what differs between the positions,
 const SHOWS: f64 = 0.5;
 /// and where it is no less than this part of the distance of the readings.
 const FAR: f64 = 0.5;
@@ -98,7 +100,7 @@ impl ReversalShift {
         let gap = model.travel() / (model.positions().len() - 1) as f64;
         let is_far = told.iter().any(|(shift, _)| shift.abs() > FAR * gap);
         let [without, with] = self.misfits(model, readings, variant, &told)?;
-        (is_far && with <= SHOWS * without).then_some(told)
+        (is_far && with < SHOWS * without).then_some(told)
     }
 
     /// The shape of shifts that readings told with their standard uncertainties, at a state that holds them or does not.

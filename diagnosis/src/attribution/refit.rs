@@ -130,7 +130,7 @@ impl Context<'_> {
         causes: &[Cause],
         changes: &DMatrix<f64>,
     ) -> Cow<'s, AnyModel> {
-        let link = |k: usize| self.catalogue[causes[k].effect].link();
+        let link = |k: usize| self.catalogue[causes[k].effect].link(&causes[k].shape);
         let mut sum = DVector::zeros(self.space.readings());
         let mut any = false;
         for k in (0..causes.len()).filter(|k| *k != which && link(which).sees(link(*k))) {

@@ -335,8 +335,8 @@ impl<M: FittedModel + 'static> Effect<AnyModel> for AnyEffect<M> {
     fn columns(&self, model: &AnyModel, shape: &Shape) -> Vec<Column> {
         self.0.columns(model.known(), shape)
     }
-    fn link(&self) -> Link {
-        self.0.link()
+    fn link(&self, shape: &Shape) -> Link {
+        self.0.link(shape)
     }
     fn is_linear_in_state(&self) -> bool {
         self.0.is_linear_in_state()

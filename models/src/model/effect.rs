@@ -125,8 +125,11 @@ pub enum Link {
     Sensor,
     /// It adds to the reading.
     Reading,
-    /// It depends on the reading, with all that any other effect has added to it.
+    /// It depends on the reading, with all that any other effect but that of a scale has added to it.
     Pointer,
+    /// It depends on where the indicator stands on its scale, with all that moves it there: play and friction of its
+    /// plunger, and what moves its mount.
+    Scale,
 }
 
 impl Link {
@@ -136,7 +139,8 @@ impl Link {
             Self::Stylus | Self::Reading => false,
             Self::Slide => other == Self::Stylus,
             Self::Sensor => matches!(other, Self::Stylus | Self::Slide),
-            Self::Pointer => other != Self::Pointer,
+            Self::Pointer => !matches!(other, Self::Pointer | Self::Scale),
+            Self::Scale => !matches!(other, Self::Sensor | Self::Scale),
         }
     }
 }
@@ -178,8 +182,8 @@ pub trait Effect<M>: Send + Sync {
     /// The change of the readings per unit of each amplitude, at the fitted state of the model.
     fn columns(&self, model: &M, shape: &Shape) -> Vec<Column>;
 
-    /// Where in the chain from the machine to the reading it acts.
-    fn link(&self) -> Link {
+    /// Where in the chain from the machine to the reading it acts, at a shape.
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Reading
     }
 

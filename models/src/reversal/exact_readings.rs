@@ -205,7 +205,7 @@ impl Scene {
             + self.offsets[channel.index()]
     }
 
-    /// What an indicator shows of a displacement at a time, before noise and play.
+    /// What an indicator shows of a displacement at a time, before noise, play and the error of its scale.
     fn indicated(
         &self,
         zero: &Zero,
@@ -214,11 +214,21 @@ impl Scene {
         time: f64,
         displacement: f64,
     ) -> f64 {
-        let beyond = self
-            .effects
-            .iter()
-            .map(|effect| effect.shown_beyond(zero, channel, x, time, displacement));
-        displacement + beyond.sum::<f64>()
+        displacement + self.beyond(zero, channel, (x, time), displacement, false)
+    }
+
+    /// What effects of its scale, or all others, add to what an indicator stands at.
+    fn beyond(
+        &self,
+        zero: &Zero,
+        channel: Channel,
+        (x, time): (f64, f64),
+        stands: f64,
+        of_scale: bool,
+    ) -> f64 {
+        let own = self.effects.iter().filter(|e| e.is_of_scale() == of_scale);
+        own.map(|effect| effect.shown_beyond(zero, channel, x, time, stands))
+            .sum()
     }
 
     /// Readings without noise.
@@ -323,6 +333,7 @@ impl Scene {
                 pointer = Some(next);
                 shown = next;
             }
+            shown += self.beyond(zero, channel, (x, time), shown, true);
             if step > 0 && self.noise.correlated > 0.0 {
                 let previous = self.positions[if sign > 0.0 { k - 1 } else { k + 1 }];
                 let decay = (-(x - previous).abs() / self.noise.length).exp();

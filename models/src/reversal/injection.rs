@@ -134,6 +134,31 @@ impl Injection {
     }
 }
 
+impl Injection {
+    /// The order in which what acts on a reading does so: where the stylus stands, what the sensor makes of that, what
+    /// moves the mount, the play, and last an error of the scale, which stands where all of these have moved it.
+    pub fn stage(self) -> u8 {
+        match self {
+            Self::GainMismatch(_) | Self::CommonGain(_) | Self::IndicatorNonlinearity { .. } => 1,
+            Self::ThermalDrift { .. } | Self::ZeroJump { .. } => 2,
+            Self::Hysteresis(_) => 3,
+            _ if self.is_of_scale() => 4,
+            _ => 0,
+        }
+    }
+
+    /// Whether it is an error of an indicator's scale.
+    pub(super) fn is_of_scale(self) -> bool {
+        matches!(
+            self,
+            Self::CyclicError {
+                of_reading: true,
+                ..
+            }
+        )
+    }
+}
+
 /// What an indicator's errors are counted from.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Zero {

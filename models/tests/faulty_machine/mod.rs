@@ -216,7 +216,7 @@ impl Machine {
         1000.0 * height + near * (self.forms[0].at(slide) + aside)
     }
 
-    /// What the indicator shows of it at a time, play apart.
+    /// Where the indicator is moved to by it at a time, play apart.
     fn shown(&self, channel: Channel, time: f64, displacement: f64, faults: &[Fault]) -> f64 {
         let near = matches!(channel, Channel::C1A | Channel::C2B);
         let mut shown = displacement + self.offsets[channel.index()];
@@ -224,9 +224,6 @@ impl Machine {
             shown += match *fault {
                 Fault::Gain(g) => shown * if near { g / 2.0 } else { -g / 2.0 },
                 Fault::Curvature(a, b) => (if near { a } else { b }) * (shown / 10.0).powi(2),
-                Fault::Cycle(size, period, phase) if near => {
-                    size * (2.0 * std::f64::consts::PI * shown / period + phase).sin()
-                }
                 _ => 0.0,
             };
         }
@@ -253,6 +250,18 @@ impl Machine {
             };
         }
         shown
+    }
+
+    /// What the scale of the indicator reads where it stands.
+    fn read(channel: Channel, stands: f64, faults: &[Fault]) -> f64 {
+        let near = matches!(channel, Channel::C1A | Channel::C2B);
+        let off = faults.iter().map(|fault| match *fault {
+            Fault::Cycle(size, period, phase) if near => {
+                size * (2.0 * std::f64::consts::PI * stands / period + phase).sin()
+            }
+            _ => 0.0,
+        });
+        stands + off.sum::<f64>()
     }
 
     /// Readings with these faults and the noise of a seed: the same noise whatever the faults.
@@ -303,7 +312,7 @@ impl Machine {
                                 },
                                 time: Some(time),
                                 x,
-                                value: value + self.noise * e,
+                                value: Self::read(channel, value, faults) + self.noise * e,
                             });
                         }
                     }

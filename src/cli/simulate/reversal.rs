@@ -210,9 +210,11 @@ pub(super) fn run(args: &Args) -> Result<Answer, Message> {
     };
     let undisturbed = Undisturbed::of(&plan).map_err(refused)?;
     let effects = effects(args, &undisturbed)?;
-    let placed: Vec<Injected> = effects
-        .iter()
-        .map(|(_, effect)| Injected::new(*effect, &undisturbed))
+    let mut in_order: Vec<Injection> = effects.iter().map(|(_, effect)| *effect).collect();
+    in_order.sort_by_key(|effect| effect.stage());
+    let placed: Vec<Injected> = in_order
+        .into_iter()
+        .map(|effect| Injected::new(effect, &undisturbed))
         .collect();
     let disturbances: Vec<&dyn Disturbance> =
         placed.iter().map(|d| d as &dyn Disturbance).collect();

@@ -419,8 +419,8 @@ impl DesignEffect {
         }
     }
 
-    /// What an indicator shows beyond its stylus, µm, that stands at `seen` by its scale; its play, which
-    /// remembers, is not among it.
+    /// What an indicator shows beyond its stylus, µm, that stands at `seen`; its play, which remembers, and the error
+    /// of its scale are not among it.
     pub(super) fn of_the_indicator(&self, frame: &DesignFrame, m: &Moment, seen: f64) -> f64 {
         use DesignEffectKind as Kind;
         if !self.reaches(m) {
@@ -434,9 +434,6 @@ impl DesignEffect {
             Kind::CommonGain | Kind::GainMismatch => {
                 self.size * (seen - frame.middle_um[m.channel])
             }
-            Kind::CyclicReading { period, phase } => {
-                self.size * (TAU * seen / period + phase).sin()
-            }
             Kind::CyclicPosition { period, phase } => {
                 self.size * (TAU * m.x / period + phase).sin()
             }
@@ -448,6 +445,16 @@ impl DesignEffect {
                 self.size * (-m.time / constant).exp_m1() / whole
             }
             Kind::ZeroJump { time } if m.time > time => self.size,
+            _ => 0.0,
+        }
+    }
+
+    /// The error of an indicator's scale, µm, where all that moves it has brought it to.
+    pub(super) fn of_the_scale(&self, m: &Moment, stands: f64) -> f64 {
+        match self.kind {
+            DesignEffectKind::CyclicReading { period, phase } if self.reaches(m) => {
+                self.size * (TAU * stands / period + phase).sin()
+            }
             _ => 0.0,
         }
     }

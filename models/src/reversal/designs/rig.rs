@@ -184,6 +184,11 @@ impl<'a> Rig<'a> {
         for half in self.plan.effects.iter().filter_map(width).map(|w| 0.5 * w) {
             follow(&mut shown, half);
         }
+        for (m, value) in trace.iter().zip(&mut shown) {
+            let stands = *value;
+            let effects = self.plan.effects.iter();
+            *value += effects.map(|e| e.of_the_scale(m, stands)).sum::<f64>();
+        }
         shown
     }
 

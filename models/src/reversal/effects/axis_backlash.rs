@@ -28,7 +28,7 @@ impl Effect<Linearised> for AxisBacklash {
         }
     }
 
-    fn link(&self) -> Link {
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Slide
     }
 

@@ -86,8 +86,13 @@ impl Effect<Linearised> for CyclicError {
         }
     }
 
-    fn link(&self) -> Link {
-        Link::Sensor
+    /// What the slide does with the drive comes before the indicator. An indicator with a scale has no pointer: its play
+    /// and friction, and the growth of its mount, come before the scale.
+    fn link(&self, shape: &Shape) -> Link {
+        match self.drive(shape.variant) {
+            Some(_) => Link::Stylus,
+            None => Link::Scale,
+        }
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {

@@ -23,7 +23,7 @@ impl Effect<Linearised> for GainMismatch {
         }
     }
 
-    fn link(&self) -> Link {
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Sensor
     }
 

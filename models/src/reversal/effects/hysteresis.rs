@@ -32,7 +32,7 @@ impl Effect<Linearised> for Hysteresis {
         }
     }
 
-    fn link(&self) -> Link {
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Pointer
     }
 

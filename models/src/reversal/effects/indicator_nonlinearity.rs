@@ -48,7 +48,7 @@ impl Effect<Linearised> for IndicatorNonlinearity {
         }
     }
 
-    fn link(&self) -> Link {
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Sensor
     }
 

@@ -77,7 +77,7 @@ impl Effect<Linearised> for LateralBacklash {
         }
     }
 
-    fn link(&self) -> Link {
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Slide
     }
 

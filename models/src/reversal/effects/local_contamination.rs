@@ -160,7 +160,7 @@ impl Effect<Linearised> for LocalContamination {
         }
     }
 
-    fn link(&self) -> Link {
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Stylus
     }
 

@@ -10,7 +10,7 @@
 //! product of α and γ that channels see, and by the line.
 
 use super::{Linearised, part_of_travel};
-use crate::model::{About, Column, Effect, FittedModel, Parameter, Place, Shape};
+use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Place, Shape};
 use crate::reversal::diagnosable::{Arrangement, Seat};
 
 /// See the head of the file. Variants: beside the crest by the skew alone, [`BESIDE`].
@@ -52,6 +52,10 @@ impl Effect<Linearised> for OffCrest {
             confirm: "move the indicator across the bar at both ends and read how far it stands from the highest point",
             source: "arrow height of a circle, y^2 / 2R, with y = y0 + x (alpha t(phi) + gamma t(psi))",
         }
+    }
+
+    fn link(&self, _shape: &Shape) -> Link {
+        Link::Stylus
     }
 
     fn amplitudes(&self) -> Vec<Parameter> {

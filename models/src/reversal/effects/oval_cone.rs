@@ -38,7 +38,7 @@ impl Effect<Linearised> for OvalCone {
         }
     }
 
-    fn link(&self) -> Link {
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Stylus
     }
 

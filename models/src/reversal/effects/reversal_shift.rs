@@ -168,7 +168,7 @@ impl Effect<Linearised> for ReversalShift {
         }
     }
 
-    fn link(&self) -> Link {
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Stylus
     }
 

@@ -116,7 +116,7 @@ impl Effect<Linearised> for StickSlip {
         }
     }
 
-    fn link(&self) -> Link {
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Slide
     }
 

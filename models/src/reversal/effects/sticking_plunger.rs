@@ -42,7 +42,7 @@ impl Effect<Linearised> for StickingPlunger {
         }
     }
 
-    fn link(&self) -> Link {
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Pointer
     }
 

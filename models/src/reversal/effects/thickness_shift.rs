@@ -19,7 +19,7 @@ impl Effect<Linearised> for ThicknessShift {
         }
     }
 
-    fn link(&self) -> Link {
+    fn link(&self, _shape: &Shape) -> Link {
         Link::Slide
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::effects::{Circumstances, JoinedEffect, Kind, Left, Move, Play, Unknown};
+use super::effects::{Circumstances, JoinedEffect, Kind, Left, Move, Play, Shows, Unknown};
 use super::readings::ChannelReadings;
 use crate::reversal::channel_noise::traces::{self, Trace};
 use crate::reversal::{Channel, Observations};
@@ -34,8 +34,10 @@ pub struct Joined<'a> {
     /// Seconds since the first reading.
     pub times: &'a [f64],
     members: Vec<Member>,
-    /// Those that act on the indicator's reading, in the order in which they do.
+    /// Those that act on the indicator's reading before its play, in the order in which they do.
     on_reading: Vec<usize>,
+    /// The same after its play.
+    after_play: Vec<usize>,
     on_surface: Vec<usize>,
     moving: Vec<usize>,
     /// The one with a play.
@@ -80,6 +82,7 @@ impl<'a> Joined<'a> {
             times,
             members: Vec::new(),
             on_reading: Vec::new(),
+            after_play: Vec::new(),
             on_surface: Vec::new(),
             moving: Vec::new(),
             playing: None,
@@ -123,11 +126,14 @@ impl<'a> Joined<'a> {
         };
         let mut on_reading = which(&|m| m.effect.shows().is_some());
         on_reading.sort_by_key(|k| joined.members[*k].effect.shows());
+        let first = |k: &usize| joined.members[*k].effect.shows() < Some(Shows::Scale);
+        let after_play = on_reading.split_off(on_reading.partition_point(first));
         let on_surface = which(&|m| m.effect.is_on_surface());
         let moving = which(&moves);
         let playing = which(&plays).first().copied();
         Self {
             on_reading,
+            after_play,
             on_surface,
             moving,
             playing,
@@ -221,8 +227,8 @@ impl<'a> Joined<'a> {
         sum
     }
 
-    /// What the indicator shows of what it sees, µm, and the derivative of that by what it sees; the
-    /// derivatives in `by` are carried along, and those of what acts here added.
+    /// What the indicator shows of what it sees before its play, µm, and the derivative of that by what it
+    /// sees; the derivatives in `by` are carried along, and those of what acts here added.
     pub fn shown(
         &self,
         at: &Circumstances,
@@ -230,8 +236,30 @@ impl<'a> Joined<'a> {
         values: &[f64],
         by: &mut [f64],
     ) -> (f64, f64) {
+        self.applied(&self.on_reading, at, seen, values, by)
+    }
+
+    /// The same of where it stands after its play.
+    pub fn read(
+        &self,
+        at: &Circumstances,
+        stands: f64,
+        values: &[f64],
+        by: &mut [f64],
+    ) -> (f64, f64) {
+        self.applied(&self.after_play, at, stands, values, by)
+    }
+
+    fn applied(
+        &self,
+        members: &[usize],
+        at: &Circumstances,
+        seen: f64,
+        values: &[f64],
+        by: &mut [f64],
+    ) -> (f64, f64) {
         let (mut shows, mut scale) = (seen, 1.0);
-        for k in &self.on_reading {
+        for k in members {
             let member = &self.members[*k];
             let range = member.from..member.from + member.unknowns.len();
             by[range.clone()].fill(0.0);
@@ -261,17 +289,23 @@ impl<'a> Joined<'a> {
         })
     }
 
+    /// Whether any effect acts after the play.
+    pub fn reads(&self) -> bool {
+        !self.after_play.is_empty()
+    }
+
     /// Whether any effect has a play.
     pub fn plays(&self) -> bool {
         self.playing.is_some()
     }
 
-    /// The same effects with the play left out of what is shown.
+    /// The same effects without the play and what comes after it.
     #[must_use]
-    pub fn without_play(&self) -> Self {
+    pub fn before_play(&self) -> Self {
         Self {
             playing: None,
             turning: None,
+            after_play: Vec::new(),
             ..self.clone()
         }
     }

@@ -144,6 +144,9 @@ impl Placed {
                     };
                     placed.play(joined, readings, &turned, values);
                 }
+                if joined.reads() {
+                    shared.read(readings, &mut placed, joined.count())?;
+                }
                 placed.sort(problem.cell_count());
                 Ok(placed)
             })
@@ -204,7 +207,8 @@ impl Placed {
         by.iter_mut().for_each(|b| *b *= spot.q);
         single.moved(at, &spot.per_move(at.channel.indicator_sign()), by);
         by.iter_mut().for_each(|b| *b *= spot.scale);
-        single.shown(at, spot.shows, values, by);
+        let (shows, _) = single.shown(at, spot.shows, values, by);
+        single.read(at, shows, values, by);
     }
 }
 
@@ -296,15 +300,43 @@ impl Channel<'_> {
         by.iter_mut().for_each(|b| *b *= q);
         joined.moved(&at, &spot.per_move(sign), by);
         (spot.shows, spot.scale) = joined.shown(&at, spot.seen, values, by);
-        if !(spot.scale > 0.0) {
-            return Err(NoValue::new(format!(
-                "an indicator whose reading falls while what it sees rises, at {} mm in channel {}",
-                at.x,
-                at.channel.name()
-            )));
-        }
+        rises(&spot, &at)?;
         Ok(spot)
     }
+
+    /// What the indicator makes of where it stands after its play.
+    fn read(
+        &self,
+        readings: &ChannelReadings,
+        placed: &mut PlacedChannel,
+        effects: usize,
+    ) -> Result<(), NoValue> {
+        let stride = effects.max(1);
+        let spots = placed.spots.par_iter_mut().with_min_len(AT_ONCE);
+        spots
+            .zip(placed.by.par_chunks_exact_mut(stride))
+            .zip(&readings.source)
+            .try_for_each(|((spot, by), source)| {
+                let at = self.joined.circumstances(*source);
+                let by = &mut by[..effects];
+                let (shows, factor) = self.joined.read(&at, spot.shows, self.values, by);
+                spot.shows = shows;
+                spot.scale *= factor;
+                rises(spot, &at)
+            })
+    }
+}
+
+/// Fails where the reading falls while what is seen rises.
+fn rises(spot: &Spot, at: &Circumstances) -> Result<(), NoValue> {
+    if spot.scale > 0.0 {
+        return Ok(());
+    }
+    Err(NoValue::new(format!(
+        "an indicator whose reading falls while what it sees rises, at {} mm in channel {}",
+        at.x,
+        at.channel.name()
+    )))
 }
 
 impl PlacedChannel {

@@ -74,8 +74,7 @@ impl Placed {
         let values = problem.unknowns.effect_values(&at.border);
         let traces = joined.traces(problem.channels);
         let cubics = problem.cubics(at);
-        let unplayed = joined.without_play();
-        let placed = Self::new(problem, &unplayed, at, &cubics)?;
+        let placed = Self::new(problem, &joined.before_play(), at, &cubics)?;
         Ok(problem
             .channels
             .iter()

@@ -266,6 +266,37 @@ fn two_effects_join_with_one_covariance() {
     tilts_are_right(&machine, &solution, "two effects");
 }
 
+/// *k·u*, one seed: the scale of an indicator is read where drift and play have brought it to. The phase of an error of
+/// 2.3 µm turns by 0.7 in the play and by 1.6 in the drift.
+#[test]
+fn an_error_of_the_scale_is_found_behind_play_and_drift() {
+    let machine = machine();
+    let faults = [
+        Fault::Play(0.25),
+        Fault::Drift(0.6, 0.5, 900.0),
+        Fault::Cycle(0.15, 2.3, 0.4),
+    ];
+    let effects = ["cyclic-error", "thermal-drift", "hysteresis"];
+    let solution = fitted(&machine.measured(&faults, 4), &effects);
+    for (effect, name, truth) in [
+        ("hysteresis", "width", 0.25),
+        ("thermal-drift", "near-drift", 0.6),
+        ("thermal-drift", "far-drift", 0.5),
+        ("cyclic-error", "amplitude", 0.15),
+        ("cyclic-error", "period", 2.3),
+    ] {
+        let (value, std) = parameter(&solution, effect, name);
+        let std = std.unwrap();
+        assert!(
+            (value - truth).abs() < TIMES * std && std < 0.3 * truth,
+            "{name} {value} ± {std}"
+        );
+    }
+    tilts_are_right(&machine, &solution, "an error of the scale");
+    let noise = solution.noise[0].sigma;
+    assert!((noise / NOISE - 1.0).abs() < 0.15, "noise {noise}");
+}
+
 #[test]
 fn taking_the_effect_out_beforehand_gives_the_same_within_what_it_adds() {
     let machine = machine();

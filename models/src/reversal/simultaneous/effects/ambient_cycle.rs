@@ -3,7 +3,9 @@
 
 use std::f64::consts::TAU;
 
-use super::{Circumstances, Entry, Indicator, JoinedEffect, Setting, Told, Unknown, only, welcome};
+use super::{
+    Circumstances, Entry, Indicator, JoinedEffect, Setting, Shows, Told, Unknown, only, welcome,
+};
 
 /// See the head of the file.
 pub const ENTRY: Entry = Entry {
@@ -61,8 +63,8 @@ impl JoinedEffect for AmbientCycle {
         (0..=steps).map(at).collect()
     }
 
-    fn shows(&self) -> Option<u8> {
-        Some(1)
+    fn shows(&self) -> Option<Shows> {
+        Some(Shows::Added)
     }
 
     fn shown(&self, at: &Circumstances, _seen: f64, values: &[f64], by: &mut [f64]) -> (f64, f64) {

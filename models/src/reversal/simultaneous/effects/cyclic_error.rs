@@ -5,7 +5,9 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use super::{Circumstances, Entry, Indicator, JoinedEffect, Setting, Told, Unknown, welcome};
+use super::{
+    Circumstances, Entry, Indicator, JoinedEffect, Setting, Shows, Told, Unknown, welcome,
+};
 
 /// See the head of the file.
 pub const ENTRY: Entry = Entry {
@@ -97,8 +99,11 @@ impl JoinedEffect for Cyclic {
         (0..=steps).map(at).collect()
     }
 
-    fn shows(&self) -> Option<u8> {
-        Some(0)
+    fn shows(&self) -> Option<Shows> {
+        Some(match self.of {
+            Of::Travel => Shows::Seen,
+            _ => Shows::Scale,
+        })
     }
 
     fn shown(&self, at: &Circumstances, seen: f64, values: &[f64], by: &mut [f64]) -> (f64, f64) {

@@ -1,7 +1,7 @@
 //! Near and far indicator have different gains: I → I + i g/2 (I − I₀), I₀ the mean reading of the channel,
 //! so that the offsets keep their place.
 
-use super::{Circumstances, Entry, JoinedEffect, Setting, Unknown, only, welcome};
+use super::{Circumstances, Entry, JoinedEffect, Setting, Shows, Unknown, only, welcome};
 
 /// See the head of the file.
 pub const ENTRY: Entry = Entry {
@@ -29,8 +29,8 @@ impl JoinedEffect for GainMismatch {
         vec![Unknown::size("mismatch", "1", 0.2)]
     }
 
-    fn shows(&self) -> Option<u8> {
-        Some(0)
+    fn shows(&self) -> Option<Shows> {
+        Some(Shows::Seen)
     }
 
     fn shown(&self, at: &Circumstances, seen: f64, values: &[f64], by: &mut [f64]) -> (f64, f64) {

@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::{Circumstances, JoinedEffect, Unknown};
+use super::{Circumstances, JoinedEffect, Shows, Unknown};
 use crate::reversal::{Channel, Direction, Observations};
 
 /// Their name among the effects.
@@ -61,8 +61,8 @@ impl JoinedEffect for Heights {
         vec![Unknown::size("height", "um", REACH); self.count]
     }
 
-    fn shows(&self) -> Option<u8> {
-        Some(u8::MAX)
+    fn shows(&self) -> Option<Shows> {
+        Some(Shows::Height)
     }
 
     fn shown(&self, at: &Circumstances, _seen: f64, values: &[f64], by: &mut [f64]) -> (f64, f64) {

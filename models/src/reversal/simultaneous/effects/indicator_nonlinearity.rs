@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use super::{Circumstances, Entry, Indicator, JoinedEffect, Setting, Unknown, welcome};
+use super::{Circumstances, Entry, Indicator, JoinedEffect, Setting, Shows, Unknown, welcome};
 
 /// See the head of the file.
 pub const ENTRY: Entry = Entry {
@@ -55,8 +55,8 @@ impl JoinedEffect for Curved {
         )
     }
 
-    fn shows(&self) -> Option<u8> {
-        Some(0)
+    fn shows(&self) -> Option<Shows> {
+        Some(Shows::Seen)
     }
 
     fn shown(&self, at: &Circumstances, seen: f64, values: &[f64], by: &mut [f64]) -> (f64, f64) {

@@ -2,7 +2,7 @@
 //!
 //! An effect is a list of unknowns and what they change at one stage of the measuring chain: where the
 //! slide or the artefact stands ([`JoinedEffect::moves`]), the surface ([`JoinedEffect::bump`]), what the
-//! indicator shows of what it sees ([`JoinedEffect::shown`]), or the play of its stylus
+//! indicator shows of what it sees ([`JoinedEffect::shown`], before or after its play), or that play
 //! ([`JoinedEffect::play`]). To add one, write its file and add it to [`CATALOGUE`].
 
 mod absorbed;
@@ -138,6 +138,20 @@ pub enum Move {
     Lateral(f64),
 }
 
+/// The order in which indicators apply what effects do to a reading; their play stands between [`Self::Added`] and
+/// [`Self::Scale`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Shows {
+    /// It depends on what the indicator sees.
+    Seen,
+    /// It adds to what is seen, by the time.
+    Added,
+    /// It depends on where the indicator stands on its scale, after all that moves it there.
+    Scale,
+    /// It adds to all readings of a pass, by where that was set to zero.
+    Height,
+}
+
 /// Where an effect's unknowns stand among those of a play.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Play {
@@ -210,9 +224,8 @@ pub trait JoinedEffect: Debug + Send + Sync {
         None
     }
 
-    /// The order in which indicators apply what they do to a reading; `None` where the effect does
-    /// nothing there. What depends on the reading comes before what is added to it.
-    fn shows(&self) -> Option<u8> {
+    /// When indicators apply what it does to a reading; `None` where the effect does nothing there.
+    fn shows(&self) -> Option<Shows> {
         None
     }
 

@@ -2,7 +2,9 @@
 //! with s the part of the whole time that has gone by and κ the whole time over the time constant (first-order
 //! thermal response, ISO 230-3). κ → 0 is a straight line.
 
-use super::{Circumstances, Entry, Indicator, JoinedEffect, Setting, Told, Unknown, only, welcome};
+use super::{
+    Circumstances, Entry, Indicator, JoinedEffect, Setting, Shows, Told, Unknown, only, welcome,
+};
 
 /// See the head of the file.
 pub const ENTRY: Entry = Entry {
@@ -57,8 +59,8 @@ impl JoinedEffect for ThermalDrift {
         RATES.map(of).to_vec()
     }
 
-    fn shows(&self) -> Option<u8> {
-        Some(1)
+    fn shows(&self) -> Option<Shows> {
+        Some(Shows::Added)
     }
 
     fn shown(&self, at: &Circumstances, _seen: f64, values: &[f64], by: &mut [f64]) -> (f64, f64) {

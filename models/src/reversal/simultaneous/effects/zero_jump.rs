@@ -4,7 +4,8 @@
 use std::sync::Arc;
 
 use super::{
-    Circumstances, Entry, Indicator, JoinedEffect, Kind, Left, Setting, Told, Unknown, welcome,
+    Circumstances, Entry, Indicator, JoinedEffect, Kind, Left, Setting, Shows, Told, Unknown,
+    welcome,
 };
 use crate::reversal::Channel;
 
@@ -77,8 +78,8 @@ impl JoinedEffect for ZeroJump {
         (0..STARTS).map(|k| vec![0.0, at(k)]).collect()
     }
 
-    fn shows(&self) -> Option<u8> {
-        Some(1)
+    fn shows(&self) -> Option<Shows> {
+        Some(Shows::Added)
     }
 
     fn shown(&self, at: &Circumstances, _seen: f64, values: &[f64], by: &mut [f64]) -> (f64, f64) {

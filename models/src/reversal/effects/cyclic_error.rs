@@ -86,11 +86,11 @@ impl Effect<Linearised> for CyclicError {
         }
     }
 
-    /// What the slide does with the drive comes before the indicator. An indicator with a scale has no pointer: its play
-    /// and friction, and the growth of its mount, come before the scale.
+    /// What comes with the drive goes by its angle, whatever the slide has lost of that. An indicator with a scale has no
+    /// pointer: its play and friction, and the growth of its mount, come before the scale.
     fn link(&self, shape: &Shape) -> Link {
         match self.drive(shape.variant) {
-            Some(_) => Link::Stylus,
+            Some(_) => Link::Reading,
             None => Link::Scale,
         }
     }

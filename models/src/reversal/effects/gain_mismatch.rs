@@ -10,6 +10,9 @@ use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 /// See the head of the file. Variants: all indicators, then one alone; two indicators have but one.
 pub(super) struct GainMismatch(pub Indicators);
 
+/// Greatest difference: what a lever that stands at 50° to its surface in place of along it loses by the cosine.
+const GREATEST: f64 = 0.4;
+
 impl Effect<Linearised> for GainMismatch {
     fn name(&self) -> &str {
         "gain-mismatch"
@@ -32,7 +35,7 @@ impl Effect<Linearised> for GainMismatch {
     }
 
     fn amplitudes_at(&self, shape: &Shape) -> Vec<Parameter> {
-        let mismatch = Parameter::symmetric("mismatch", "1", 0.2);
+        let mismatch = Parameter::symmetric("mismatch", "1", GREATEST);
         match (self.0.count(), shape.variant) {
             (0..=2, _) => vec![mismatch],
             (_, ALL) => self.0.sizes(ALL, &mismatch, "mismatch").split_off(1),

@@ -237,7 +237,7 @@ impl Effect<Linearised> for LateralBacklash {
             let weight = |k: usize| parts[k][2] - parts[k][0].powi(2) - parts[k][1].powi(2) / 3.0;
             let of_noise: f64 = (2..count).map(|k| weight(k) * variance(k)).sum();
             let square = form.sum::<f64>() - step * step - turn * turn / 3.0 - of_noise;
-            let size = square.max(0.0).sqrt().max(f64::MIN_POSITIVE);
+            let size = square.max(0.0).sqrt();
             let slope =
                 |k: usize| parts[k][2] * own[k] - parts[k][0] * step - parts[k][1] * turn / 3.0;
             let rms = Estimate {
@@ -246,7 +246,12 @@ impl Effect<Linearised> for LateralBacklash {
                     _ => format!("{}-rms-of-form", AXES[*axis]),
                 },
                 value: size,
-                std: within((2..count).map(|k| (k, slope(k) / size)).collect()),
+                // A form within its noise is none, known to that noise.
+                std: if size > 0.0 {
+                    within((2..count).map(|k| (k, slope(k) / size)).collect())
+                } else {
+                    of_noise.sqrt()
+                },
                 unit: "um".to_owned(),
             };
             line.into_iter().chain([rms])
@@ -307,4 +312,34 @@ fn legendre(degree: usize, t: f64) -> f64 {
         (before, here) = (here, ((2.0 * n + 1.0) * t * here - n * before) / (n + 1.0));
     }
     here
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::{FINE, TERMS};
+    use crate::model::{FittedModel, Shape};
+    use crate::reversal::diagnosable::{Assumptions, Linearised};
+    use crate::reversal::exact_readings::{Scene, SceneNoise};
+
+    /// *Limit*: a form that is no more than its noise is none, known to that noise.
+    #[test]
+    fn a_form_within_its_noise_is_none() {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let scene = Scene::random(60, 2, 1e-5, 2.0, SceneNoise::default(), &mut random);
+        let model = Linearised::new(&scene.measured(1), Assumptions::default()).unwrap();
+        let effects = model.effects();
+        let own = effects.iter().find(|e| e.name() == "lateral-backlash");
+        let count = TERMS[FINE - 1];
+        let covariance = DMatrix::identity(count, count) * 0.01;
+        let told =
+            own.unwrap()
+                .estimates(&Shape::variant(FINE - 1), &vec![0.0; count], &covariance);
+        let form = told.iter().find(|e| e.name == "rms-of-form").unwrap();
+        assert_eq!(form.value, 0.0);
+        assert!((0.05..0.5).contains(&form.std), "{}", form.std);
+    }
 }

@@ -15,8 +15,12 @@ use crate::units::mm_from_um;
 /// Places at which forms are looked at to tell their straight line.
 const PLACES: usize = 200;
 
+/// A contrast of four channels is known as well as a tilt: known to so many times less, an effect in the fit takes it up
+/// but for rounding.
+const TAKEN_UP: f64 = 1e3;
+
 /// The closure: the contrast the convention holds at zero, if it were released; and the closure
-/// profile (R1A + R1B − R2A − R2B)/4 of the residuals. `ends`: over how much the traces' first positions
+/// profile (R1A + R1B − R2A − R2B)/4 of the residuals. No contrast where an effect in the fit takes it up. `ends`: over how much the traces' first positions
 /// spread, and their last, mm.
 pub fn of(
     problem: &Reversal,
@@ -38,6 +42,12 @@ pub fn of(
         let std = std.hypot(by_ends(solution, channels, ends));
         (Value { value, std }, freedom)
     });
+    let of_tilts = solution
+        .tilts()
+        .iter()
+        .map(|t| t.angle.std)
+        .fold(0.0, f64::max);
+    let slope = slope.filter(|(slope, _)| slope.std <= TAKEN_UP * of_tilts);
     let (x, profile) = profile(problem, channels, residuals);
     let rms = (profile.iter().map(|c| c * c).sum::<f64>() / profile.len().max(1) as f64).sqrt();
     Some(Closure {

@@ -439,6 +439,10 @@ fn the_closure_is_the_tapers() {
     let solution = fitted(&machine().measured(&[Fault::Cone(20e-6)], 8), &["taper"]);
     let closure = solution.closure.unwrap();
     assert_eq!(closure.slope, None);
+    // A stylus beside the crest at mid travel too has a line of its own, but for rounding the same.
+    let askew = [Fault::Askew(20.0, 0.15, 0.04)];
+    let beside = fitted(&machine().measured(&askew, 8), &["off-crest"]);
+    assert_eq!(beside.closure.unwrap().slope, None);
     // k·u: what is left of the profile is noise of 4 × 4 readings a position, less the unknowns.
     assert!(closure.rms < 1.3 * NOISE / 4.0, "{}", closure.rms);
 }

@@ -11,6 +11,9 @@ pub const ENTRY: Entry = Entry {
     refused: welcome,
 };
 
+/// Greatest difference: what a lever that stands at 50° to its surface in place of along it loses by the cosine.
+const GREATEST: f64 = 0.4;
+
 #[derive(Debug)]
 struct GainMismatch {
     middle: [f64; 4],
@@ -26,7 +29,7 @@ impl GainMismatch {
 
 impl JoinedEffect for GainMismatch {
     fn unknowns(&self) -> Vec<Unknown> {
-        vec![Unknown::size("mismatch", "1", 0.2)]
+        vec![Unknown::size("mismatch", "1", GREATEST)]
     }
 
     fn shows(&self) -> Option<Shows> {

@@ -105,17 +105,7 @@ fn one<M: FittedModel + 'static>(
     };
     let clean = make(&[], seed, 0.0);
     let readings = clean.linearised();
-    let mut truth = size * told_of_put(effect);
-    if effect == "nonlinearity" {
-        // Put in at a reading of 30 µm, told at the greatest reading of the sensor.
-        let own = clean
-            .places()
-            .iter()
-            .zip(readings.iter())
-            .filter(|(p, _)| p.channel == 2);
-        let reach = own.map(|(_, value)| value.abs()).fold(0.0, f64::max);
-        truth *= (reach / 30.0).powi(2);
-    }
+    let truth = size * told_of_put(effect);
     let told = parameters.first()?;
     let freedom = fit.noise.degrees_of_freedom.unwrap_or(f64::INFINITY);
     let mut tallies = [Tally::default(); 2];

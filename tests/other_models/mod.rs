@@ -1,6 +1,8 @@
 //! Makers of data for every model but the reversal: known effects in exact form, noise, repeats.
 #![allow(dead_code, reason = "the campaign and the tests each use their part")]
 
+use std::sync::OnceLock;
+
 use errsep::diagnosis::{Diagnosis, Hidden, Kind, Options, diagnose};
 use errsep_models::calibration_line::CalibrationLine;
 use errsep_models::calibration_line::simulate as line;
@@ -13,7 +15,7 @@ use errsep_models::machine::{
     Chain, ComponentError, ErrorFunction, Machine, MeasuredParts, PartDisturbance, Position, Sense,
     Spread, simulate_parts_disturbed,
 };
-use errsep_models::model::AnyModel;
+use errsep_models::model::{AnyModel, FittedModel};
 
 /// Effects by their names and sizes.
 pub type Put<'a> = &'a [(&'a str, f64)];
@@ -293,12 +295,25 @@ pub fn within(diagnosis: &Diagnosis, effect: &str, size: f64) -> Option<bool> {
 }
 
 /// What the size of an effect is told to be, per unit of what is put in: a yaw is put in by the amplitude of a wave and
-/// told by its root mean square.
+/// told by its root mean square, the bend of a sensor's characteristic at 30 µm and told at its greatest reading.
 pub fn told_of_put(effect: &str) -> f64 {
     match effect {
         "yaw" => 0.5f64.sqrt(),
+        "nonlinearity" => (greatest_of_sensor_3() / 30.0).powi(2),
         _ => 1.0,
     }
+}
+
+/// The greatest reading of the sensor that is disturbed, µm.
+fn greatest_of_sensor_3() -> f64 {
+    static GREATEST: OnceLock<f64> = OnceLock::new();
+    *GREATEST.get_or_init(|| {
+        let quiet = four_sensor_made(&[], 1, 0.0);
+        let readings = quiet.linearised();
+        let own = quiet.places().iter().zip(readings.iter());
+        own.filter(|(place, _)| place.channel == 2)
+            .fold(0.0, |most: f64, (_, reading)| most.max(reading.abs()))
+    })
 }
 
 /// The smallest size of an effect that data without it would have shown with 80 % probability.

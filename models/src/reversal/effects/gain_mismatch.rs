@@ -10,8 +10,9 @@ use crate::model::{About, Column, Effect, FittedModel, Link, Parameter, Shape};
 /// See the head of the file. Variants: all indicators, then one alone; two indicators have but one.
 pub(super) struct GainMismatch(pub Indicators);
 
-/// Greatest difference: what a lever that stands at 50° to its surface in place of along it loses by the cosine.
-const GREATEST: f64 = 0.4;
+/// Greatest difference: what a lever that stands at 40° to its surface in place of along it loses by the cosine. Where
+/// readings are nearly straight a greater one is what a cone is too.
+const GREATEST: f64 = 0.234;
 
 impl Effect<Linearised> for GainMismatch {
     fn name(&self) -> &str {

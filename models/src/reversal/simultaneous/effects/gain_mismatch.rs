@@ -11,8 +11,9 @@ pub const ENTRY: Entry = Entry {
     refused: welcome,
 };
 
-/// Greatest difference: what a lever that stands at 50° to its surface in place of along it loses by the cosine.
-const GREATEST: f64 = 0.4;
+/// Greatest difference: what a lever that stands at 40° to its surface in place of along it loses by the cosine. Where
+/// readings are nearly straight a greater one is what a cone is too.
+const GREATEST: f64 = 0.234;
 
 #[derive(Debug)]
 struct GainMismatch {

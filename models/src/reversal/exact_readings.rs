@@ -205,7 +205,7 @@ impl Scene {
             + self.offsets[channel.index()]
     }
 
-    /// What an indicator shows of a displacement at a time, before noise, play and the error of its scale.
+    /// Where an indicator is moved to by a displacement at a time, before its play, what it makes of that, and noise.
     fn indicated(
         &self,
         zero: &Zero,
@@ -214,19 +214,20 @@ impl Scene {
         time: f64,
         displacement: f64,
     ) -> f64 {
-        displacement + self.beyond(zero, channel, (x, time), displacement, false)
+        let moved = |e: &Injection| !e.is_of_scale() && !e.is_characteristic();
+        displacement + self.beyond(zero, channel, (x, time), displacement, moved)
     }
 
-    /// What effects of its scale, or all others, add to what an indicator stands at.
+    /// What some effects add to what an indicator stands at.
     fn beyond(
         &self,
         zero: &Zero,
         channel: Channel,
         (x, time): (f64, f64),
         stands: f64,
-        of_scale: bool,
+        which: impl Fn(&Injection) -> bool,
     ) -> f64 {
-        let own = self.effects.iter().filter(|e| e.is_of_scale() == of_scale);
+        let own = self.effects.iter().filter(|e| which(e));
         own.map(|effect| effect.shown_beyond(zero, channel, x, time, stands))
             .sum()
     }
@@ -333,7 +334,8 @@ impl Scene {
                 pointer = Some(next);
                 shown = next;
             }
-            shown += self.beyond(zero, channel, (x, time), shown, true);
+            let made = |e: &Injection| e.is_of_scale() || e.is_characteristic();
+            shown += self.beyond(zero, channel, (x, time), shown, made);
             if step > 0 && self.noise.correlated > 0.0 {
                 let previous = self.positions[if sign > 0.0 { k - 1 } else { k + 1 }];
                 let decay = (-(x - previous).abs() / self.noise.length).exp();

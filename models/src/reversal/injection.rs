@@ -135,16 +135,24 @@ impl Injection {
 }
 
 impl Injection {
-    /// The order in which what acts on a reading does so: where the stylus stands, what the sensor makes of that, what
-    /// moves the mount, the play, and last an error of the scale, which stands where all of these have moved it.
+    /// The order in which what acts on a reading does so: where the stylus stands, what moves the mount, the play, an error
+    /// of the scale, which stands where all of these have moved it, and last the gain and the curve of the indicator.
     pub fn stage(self) -> u8 {
         match self {
-            Self::GainMismatch(_) | Self::CommonGain(_) | Self::IndicatorNonlinearity { .. } => 1,
-            Self::ThermalDrift { .. } | Self::ZeroJump { .. } => 2,
-            Self::Hysteresis(_) => 3,
-            _ if self.is_of_scale() => 4,
+            Self::ThermalDrift { .. } | Self::ZeroJump { .. } => 1,
+            Self::Hysteresis(_) => 2,
+            _ if self.is_of_scale() => 3,
+            _ if self.is_characteristic() => 4,
             _ => 0,
         }
+    }
+
+    /// Whether it is the gain or the curve of an indicator.
+    pub(super) fn is_characteristic(self) -> bool {
+        matches!(
+            self,
+            Self::GainMismatch(_) | Self::CommonGain(_) | Self::IndicatorNonlinearity { .. }
+        )
     }
 
     /// Whether it is an error of an indicator's scale.

@@ -419,9 +419,8 @@ impl DesignEffect {
         }
     }
 
-    /// What an indicator shows beyond its stylus, µm, that stands at `seen`; its play, which remembers, and the error
-    /// of its scale are not among it.
-    pub(super) fn of_the_indicator(&self, frame: &DesignFrame, m: &Moment, seen: f64) -> f64 {
+    /// What moves an indicator beyond its stylus, µm; its play, which remembers, is not among it.
+    pub(super) fn of_the_mount(&self, frame: &DesignFrame, m: &Moment) -> f64 {
         use DesignEffectKind as Kind;
         if !self.reaches(m) {
             return 0.0;
@@ -431,14 +430,8 @@ impl DesignEffect {
             Kind::AmbientCycle { cycles, phase } => {
                 self.size * ((TAU * cycles * part + phase).sin() - phase.sin())
             }
-            Kind::CommonGain | Kind::GainMismatch => {
-                self.size * (seen - frame.middle_um[m.channel])
-            }
             Kind::CyclicPosition { period, phase } => {
                 self.size * (TAU * m.x / period + phase).sin()
-            }
-            Kind::IndicatorNonlinearity { cubic } => {
-                self.size * (seen / frame.reach_um).powi(if cubic { 3 } else { 2 })
             }
             Kind::ThermalDrift { constant } => {
                 let whole = (-frame.duration_s / constant).exp_m1();
@@ -449,11 +442,22 @@ impl DesignEffect {
         }
     }
 
-    /// The error of an indicator's scale, µm, where all that moves it has brought it to.
-    pub(super) fn of_the_scale(&self, m: &Moment, stands: f64) -> f64 {
+    /// What an indicator makes of where all that moves it has brought it to, µm: the error of its scale, its gain and its
+    /// curve.
+    pub(super) fn of_the_scale(&self, frame: &DesignFrame, m: &Moment, stands: f64) -> f64 {
+        use DesignEffectKind as Kind;
+        if !self.reaches(m) {
+            return 0.0;
+        }
         match self.kind {
-            DesignEffectKind::CyclicReading { period, phase } if self.reaches(m) => {
+            Kind::CyclicReading { period, phase } => {
                 self.size * (TAU * stands / period + phase).sin()
+            }
+            Kind::CommonGain | Kind::GainMismatch => {
+                self.size * (stands - frame.middle_um[m.channel])
+            }
+            Kind::IndicatorNonlinearity { cubic } => {
+                self.size * (stands / frame.reach_um).powi(if cubic { 3 } else { 2 })
             }
             _ => 0.0,
         }

@@ -174,11 +174,8 @@ impl<'a> Rig<'a> {
             return shown;
         };
         for (m, value) in trace.iter().zip(&mut shown) {
-            let seen = *value;
             let effects = self.plan.effects.iter();
-            *value += effects
-                .map(|e| e.of_the_indicator(frame, m, seen))
-                .sum::<f64>();
+            *value += effects.map(|e| e.of_the_mount(frame, m)).sum::<f64>();
         }
         let width = |e: &DesignEffect| trace.first().and_then(|m| e.play(m));
         for half in self.plan.effects.iter().filter_map(width).map(|w| 0.5 * w) {
@@ -187,7 +184,9 @@ impl<'a> Rig<'a> {
         for (m, value) in trace.iter().zip(&mut shown) {
             let stands = *value;
             let effects = self.plan.effects.iter();
-            *value += effects.map(|e| e.of_the_scale(m, stands)).sum::<f64>();
+            *value += effects
+                .map(|e| e.of_the_scale(frame, m, stands))
+                .sum::<f64>();
         }
         shown
     }

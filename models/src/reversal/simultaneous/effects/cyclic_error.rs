@@ -101,7 +101,7 @@ impl JoinedEffect for Cyclic {
 
     fn shows(&self) -> Option<Shows> {
         Some(match self.of {
-            Of::Travel => Shows::Seen,
+            Of::Travel => Shows::Added,
             _ => Shows::Scale,
         })
     }

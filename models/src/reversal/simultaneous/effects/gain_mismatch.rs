@@ -34,7 +34,7 @@ impl JoinedEffect for GainMismatch {
     }
 
     fn shows(&self) -> Option<Shows> {
-        Some(Shows::Seen)
+        Some(Shows::Characteristic)
     }
 
     fn shown(&self, at: &Circumstances, seen: f64, values: &[f64], by: &mut [f64]) -> (f64, f64) {

@@ -142,12 +142,12 @@ pub enum Move {
 /// [`Self::Scale`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Shows {
-    /// It depends on what the indicator sees.
-    Seen,
-    /// It adds to what is seen, by the time.
+    /// It adds to what is seen, by the time or by the place.
     Added,
     /// It depends on where the indicator stands on its scale, after all that moves it there.
     Scale,
+    /// It is what the indicator makes of where it stands: its gain, its curve.
+    Characteristic,
     /// It adds to all readings of a pass, by where that was set to zero.
     Height,
 }

@@ -5,8 +5,7 @@ use errsep_models::model::FittedModel;
 use errsep_models::reversal::Direction;
 use errsep_models::reversal::designs::simulate::{DesignPlan, simulate};
 use errsep_models::reversal::designs::{
-    Design, DesignFit, DesignObservations, DesignOptions, DesignReading, Determined, FoundForm,
-    Zero, fit,
+    Design, DesignFit, DesignObservations, DesignOptions, Determined, FoundForm, Zero, fit,
 };
 use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
 use errsep_models::reversal::simultaneous::Noise;
@@ -137,13 +136,15 @@ pub(super) fn promise(name: String, design: &Design, plan: &Common) -> Result<Pr
 /// all repeats, forward and backward, the indicators at once.
 fn readings_of(design: &Design, plan: &Common) -> Result<DesignObservations, String> {
     let [alpha_h, alpha_v, gamma_1, gamma_2, cone] = plan.slopes.map(|urad| urad * 1e-6);
+    let directions = if plan.both_directions { 2 } else { 1 };
     let (made, _) = simulate(&DesignPlan {
         slopes_rad: [alpha_h, alpha_v, gamma_1, gamma_2, cone, 0.0, 0.0],
         kept_um: (plan.zero == Zero::Kept).then_some([0.0; 3]),
         thickness_mm: plan.thickness,
         length_mm: plan.travel,
         positions: plan.positions,
-        repeats: plan.repeats,
+        // Each pass has noise of its own.
+        repeats: plan.repeats * directions,
         noise_um: plan
             .noise
             .max(LEAST_NOISE * plan.forms[0].max(plan.forms[1])),
@@ -153,26 +154,21 @@ fn readings_of(design: &Design, plan: &Common) -> Result<DesignObservations, Str
     })
     .map_err(|why| why.to_string())?;
     let positions = design.positions();
-    let directions = if plan.both_directions { 2 } else { 1 };
-    let mut readings = Vec::with_capacity(directions * made.readings.len());
-    for reading in &made.readings {
+    let mut readings = made.readings;
+    for reading in &mut readings {
         let spindle = design.channels()[reading.channel].spindle;
         let turn = positions.partition_point(|p| *p < spindle - 0.25) as u32;
-        let pass = turn * plan.repeats + reading.repeat - 1;
-        for back in 0..directions {
-            let part = reading.x / plan.travel;
-            let along = if back == 0 { part } else { 1.0 - part };
-            let passes = f64::from(pass) * directions as f64 + back as f64;
-            readings.push(DesignReading {
-                direction: if back == 0 {
-                    Direction::Forward
-                } else {
-                    Direction::Backward
-                },
-                time: Some(plan.costs.trace * (passes + along) + plan.costs.turn * f64::from(turn)),
-                ..*reading
-            });
-        }
+        let of_turn = reading.repeat - 1;
+        let part = reading.x / plan.travel;
+        let (direction, along) = if of_turn.is_multiple_of(directions) {
+            (Direction::Forward, part)
+        } else {
+            (Direction::Backward, 1.0 - part)
+        };
+        let pass = f64::from(turn * plan.repeats * directions + of_turn);
+        reading.repeat = of_turn / directions + 1;
+        reading.direction = direction;
+        reading.time = Some(plan.costs.trace * (pass + along) + plan.costs.turn * f64::from(turn));
     }
     Ok(DesignObservations {
         design: design.clone(),

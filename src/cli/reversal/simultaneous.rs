@@ -296,7 +296,7 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
         }
         (None, Some(fewer)) => format!(
             "the fewest that leave no more than the finest do but for noise: with {fewer}, which the corrected \
-             information criterion would have of so few positions, the forms would be told as noise"
+             information criterion would have of so few readings, the forms would be told as noise"
         ),
     };
     let verdict = match fit.knots.verdict {

@@ -125,6 +125,33 @@ fn a_closure_of_few_positions_raises_no_alarm() {
     }
 }
 
+/// *Simulated truth*: forms with detail of a few positions are followed where the readings tell it, and no alarm is raised.
+/// With knots no finer than three positions a cell each of these was told to disagree.
+#[test]
+fn detail_of_a_few_positions_raises_no_alarm() {
+    let folder = TempDir::new().unwrap();
+    for (positions, seed) in [
+        ("36", "1"),
+        ("41", "2"),
+        ("41", "3"),
+        ("61", "45"),
+        ("61", "56"),
+    ] {
+        let grid = ["--positions", positions, "--seed", seed];
+        let passes = ["--repeats", "3", "--both-directions"];
+        let (_, data, _) = run(
+            folder.path(),
+            &[&["simulate", "reversal"][..], &grid, &passes].concat(),
+        );
+        fs::write(folder.path().join("data.csv"), data).unwrap();
+        let (_, text, _) = run(folder.path(), &["reversal", "data.csv", "--simultaneous"]);
+        assert!(
+            !text.contains("disagree") && text.contains("neighbouring residuals are not"),
+            "{positions} positions, seed {seed}: {text}"
+        );
+    }
+}
+
 /// Without repeats the closure is told from the noise by neighbouring readings, which bound it.
 #[test]
 fn a_jump_without_repeats_is_told_by_the_closure() {

@@ -3,8 +3,9 @@
 //! At the slopes of the channels' lines the cost of the linear fit is that of one linear problem; the least
 //! corrected Akaike criterion of all unknowns decides
 //! ([`knots`](crate::reversal::simultaneous::knots)). First all forms go up the ladder together, then each
-//! form by itself up and down from there while that lowers the criterion, in turn until none moves. With few positions a
-//! rung that leaves more than the finest does is refuted, as there, and all forms take the fewest cells that are not.
+//! form by itself up and down from there while that lowers the criterion, in turn until none moves. With few readings a
+//! rung that leaves more than the finest does is refuted, as there: all forms take the fewest cells that are not, and
+//! then each by itself fewer as long as they are not.
 
 use std::collections::HashMap;
 
@@ -22,7 +23,7 @@ use crate::basis::bspline::CubicBSpline;
 use crate::reversal::finer_forms::{Curves, FinerForms, TIMES};
 use crate::reversal::simultaneous::Knots;
 use crate::reversal::simultaneous::knots::{
-    FEWEST_POSITIONS, KnotTrial, PATIENCE, POSITIONS_A_CELL, ladder, sparse, trial,
+    KnotTrial, PATIENCE, ladder, most_by_positions, sparse, trial,
 };
 
 /// The break points of a fit.
@@ -74,14 +75,14 @@ pub(super) fn breaks(ground: &Ground) -> Result<Chosen, DesignFitError> {
             let refuting = rungs.refuting(best, &mut table)?;
             let forms = ground.layout.forms.len();
             let own: Vec<Vec<f64>> = match &refuting {
-                Some(breaks) => vec![breaks.clone(); forms],
+                Some((breaks, finest)) => rungs.fewer(breaks, finest)?,
                 None if ground.options.alike => vec![rungs.breaks[best].clone(); forms],
                 None => {
                     let own = rungs.by_form(best)?;
                     own.iter().map(|r| rungs.breaks[*r].clone()).collect()
                 }
             };
-            let common = refuting.unwrap_or_else(|| rungs.breaks[best].clone());
+            let common = refuting.map_or_else(|| rungs.breaks[best].clone(), |own| own.0);
             Ok(Chosen {
                 forms: rungs.finer(&own, common.len() - 1)?,
                 breaks: own,
@@ -138,7 +139,7 @@ struct Rungs<'g, 'a> {
 impl<'g, 'a> Rungs<'g, 'a> {
     fn new(ground: &'g Ground<'a>) -> Result<Self, DesignFitError> {
         let mut breaks: Vec<Vec<f64>> = Vec::new();
-        for cells in std::iter::once(1).chain(ladder(ground.positions() / POSITIONS_A_CELL)) {
+        for cells in ladder(most_by_positions(ground.positions())) {
             let own = even(ground, cells)?;
             if breaks.last().is_none_or(|last| last.len() != own.len()) {
                 breaks.push(own);
@@ -182,7 +183,7 @@ impl<'g, 'a> Rungs<'g, 'a> {
     /// The forms on their breaks and on finer ones, no form's coarser than the cells that are best for all together;
     /// `None` where the readings carry none.
     fn finer(self, own: &[Vec<f64>], common: usize) -> Result<Option<FinerForms>, DesignFitError> {
-        let most = self.most_by_positions();
+        let most = most_by_positions(self.ground.positions());
         let finer = own.iter().map(|b| {
             let cells = (TIMES * (b.len() - 1)).max(common);
             even(self.ground, cells.min(most).max(1))
@@ -200,33 +201,29 @@ impl<'g, 'a> Rungs<'g, 'a> {
             .map(|(taken, finer)| FinerForms::new(taken, finer, self.ladder, x)))
     }
 
-    /// Cells that a spline with its slope and constant has at most on the positions.
-    fn most_by_positions(&self) -> usize {
-        self.ground.positions().saturating_sub(FEWEST_POSITIONS - 1)
-    }
-
-    /// The fewest cells, of all forms alike, that leave no more than the finest but for noise, where positions are few and
-    /// the best of the ladder leaves more.
+    /// The fewest cells, of all forms alike, that leave no more than the finest but for noise, where readings are few and
+    /// the best of the ladder leaves more; and the finest.
     fn refuting(
         &self,
         best: usize,
         table: &mut Vec<KnotTrial>,
-    ) -> Result<Option<Vec<f64>>, DesignFitError> {
+    ) -> Result<Option<(Vec<f64>, KnotTrial)>, DesignFitError> {
         let Some(taken) = table.get(best).copied() else {
             return Ok(None);
         };
-        if !sparse::are_few(self.ground.positions()) {
+        let (positions, readings) = (self.ground.positions(), self.ground.readings());
+        let last = table.last().map_or(0, |t| t.unknowns);
+        if !sparse::are_few(positions, readings, last) {
             return Ok(None);
         }
         let forms = self.ground.layout.forms.len();
-        let readings = self.ground.readings();
         let on = |cells: usize| -> Result<_, DesignFitError> {
             let breaks = even(self.ground, cells)?;
             let fitted = self.fitted(vec![breaks.clone(); forms])?;
             Ok(fitted.map(|own| (breaks, own.0)))
         };
         let mut finest = None;
-        for cells in (taken.cells + 1..=self.most_by_positions()).rev() {
+        for cells in sparse::beyond(taken.cells, positions).into_iter().rev() {
             finest = on(cells)?;
             if finest.is_some() {
                 break;
@@ -239,18 +236,46 @@ impl<'g, 'a> Rungs<'g, 'a> {
             return Ok(None);
         }
         table.truncate(best + 1);
-        for cells in taken.cells + 1..=finest.cells {
+        for cells in sparse::beyond(taken.cells, positions) {
             let Some((breaks, own)) = on(cells)? else {
                 break;
             };
             if table.last().is_some_and(|before| before.cells < own.cells) {
                 table.push(own);
                 if !sparse::leaves_more(&own, &finest, readings) {
-                    return Ok(Some(breaks));
+                    return Ok(Some((breaks, finest)));
                 }
             }
         }
         Ok(None)
+    }
+
+    /// The breaks of each form, of rungs below these common ones, that still leave no more than the finest but for noise.
+    fn fewer(&self, common: &[f64], finest: &KnotTrial) -> Result<Vec<Vec<f64>>, DesignFitError> {
+        let mut own = vec![common.to_vec(); self.ground.layout.forms.len()];
+        if self.ground.options.alike {
+            return Ok(own);
+        }
+        let coarser = self.breaks.iter().filter(|b| b.len() < common.len());
+        let coarser: Vec<&Vec<f64>> = coarser.rev().collect();
+        for form in 0..own.len() {
+            for breaks in &coarser {
+                let mut tried = own.clone();
+                tried[form] = (*breaks).clone();
+                let fitted = if near(tried.iter().map(|b| b.len() - 1)) {
+                    self.fitted(tried.clone())?
+                } else {
+                    None
+                };
+                let passes =
+                    |t: &KnotTrial| !sparse::leaves_more(t, finest, self.ground.readings());
+                if !fitted.is_some_and(|(t, _)| passes(&t)) {
+                    break;
+                }
+                own = tried;
+            }
+        }
+        Ok(own)
     }
 
     /// Goes up the ladder with all forms together: the best rung, and the table.
@@ -290,12 +315,6 @@ impl<'g, 'a> Rungs<'g, 'a> {
         Ok(own.unwrap_or(f64::INFINITY))
     }
 
-    /// Whether the finest of these rungs is no finer beside the coarsest than the band carries.
-    fn near(&self, rungs: &[usize]) -> bool {
-        let cells = |rung: Option<&usize>| rung.map_or(1, |r| self.breaks[*r].len() - 1);
-        cells(rungs.iter().max()) <= FINEST * cells(rungs.iter().min())
-    }
-
     /// The rung of each form, from one that is best for all together.
     fn by_form(&mut self, common: usize) -> Result<Vec<usize>, DesignFitError> {
         let mut at = vec![common; self.ground.layout.forms.len()];
@@ -317,7 +336,7 @@ impl<'g, 'a> Rungs<'g, 'a> {
                         (rung, since) = (next, since + 1);
                         let mut tried = at.clone();
                         tried[form] = rung;
-                        if !self.near(&tried) {
+                        if !near(tried.iter().map(|r| self.breaks[*r].len() - 1)) {
                             break;
                         }
                         let own = self.criterion(&tried)?;
@@ -333,6 +352,12 @@ impl<'g, 'a> Rungs<'g, 'a> {
         }
         Ok(at)
     }
+}
+
+/// Whether the finest of these numbers of cells is no finer beside the coarsest than the band carries.
+fn near(cells: impl Iterator<Item = usize> + Clone) -> bool {
+    let coarsest = cells.clone().min().unwrap_or(1);
+    cells.max().unwrap_or(1) <= FINEST * coarsest
 }
 
 /// The sum of squares that the linear fit leaves, and the step there.

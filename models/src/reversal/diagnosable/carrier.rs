@@ -51,7 +51,7 @@ impl Carrier<'_> {
     /// The same of four channels with more cells, at most so many, as long as the criterion that chose the knots
     /// says that it is better.
     ///
-    /// That choice ends where a channel has three positions a cell, as its forms' bands are to be told. Channels read
+    /// That choice goes by steps of a factor of √2 and no further than the positions of a single channel. Channels read
     /// at positions of their own tell the forms between those of each: what a finer form is there need not be told
     /// well, as long as `routes`, over less than a spacing, are.
     pub fn refined(

@@ -73,7 +73,7 @@ impl FittedKnots {
         }
     }
 
-    /// The number of cells that the criterion alone would have, where it was refuted: of few positions it counts forms as noise.
+    /// The number of cells that the criterion alone would have, where it was refuted: of few readings it counts forms as noise.
     pub fn refuted(&self) -> Option<usize> {
         let best = self.table.iter().min_by(|a, b| a.aicc.total_cmp(&b.aicc))?;
         (best.cells < self.cells()).then_some(best.cells)

@@ -3,8 +3,9 @@
 //! At the seed's tilts the cost of the linear fit with K cells is that of one linear problem. The choice
 //! is the least corrected Akaike criterion (Hurvich and Tsai, Biometrika 76, 1989),
 //! m ln(RSS/m) + 2pm/(m − p − 1); Schwarz's criterion and generalised cross-validation stand beside
-//! it in the table. With few positions the criterion's correction outweighs forms that stand far out of the
-//! noise; there what the finest rung leaves is the measure (`sparse.rs`).
+//! it in the table. The ladder ends where rung after rung is worse, or where the positions carry no finer
+//! rung. With few readings beside the unknowns the criterion's correction outweighs forms that stand far out of
+//! the noise; there what the finest rung leaves is the measure (`sparse.rs`).
 
 mod climbed;
 pub mod sparse;
@@ -31,21 +32,17 @@ use climbed::{Climbed, RungFit};
 /// Rungs after the best one before the ladder is left.
 pub const PATIENCE: usize = 3;
 
-/// Readings' positions a cell must have on average, so that the table never ends in interpolation.
-pub const POSITIONS_A_CELL: usize = 3;
-
-/// Cell counts of the ladder: a factor of about √2 apart.
+/// Cell counts of the ladder, from one to the most: a factor of about √2 apart.
 pub fn ladder(most: usize) -> impl Iterator<Item = usize> {
-    (2..)
-        .map(|k: u32| {
-            let power = 1_usize << (k / 2);
-            if k.is_multiple_of(2) {
-                power
-            } else {
-                power + power / 2
-            }
-        })
-        .take_while(move |cells| *cells <= most)
+    let powers = (2..).map(|k: u32| {
+        let power = 1_usize << (k / 2);
+        if k.is_multiple_of(2) {
+            power
+        } else {
+            power + power / 2
+        }
+    });
+    std::iter::once(1).chain(powers.take_while(move |cells| *cells <= most))
 }
 
 /// Number of different positions of the channel that has most.
@@ -63,6 +60,11 @@ fn different(x: &[f64]) -> usize {
     x.chunk_by(|a, b| a == b).count()
 }
 
+/// Most cells of a spline that has its slope and constant apart on so many positions.
+pub fn most_by_positions(positions: usize) -> usize {
+    positions.saturating_sub(FEWEST_POSITIONS - 1)
+}
+
 /// Most cells that readings carry: a spline of K cells with its slope and offset has K + 3 unknowns and
 /// needs as many positions (Schoenberg and Whitney 1953), and `free` readings more than all unknowns
 /// tell the noise. `unknowns` are those of any number of cells.
@@ -70,7 +72,7 @@ pub fn most_cells(channels: &[ChannelReadings], unknowns: &Unknowns, free: usize
     let readings: usize = channels.iter().map(ChannelReadings::len).sum();
     let others = unknowns.free_count() - unknowns.band_count();
     let by_readings = readings.saturating_sub(others + free) / unknowns.forms.len().max(1);
-    let by_positions = positions(channels).saturating_sub(FEWEST_POSITIONS - 1);
+    let by_positions = most_by_positions(positions(channels));
     by_readings.saturating_sub(1).min(by_positions)
 }
 
@@ -227,9 +229,9 @@ impl Choice<'_> {
         ) -> Result<Option<(Squares, RungFit)>, ReversalError>,
     ) -> Result<Climbed, ReversalError> {
         let readings = self.readings();
-        let most = positions(self.channels) / POSITIONS_A_CELL;
+        let most = most_by_positions(positions(self.channels));
         let mut climbed = Climbed::default();
-        for cells in std::iter::once(1).chain(ladder(most)) {
+        for cells in ladder(most) {
             let (unknowns, bases) = self.rung(unknowns_of, cells)?;
             let count = unknowns.free_count();
             let cells = bases[0].cell_count();
@@ -248,7 +250,8 @@ impl Choice<'_> {
                 break;
             }
         }
-        if sparse::are_few(positions(self.channels)) {
+        let last = climbed.table.last().map_or(0, |t| t.unknowns);
+        if sparse::are_few(positions(self.channels), readings, last) {
             self.climb_to_the_finest(unknowns_of, &mut squares, &mut climbed)?;
         }
         self.look_finer(unknowns_of, squares, &mut climbed)?;
@@ -265,7 +268,7 @@ impl Choice<'_> {
         ) -> Result<Option<(Squares, RungFit)>, ReversalError>,
         climbed: &mut Climbed,
     ) -> Result<(), ReversalError> {
-        let most = positions(self.channels).saturating_sub(FEWEST_POSITIONS - 1);
+        let most = most_by_positions(positions(self.channels));
         let cells = (TIMES * climbed.cells()).min(most);
         if climbed.on_cells(cells) {
             return Ok(());

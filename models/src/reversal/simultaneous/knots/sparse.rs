@@ -1,4 +1,4 @@
-//! Forms at few positions.
+//! Forms at few positions or of few readings.
 //!
 //! With m readings and p unknowns the corrected criterion adds 2pm/(m − p − 1), which outweighs any misfit as p comes
 //! near m: forms of 2 µm read at seven positions with a noise of 0.05 µm would be smoothed away and told as noise.
@@ -8,22 +8,40 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::{
-    Choice, Climbed, FEWEST_FREE, FEWEST_POSITIONS, KnotTrial, POSITIONS_A_CELL, RungFit, Squares,
+    Choice, Climbed, FEWEST_FREE, KnotTrial, RungFit, Squares, ladder, most_by_positions,
     positions, trial,
 };
 use crate::basis::bspline::CubicBSpline;
 use crate::reversal::simultaneous::ReversalError;
 use crate::reversal::simultaneous::unknowns::Unknowns;
 
-/// Where the ladder carries fewer cells the positions are few.
-const CELLS: usize = 12;
+/// Fewer positions are few whatever the readings.
+const POSITIONS: usize = 36;
 
-/// Probability under noise alone below which a rung leaves more than noise.
-const LEVEL: f64 = 0.01;
+/// Readings an unknown of the last rung that was tried, below which they are few: the correction is a fifth of the
+/// criterion's penalty there, and grows from rung to rung.
+const READINGS: usize = 6;
 
-/// Whether so many positions are few.
-pub fn are_few(positions: usize) -> bool {
-    positions / POSITIONS_A_CELL < CELLS
+/// Probability under noise alone below which a rung leaves more than noise: where the finest leaves few degrees of
+/// freedom, and so shows little, and elsewhere.
+const LEVELS: [f64; 2] = [0.01, 0.001];
+
+/// Fewer degrees of freedom than these are few.
+const FREE: f64 = 50.0;
+
+/// Whether so many positions, or so many readings beside the unknowns of the last rung that was tried, are few.
+pub fn are_few(positions: usize, readings: usize, unknowns: usize) -> bool {
+    positions < POSITIONS || readings < READINGS * unknowns
+}
+
+/// Cells beyond so many up to the most: all where positions are few, else those of the ladder.
+pub fn beyond(cells: usize, positions: usize) -> Vec<usize> {
+    let most = most_by_positions(positions);
+    if positions < POSITIONS {
+        (cells + 1..=most).collect()
+    } else {
+        ladder(most).filter(|rung| *rung > cells).collect()
+    }
 }
 
 impl Choice<'_> {
@@ -39,15 +57,16 @@ impl Choice<'_> {
         climbed: &mut Climbed,
     ) -> Result<(), ReversalError> {
         let readings = self.readings();
-        let places = positions(self.channels);
-        let most = places.saturating_sub(FEWEST_POSITIONS - 1);
+        let tried = climbed.table.last().map_or(0, |t| t.cells);
         let mut finer: Vec<(KnotTrial, RungFit)> = Vec::new();
-        for cells in places / POSITIONS_A_CELL + 1..=most {
+        for cells in beyond(tried, positions(self.channels)) {
             let (unknowns, bases) = self.rung(unknowns_of, cells)?;
             let (count, cells) = (unknowns.free_count(), bases[0].cell_count());
-            let known = climbed.table.iter().chain(finer.iter().map(|f| &f.0));
-            if readings < count + FEWEST_FREE || known.last().is_some_and(|t| t.cells >= cells) {
+            if readings < count + FEWEST_FREE {
                 break;
+            }
+            if cells <= finer.last().map_or(tried, |(t, _)| t.cells) {
+                continue;
             }
             let Some((squares, fit)) = squares(unknowns, bases)? else {
                 break;
@@ -55,10 +74,11 @@ impl Choice<'_> {
             let trial = trial(cells, readings, count, squares.left);
             finer.push((trial, fit));
         }
-        let Some((finest, ..)) = finer.last() else {
+        let finest = finer.last().map(|f| f.0).or(climbed.table.last().copied());
+        let Some(finest) = finest else {
             return Ok(());
         };
-        let (finest, best) = (*finest, climbed.table.get(climbed.best).copied());
+        let best = climbed.table.get(climbed.best).copied();
         let enough = |rung: &KnotTrial| !leaves_more(rung, &finest, readings);
         if best.as_ref().is_none_or(enough) {
             return Ok(());
@@ -83,5 +103,6 @@ pub fn leaves_more(rung: &KnotTrial, finest: &KnotTrial, readings: usize) -> boo
         return false;
     }
     let ratio = (left(rung) - left(finest)) / more / finest.noise.powi(2).max(f64::MIN_POSITIVE);
-    FisherSnedecor::new(more, free(finest)).is_ok_and(|law| law.sf(ratio.max(0.0)) < LEVEL)
+    let level = LEVELS[usize::from(free(finest) >= FREE)];
+    FisherSnedecor::new(more, free(finest)).is_ok_and(|law| law.sf(ratio.max(0.0)) < level)
 }

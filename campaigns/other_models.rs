@@ -100,7 +100,7 @@ fn smallest(maker: &Maker, cases: u64, first: u64) {
             };
             let bare = maker.diagnosed(&[], seed, &own);
             let seen = |effect: &str, size: f64| {
-                let put = [(effect, size / told_of_put(effect))];
+                let put = [(effect, size / told_of_put(maker.model, effect))];
                 maker.diagnosed(&put, seed, &own).verdict.kind != Kind::None
             };
             let of = |effect: &&str| {

@@ -175,7 +175,7 @@ fn gap(tally: &mut Tally, size: Size, truth: f64) {
 }
 
 fn sized(tally: &mut Tally, diagnosis: &Diagnosis, effect: &str, size: f64) {
-    let size = size * told_of_put(effect);
+    let size = size * told_of_put(diagnosis.model, effect);
     let candidate = diagnosis.candidates.iter().find(|c| c.effect == effect);
     if let Some(found) = candidate.and_then(|c| c.parameters.first()) {
         tally.add(found.value.abs() - size, found.std, freedom(diagnosis));

@@ -92,9 +92,10 @@ fn one<M: FittedModel + 'static>(
     let model = make(&[(effect, size)], seed, 1.0);
     let fit: Joined = joined(&model, model.effects(), &[effect.to_owned()], &options()).ok()?;
     let own = fit.effects.first()?;
-    // The makers spoil sensor 3 and the last of four sets.
+    // The makers spoil sensor 3, probe 2 and the last of four sets.
     let right = |variant: &str| match variant.split_once(' ') {
         Some(("sensor", number)) => number == "3",
+        Some(("probe", number)) => number == "2",
         Some(("set", number)) => number == "4",
         _ => true,
     };
@@ -105,7 +106,7 @@ fn one<M: FittedModel + 'static>(
     };
     let clean = make(&[], seed, 0.0);
     let readings = clean.linearised();
-    let truth = size * told_of_put(effect);
+    let truth = size * told_of_put(model.name(), effect);
     let told = parameters.first()?;
     let freedom = fit.noise.degrees_of_freedom.unwrap_or(f64::INFINITY);
     let mut tallies = [Tally::default(); 2];

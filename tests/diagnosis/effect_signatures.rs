@@ -229,6 +229,8 @@ fn fourier() {
         ("zero-jump", 1.0, 5, 1e-9),
         // Second order, and the ends of the section.
         ("travel-scale", 1e-5, 0, 0.02),
+        ("gain", 1e-3, 2, 1e-9),
+        ("nonlinearity", 1.0, 2, 1e-9),
     ] {
         let with = made(&[fourier::Disturbance::named(name, size, 3).unwrap()]);
         let values: &[f64] = match name {
@@ -238,6 +240,38 @@ fn fourier() {
         };
         let rest = bare.left(&with, name, &at(variant, values));
         assert!(rest < most, "{name}: {rest:e}");
+    }
+}
+
+/// Two probes see what is behind the section.
+#[test]
+fn fourier_of_two_probes() {
+    let what = FourierSimulation {
+        samples: 200,
+        orders: 20,
+        noise: 0.0,
+        step: (0.0, 0.0),
+        third_probe: false,
+        ..FourierSimulation::default()
+    };
+    let section = Section {
+        length: what.length,
+        orders: what.orders,
+    };
+    let made = |disturbances: &[fourier::Disturbance]| {
+        let (scans, _) = fourier::simulate_disturbed(&what, disturbances, 3).unwrap();
+        FourierScans::new(&scans, section, None).unwrap()
+    };
+    let bare = Bare::of(made(&[]));
+    for (name, size, variant, values) in [
+        ("beyond-the-section", 1.0, 0, &[4.95][..]),
+        ("gain", 1e-3, 2, &[]),
+        ("nonlinearity", 1.0, 2, &[]),
+    ] {
+        let with = made(&[fourier::Disturbance::named(name, size, 3).unwrap()]);
+        let rest = bare.left(&with, name, &at(variant, values));
+        // Epsilons.
+        assert!(rest < 1e-9, "{name}: {rest:e}");
     }
 }
 

@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use errsep::diagnosis::{Diagnosis, Hidden, Kind, Options, diagnose};
 use errsep_models::calibration_line::CalibrationLine;
 use errsep_models::calibration_line::simulate::{CalibrationSimulation, Disturbance, simulate};
+use errsep_models::fourier::{self, FourierScans, FourierSimulation, Section};
 
 use crate::other_models::{MAKERS, Maker, judged, told_by};
 
@@ -133,6 +134,44 @@ fn four_sensor() {
 fn fourier() {
     found_blind(maker("fourier"));
     not_passed_over(maker("fourier"), "height-difference");
+}
+
+/// *Simulated truth*: of two probes a step of the workpiece behind the section is named as that, in size and place, and a
+/// workpiece that goes on as it begins as nothing.
+#[test]
+fn fourier_of_two_probes() {
+    let what = FourierSimulation {
+        samples: 200,
+        orders: 30,
+        step: (0.0, 0.0),
+        third_probe: false,
+        ..FourierSimulation::default()
+    };
+    let section = Section {
+        length: what.length,
+        orders: what.orders,
+    };
+    for seed in 1..=4 {
+        let of = |step: f64| {
+            let put = [fourier::Disturbance::BeyondTheSection(step)];
+            let (scans, _) = fourier::simulate_disturbed(&what, &put, seed).unwrap();
+            let scans = FourierScans::new(&scans, section, Some(what.noise)).unwrap();
+            diagnose(&scans, &options(&[]))
+        };
+        assert_eq!(of(0.0).verdict.kind, Kind::None);
+        let found = of(15.0);
+        assert_eq!(
+            found.verdict.effects,
+            ["beyond-the-section"],
+            "{}",
+            found.verdict.statement
+        );
+        let cause = &found.candidates[0];
+        let [height, past] = [0, 1].map(|k| &cause.parameters[k]);
+        // k·u: eight figures in all; the place lies between one reading and the next, 0.5 mm apart.
+        assert!((height.value - 15.0).abs() < 3.5 * height.std, "{height:?}");
+        assert!((past.value - 5.0).abs() < 3.5 * past.std + 0.5, "{past:?}");
+    }
 }
 
 #[test]

@@ -94,7 +94,9 @@ pub const MAKERS: [Maker; 6] = [
         model: "fourier",
         effects: &[
             "drift",
+            "gain",
             "height-difference",
+            "nonlinearity",
             "probe-spacing",
             "thermal-bending",
             "travel-scale",
@@ -283,23 +285,24 @@ pub fn within(diagnosis: &Diagnosis, effect: &str, size: f64) -> Option<bool> {
     if ["part-zero", "part-rotation", "part-temperature"].contains(&effect) {
         return None;
     }
-    let size = size * told_of_put(effect);
+    let size = size * told_of_put(diagnosis.model, effect);
     let candidate = diagnosis.candidates.iter().find(|c| c.effect == effect)?;
     if !candidate.elsewhere.is_empty() {
         return None;
     }
     let sensor = candidate.variant.as_deref();
-    let right = sensor.is_none_or(|v| !v.starts_with("sensor") || v == "sensor 3");
+    let is_one = |v: &str| v.starts_with("sensor") || v.starts_with("probe");
+    let right = sensor.is_none_or(|v| !is_one(v) || v == "sensor 3" || v == "probe 2");
     let found = candidate.parameters.first()?;
     Some(right && (found.value.abs() - size).abs() <= 2.0 * found.std)
 }
 
 /// What the size of an effect is told to be, per unit of what is put in: a yaw is put in by the amplitude of a wave and
-/// told by its root mean square, the bend of a sensor's characteristic at 30 µm and told at its greatest reading.
-pub fn told_of_put(effect: &str) -> f64 {
-    match effect {
-        "yaw" => 0.5f64.sqrt(),
-        "nonlinearity" => (greatest_of_sensor_3() / 30.0).powi(2),
+/// told by its root mean square, the bend of a sensor's characteristic (four sensors) at 30 µm and told at its greatest reading.
+pub fn told_of_put(model: &str, effect: &str) -> f64 {
+    match (model, effect) {
+        (_, "yaw") => 0.5f64.sqrt(),
+        ("four-sensor", "nonlinearity") => (greatest_of_sensor_3() / 30.0).powi(2),
         _ => 1.0,
     }
 }

@@ -6,9 +6,10 @@ use errsep_models::model::{AnyModel, Column, Effect, FittedModel, Shape};
 use nalgebra::{DMatrix, DVector};
 
 use crate::attribution::doubt::Drawn;
+use crate::detection::basis::orthonormal;
 use crate::detection::dictionary::{Dictionary, Entry, Places};
 use crate::detection::null::NullLaw;
-use crate::detection::space::{Space, orthonormal};
+use crate::detection::space::Space;
 use crate::levels::SLACK;
 use crate::noise::contrasts::repeated;
 use crate::noise::law::NoiseLaw;

@@ -18,7 +18,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::attribution::context::{Cause, Context};
-use crate::detection::space::inner_products;
+use crate::detection::basis::inner_products;
 
 /// Draws of the state.
 pub(crate) const DRAWS: usize = 128;

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use crate::attribution::by_traces::ByTraces;
 use crate::attribution::context::{Cause, Context, as_matrix, column, span, unknowns};
+use crate::detection::basis::orthonormal;
 use crate::detection::dictionary::{inverse, is_positive, products, statistic};
-use crate::detection::space::orthonormal;
 use crate::levels::{ALIKE, UNSEARCHED};
 use crate::search::{Reach, around, coordinate_search};
 

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use crate::attribution::context::{Cause, Context, span};
 use crate::attribution::doubt::{DRAWS, Doubt, FEW_DRAWS};
+use crate::detection::basis::inner_products;
 use crate::detection::dictionary::{Entry, Meaning, statistic, surprise};
 use crate::detection::folding::Sums;
-use crate::detection::space::inner_products;
 use crate::levels::{ADEQUATE, FAR, PAST_DOUBT, SEPARABLE, SUSPECT};
 
 /// Vectors that signatures are multiplied with at once.

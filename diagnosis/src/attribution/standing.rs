@@ -8,7 +8,8 @@ use crate::attribution::context::{Cause, Context, raw_signatures};
 use crate::attribution::limits::is_beyond_limit;
 use crate::attribution::shrink::held_out_square;
 use crate::attribution::sizes::{Sizes, first_amplitude};
-use crate::detection::space::{Space, orthonormal};
+use crate::detection::basis::orthonormal;
+use crate::detection::space::Space;
 use crate::levels::{EARNED, FAR, LEAVES, STANDS, WEIGHTY};
 use crate::noise::law::{NoiseLaw, NoiseSource};
 

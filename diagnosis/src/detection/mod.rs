@@ -2,6 +2,7 @@
 //! dictionary of signatures and places, and the null distribution that says how seldom as much would
 //! stand out with nothing there.
 
+pub(super) mod basis;
 pub(super) mod dictionary;
 pub(super) mod estimate;
 pub(super) mod fitted;

@@ -11,17 +11,12 @@ use std::sync::Arc;
 use errsep_models::model::{AnyModel, Column, FittedModel, Freedom, Profiles, Record};
 use nalgebra::{DMatrix, DVector};
 
+use crate::detection::basis::{inner_products, orthonormal};
 use crate::detection::loose::Loose;
 use crate::detection::scatter::{Scatter, ScatterRoot};
 use crate::detection::shared_scatter::SharedRoot;
 use crate::noise::law::NoiseLaw;
 use crate::noise::whitening::Whitening;
-
-/// Columns that project to less than this part of their length lie in the span of the others.
-const DEPENDENT: f64 = 1e-7;
-
-/// Columns below which products are taken one by one.
-const FEW: usize = 8;
 
 /// The whitened space of one set of readings under one model and one law of noise.
 #[derive(Debug, Clone)]
@@ -335,37 +330,5 @@ impl Space {
             }
         }
         columns
-    }
-}
-
-/// AᵀB of tall matrices, by blocks where there are many products.
-pub(crate) fn inner_products(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    if a.ncols().min(b.ncols()) < FEW {
-        a.tr_mul(b)
-    } else {
-        a.transpose() * b
-    }
-}
-
-/// An orthonormal basis of the columns that are longer than rounding compared with `sizes`.
-pub(crate) fn orthonormal(columns: &DMatrix<f64>, sizes: &[f64]) -> DMatrix<f64> {
-    let mut kept: Vec<DVector<f64>> = Vec::new();
-    for (column, size) in columns.column_iter().zip(sizes) {
-        let mut vector = column.clone_owned();
-        for _ in 0..2 {
-            for other in &kept {
-                let along = other.dot(&vector);
-                vector.axpy(-along, other, 1.0);
-            }
-        }
-        let length = vector.norm();
-        if length > DEPENDENT * size && length > 0.0 {
-            kept.push(vector / length);
-        }
-    }
-    if kept.is_empty() {
-        DMatrix::zeros(columns.nrows(), 0)
-    } else {
-        DMatrix::from_columns(&kept)
     }
 }

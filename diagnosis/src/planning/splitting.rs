@@ -11,7 +11,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::attribution::alternatives::Alternative;
 use crate::attribution::confidence::Answer;
 use crate::attribution::context::{Cause, Context};
-use crate::detection::space::{Space, orthonormal};
+use crate::detection::basis::orthonormal;
+use crate::detection::space::Space;
 use crate::levels::{TELL, normal_quantile};
 
 /// A further measurement for a group.

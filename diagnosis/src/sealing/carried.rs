@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use errsep_models::model::{AnyModel, FittedModel, Place};
 use nalgebra::{DMatrix, DVector};
 
-use crate::detection::space::orthonormal;
+use crate::detection::basis::orthonormal;
 use crate::sealing::forecast::NotSealed;
 
 /// Parts of the range by which positions may differ and still be the same, and lie beyond its ends.

@@ -390,7 +390,7 @@ impl Gram {
 /// An orthonormal basis of seen columns.
 pub(super) fn unit(seen: &DMatrix<f64>) -> DMatrix<f64> {
     let sizes: Vec<f64> = seen.column_iter().map(|c| c.norm()).collect();
-    crate::detection::space::orthonormal(seen, &sizes)
+    crate::detection::basis::orthonormal(seen, &sizes)
 }
 
 /// A vector less its parts along unit vectors.

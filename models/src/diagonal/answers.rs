@@ -4,9 +4,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::components::{Component, Location};
-use super::design::{Design, decompose, is_definition};
+use super::design::{Design, is_definition};
+use super::elimination::Elimination;
 use super::prediction::Parameter;
-use super::solution::OPEN;
+use super::solution::{OPEN, Solution};
 use super::{DiagonalError, WorkZone};
 
 /// An error function that the readings determine at every position.
@@ -34,16 +35,17 @@ impl Answers {
     /// # Errors
     /// The singular values do not converge.
     pub fn of(zone: &WorkZone, design: &Design) -> Result<Self, DiagonalError> {
-        let matrix = design.dense();
-        let split = decompose(&matrix, 0.0)?;
-        let unseen = |j: usize| split.null.row(j).norm();
-        // Σ M v vᵀe / s², whose run means are zero already.
+        let blank = DVector::zeros(design.stop_of.len());
+        let triangle = Elimination::of(design, zone, &blank)?;
+        let border = Solution::of_readings(&triangle.corner, &triangle.right, triangle.floor)?;
+        let open = triangle.undetermined(&border.null)?;
+        let unseen = |j: usize| open.square(j).sqrt();
+        // M (MᵀM)⁺ e.
         let weights = |j: usize| {
-            let mut inside = DVector::zeros(matrix.ncols());
-            for (value, vector) in &split.determined {
-                inside.axpy(vector[j] / (value * value), vector, 1.0);
-            }
-            &matrix * inside * design.scale[j]
+            let mut unit = DVector::zeros(design.scale.len());
+            unit[j] = 1.0;
+            let inside = triangle.correction(&unit, &border.half_covariance);
+            design.residuals(&blank, &inside) * -design.scale[j]
         };
         let known = |parameter: Parameter| {
             let j = design.unknowns.index_of(parameter)?;
@@ -57,7 +59,7 @@ impl Answers {
             let mut found = Determined {
                 component,
                 positions: Vec::new(),
-                weights: DMatrix::zeros(zone.steps + 1, matrix.nrows()),
+                weights: DMatrix::zeros(zone.steps + 1, blank.len()),
             };
             let mut any = false;
             for index in 0..=zone.steps {

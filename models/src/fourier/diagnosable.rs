@@ -25,6 +25,10 @@ pub struct FourierScans {
     /// Maps readings to the coefficients of the columns.
     solver: Arc<DMatrix<f64>>,
     coefficients: DVector<f64>,
+    /// The mean of what both probes read, µm: the noise of it is independent of that of their difference.
+    means: Arc<Vec<f64>>,
+    /// By trace: whether a third probe takes over at the joint.
+    third: Arc<Vec<bool>>,
     noise: Option<f64>,
 }
 
@@ -40,6 +44,7 @@ impl FourierScans {
         }
         let spacings = spacings(scans);
         let (mut places, mut traces, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut means, mut third) = (Vec::new(), Vec::new());
         for (channel, spacing) in spacings.iter().enumerate() {
             let first_cell = channel << 32;
             for scan in scans.iter().filter(|s| s.spacing == *spacing) {
@@ -56,6 +61,9 @@ impl FourierScans {
                         cell: first_cell + k,
                     });
                 }
+                let both = joined.first.iter().zip(&joined.difference);
+                means.extend(both.map(|(first, difference)| first - 0.5 * difference));
+                third.push(joined.third_from.is_some());
                 traces.push(start..places.len());
             }
         }
@@ -66,6 +74,8 @@ impl FourierScans {
             columns: Arc::new(DMatrix::zeros(0, 0)),
             solver: Arc::new(DMatrix::zeros(0, 0)),
             coefficients: DVector::zeros(0),
+            means: Arc::new(means),
+            third: Arc::new(third),
             // A difference of two readings.
             noise: noise.map(|sigma| sigma * 2f64.sqrt()),
         };
@@ -143,6 +153,38 @@ impl FourierScans {
     /// Part of the section from the first probe to the other one.
     pub(super) fn share_of_arm(&self, place: &Place) -> f64 {
         self.arm(place) / self.section.length
+    }
+
+    /// Whether a third probe takes over at the joint of any scan.
+    pub(super) fn has_third_probe(&self) -> bool {
+        self.third.contains(&true)
+    }
+
+    /// How far beyond the end of the section the second probe stands, mm, in a scan without a third one.
+    pub(super) fn past_the_end(&self, row: usize) -> Option<f64> {
+        let trace = self.record.traces.partition_point(|t| t.end <= row);
+        let place = self.record.places.get(row)?;
+        let second = self.third.get(trace) == Some(&false);
+        (second && self.beyond(place))
+            .then(|| place.x + self.spacings[place.channel] - self.section.length)
+    }
+
+    /// The probe that is read against the first, 2 or 3.
+    pub(super) fn other_probe(&self, row: usize) -> usize {
+        let beyond = self.record.places.get(row).is_some_and(|p| self.beyond(p));
+        if beyond && self.past_the_end(row).is_none() {
+            3
+        } else {
+            2
+        }
+    }
+
+    /// What the probes of a reading read, the first and the other, µm: the mean of both as it was read, their difference as
+    /// it is fitted. A signature of the readings themselves would find their noise in what is judged.
+    pub(super) fn read(&self, row: usize) -> [f64; 2] {
+        let fitted = self.columns.row(row).transpose().dot(&self.coefficients);
+        let mean = self.means.get(row).copied().unwrap_or(0.0);
+        [mean + 0.5 * fitted, mean - 0.5 * fitted]
     }
 
     /// Part of the test at which a reading was taken, 0 to 1.

@@ -93,13 +93,22 @@ pub enum Disturbance {
     TravelScale(f64),
     /// The workpiece bends by so much over all scans, µm.
     ThermalBending(f64),
+    /// P2 reads too much by this share.
+    Gain(f64),
+    /// P2 reads too much by this at its greatest reading of all scans, µm, and in proportion to the square of it elsewhere.
+    Nonlinearity(f64),
+    /// The workpiece steps up by so much behind the section, µm, a twentieth of it past its end.
+    BeyondTheSection(f64),
 }
 
 impl Disturbance {
     /// The names that [`Self::named`] knows.
-    pub const NAMES: [&'static str; 7] = [
+    pub const NAMES: [&'static str; 10] = [
+        "beyond-the-section",
         "drift",
+        "gain",
         "height-difference",
+        "nonlinearity",
         "probe-spacing",
         "thermal-bending",
         "travel-scale",
@@ -125,6 +134,9 @@ impl Disturbance {
             "zero-jump" => Self::ZeroJump(size),
             "travel-scale" => Self::TravelScale(size),
             "thermal-bending" => Self::ThermalBending(size),
+            "gain" => Self::Gain(size),
+            "nonlinearity" => Self::Nonlinearity(size),
+            "beyond-the-section" => Self::BeyondTheSection(size),
             _ => return None,
         })
     }
@@ -140,6 +152,8 @@ struct Here {
     jump: f64,
     scale: f64,
     bending: f64,
+    gain: f64,
+    step: f64,
 }
 
 impl Here {
@@ -161,6 +175,10 @@ impl Here {
                 Disturbance::ZeroJump(_) => {}
                 Disturbance::TravelScale(share) => here.scale += share,
                 Disturbance::ThermalBending(size) => here.bending += size,
+                Disturbance::Gain(share) => here.gain += share,
+                Disturbance::BeyondTheSection(size) => here.step += size,
+                // Of the readings of all scans, afterwards.
+                Disturbance::Nonlinearity(_) => {}
             }
         }
         here
@@ -275,16 +293,20 @@ pub fn simulate_disturbed(
                     let stands = x * (1.0 + here.scale);
                     let probed = |at: f64| {
                         let u = at.rem_euclid(length) / length;
-                        workpiece(at) + here.bending * moment * (1.0 - (2.0 * u - 1.0).powi(2))
+                        let step = if at >= 1.05 * length { here.step } else { 0.0 };
+                        workpiece(at)
+                            + step
+                            + here.bending * moment * (1.0 - (2.0 * u - 1.0).powi(2))
                     };
                     let zero = here.drift * (1.0 - (-moment / 0.15).exp())
                         + if 2 * i > what.samples { here.jump } else { 0.0 };
                     let mut noise = || normal.sample(&mut rng);
                     let m1 = probed(stands) + slide(x) + zero + noise();
-                    let m2 = what.height_difference
-                        + probed(stands + spacing + here.error)
-                        + slide(x)
-                        + lift(x, spacing + here.error)
+                    let m2 = (1.0 + here.gain)
+                        * (what.height_difference
+                            + probed(stands + spacing + here.error)
+                            + slide(x)
+                            + lift(x, spacing + here.error))
                         + noise();
                     ScanReading {
                         x,
@@ -308,5 +330,26 @@ pub fn simulate_disturbed(
             });
         }
     }
+    for disturbance in disturbances {
+        if let Disturbance::Nonlinearity(size) = disturbance {
+            bend(&mut scans, *size, what);
+        }
+    }
     Ok((scans, truth))
+}
+
+/// Bends the readings of P2 by so much at the greatest that stands in for the other end of the spacing, µm.
+fn bend(scans: &mut [Scan], size: f64, what: &FourierSimulation) {
+    let counts =
+        |scan: &Scan, r: &ScanReading| !what.third_probe || r.x < what.length - scan.spacing;
+    let of = |scan: &Scan| -> f64 {
+        let read = scan.readings.iter().filter(|r| counts(scan, r));
+        read.filter_map(|r| r.m2)
+            .fold(0.0, |most, m| most.max(m.abs()))
+    };
+    let reach = scans.iter().map(of).fold(f64::MIN_POSITIVE, f64::max);
+    let readings = scans.iter_mut().flat_map(|s| &mut s.readings);
+    for m2 in readings.filter_map(|r| r.m2.as_mut()) {
+        *m2 += size * (*m2 / reach).powi(2);
+    }
 }

@@ -7,7 +7,12 @@ pub(crate) struct Moments(Vec<f64>);
 
 impl Moments {
     pub fn of<'a>(places: impl Iterator<Item = &'a Place>) -> Self {
-        let mut moments: Vec<f64> = places.map(|p| p.time).collect();
+        Self::at(places.map(|p| p.time))
+    }
+
+    /// The different ones of these.
+    pub fn at(moments: impl Iterator<Item = f64>) -> Self {
+        let mut moments: Vec<f64> = moments.collect();
         moments.sort_by(f64::total_cmp);
         moments.dedup();
         Self(moments)

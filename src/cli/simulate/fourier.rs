@@ -50,7 +50,7 @@ pub struct Args {
     #[arg(long)]
     two_probes: bool,
     /// Switch on an effect of the diagnosis's catalogue at a size, in its exact form; may be given
-    /// several times. Sizes are in um, mm (probe-spacing) or rad (yaw).
+    /// several times. Sizes are in um, mm (probe-spacing), rad (yaw) or shares (gain, travel-scale).
     #[arg(long = "effect", value_name = "NAME=VALUE")]
     effects: Vec<String>,
     #[command(flatten)]
@@ -82,6 +82,8 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         height_difference: args.height_difference,
         noise: args.noise,
         third_probe: !args.two_probes,
+        // Behind the section the workpiece goes on as it begins, unless an effect says otherwise.
+        step: (0.0, defaults.step.1),
         ..defaults
     };
     let seed = args.common.seed;

@@ -34,6 +34,13 @@ const SLOPE: f64 = 1e-3;
 /// Part of the time between two readings that is rounding.
 const ROUNDING: f64 = 1e-9;
 
+/// Variance of where a signature falls between two readings, by the square of their distance: anywhere is as probable.
+const BETWEEN: f64 = 1.0 / 12.0;
+
+/// What the noise adds to it, by the fourth power of the fall in units of the noise: that of the place of a step that is
+/// found among many readings (Yao, Annals of Statistics 15 (1987) 1321).
+const BLURRED: f64 = 26.0;
+
 /// Amplitudes and shapes of causes fitted together.
 pub(crate) struct Sizes {
     /// The amplitudes, cause by cause.
@@ -68,7 +75,7 @@ impl Sizes {
     ) -> Option<Self> {
         let (amplitudes, _) = context.amplitudes(readings, causes)?;
         let (columns, parameters) = instruments(context, causes, &amplitudes);
-        let gram = columns.tr_mul(&columns);
+        let gram = columns.tr_mul(&columns) + fallen(context, causes, &amplitudes, &parameters);
         let covariance = gram
             .clone()
             .cholesky()
@@ -119,15 +126,17 @@ impl Sizes {
                 derivatives.set_column(parameter, &slope);
             }
         }
-        let Some(inverse) = columns.tr_mul(&derivatives).try_inverse() else {
+        let fallen = fallen(context, causes, &plain.amplitudes, &plain.parameters);
+        let Some(inverse) = (columns.tr_mul(&derivatives) + &fallen).try_inverse() else {
             return Some(plain);
         };
-        let gain = inverse * columns.transpose();
+        let gain = &inverse * columns.transpose();
+        let own = &gain * gain.transpose() + &inverse * fallen * inverse.transpose();
         // What the state leaves open is independent of the noise.
         let open = &gain * context.open(readings, causes);
         let added = draws.added(&gain) + &open * open.transpose();
         Some(Self {
-            covariance: with_state(&gain * gain.transpose(), &added),
+            covariance: with_state(own, &added),
             gain,
             draws: Some(draws),
             ..plain
@@ -259,6 +268,43 @@ fn instruments(
         return (DMatrix::zeros(context.space.readings(), 0), parameters);
     }
     (DMatrix::from_columns(&columns), parameters)
+}
+
+/// What the readings tell of shapes by between which of them signatures fall, as inverse variances of the parameters.
+fn fallen(
+    context: &Context<'_>,
+    causes: &[Cause],
+    amplitudes: &DVector<f64>,
+    parameters: &[Unknown],
+) -> DMatrix<f64> {
+    let mut told = DMatrix::zeros(parameters.len(), parameters.len());
+    for (which, cause) in causes.iter().enumerate() {
+        if cause.projected.ncols() != 1 {
+            continue;
+        }
+        let amplitude = amplitudes[first_amplitude(causes, which)];
+        let falls = context.catalogue[cause.effect].falls(context.model, &cause.shape);
+        for fall in falls {
+            let (seen, _) = context
+                .space
+                .forward_columns(std::slice::from_ref(&fall.height));
+            let height = amplitude.powi(2) * seen.norm_squared();
+            let variance = fall.apart.powi(2) * (BETWEEN + BLURRED / height.powi(2));
+            let of = |value: usize| {
+                let own = Unknown::Shape(which, value);
+                parameters.iter().position(|p| *p == own)
+            };
+            let by: Vec<(usize, f64)> = (fall.by.iter())
+                .filter_map(|(value, slope)| Some((of(*value)?, *slope)))
+                .collect();
+            for (i, a) in &by {
+                for (j, b) in &by {
+                    told[(*i, *j)] += a * b / variance;
+                }
+            }
+        }
+    }
+    told
 }
 
 /// The shapes on either side of a cause's along one of its free parameters, and how far apart: where it begins at a

@@ -7,8 +7,8 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector};
 
 use super::{
-    About, Column, Covariate, Effect, Estimate, FittedModel, Freedom, Link, Parameter, Pattern,
-    Place, Profile, Quantity, Record, Shape,
+    About, Column, Covariate, Effect, Estimate, Fall, FittedModel, Freedom, Link, Parameter,
+    Pattern, Place, Profile, Quantity, Record, Shape,
 };
 
 /// A fitted model of any kind. It does what the model in it does.
@@ -360,6 +360,9 @@ impl<M: FittedModel + 'static> Effect<AnyModel> for AnyEffect<M> {
         value: usize,
     ) -> Option<(Vec<usize>, Column)> {
         self.0.changed(model.known(), shape, value)
+    }
+    fn falls(&self, model: &AnyModel, shape: &Shape) -> Vec<Fall> {
+        self.0.falls(model.known(), shape)
     }
     fn allowed(&self, model: &AnyModel, shape: &Shape) -> bool {
         self.0.allowed(model.known(), shape)

@@ -102,6 +102,18 @@ impl Shape {
     }
 }
 
+/// Where the signature of an effect falls or rises from one reading to the next: a small step of its shape moves no
+/// reading over it, and yet the readings tell between which of them it lies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fall {
+    /// The derivatives of what it lies at by the values of the shape, with their places.
+    pub by: Vec<(usize, f64)>,
+    /// How far that goes from one reading to the next.
+    pub apart: f64,
+    /// By how much the readings there differ, per unit of the amplitude.
+    pub height: Column,
+}
+
 /// What people should know of an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct About {
@@ -222,6 +234,11 @@ pub trait Effect<M>: Send + Sync {
     /// traces, and the column at each of their readings. A search by small steps then takes the others as they are.
     fn changed(&self, _model: &M, _shape: &Shape, _value: usize) -> Option<(Vec<usize>, Column)> {
         None
+    }
+
+    /// Where the signature falls from one reading to the next, of an effect of one amplitude.
+    fn falls(&self, _model: &M, _shape: &Shape) -> Vec<Fall> {
+        Vec::new()
     }
 
     /// Whether a shape is one that the search may go to.

@@ -20,7 +20,7 @@ pub(crate) const ROUNDING: f64 = 1e-12;
 pub use any::AnyModel;
 pub(crate) use effect::amplitude;
 pub(crate) use effect::each;
-pub use effect::{About, Effect, Estimate, Link, Parameter, Shape};
+pub use effect::{About, Effect, Estimate, Fall, Link, Parameter, Shape};
 pub(crate) use moments::Moments;
 
 /// The circumstances of one reading.

@@ -9,13 +9,16 @@
 //! lean, the way from slip to slip, told by the slips over the travel, the state at mid travel or where each
 //! pass begins.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
 
 use super::passes::{in_pass, passes};
 use super::{Linearised, part_of_travel, spread};
-use crate::model::{About, Column, Effect, Estimate, FittedModel, Link, Parameter, Place, Shape};
+use crate::model::{
+    About, Column, Effect, Estimate, Fall, FittedModel, Link, Parameter, Place, Shape,
+};
 use crate::reversal::diagnosable::Arrangement;
 
 /// See the head of the file. Variants: a lag; then [`KINDS`] of a lean for each direction across: its first
@@ -324,6 +327,48 @@ impl Effect<Linearised> for StickSlip {
         let column = saw.in_pass(model, pass, *shape.values.get(value)?);
         let at = |range: &Range<usize>| model.traces().iter().position(|t| t == range);
         Some((pass.iter().filter_map(at).collect(), column))
+    }
+
+    /// Where it slips: the part of a slip that is slips × run + state passes a whole number.
+    fn falls(&self, model: &Linearised, shape: &Shape) -> Vec<Fall> {
+        let (kind, Some(&slips)) = (self.kind(shape.variant), shape.values.first()) else {
+            return Vec::new();
+        };
+        let own = passes(model);
+        let (what, lag) = match kind {
+            Kind::Lag => (Anew::Lag, shape.values.get(2)),
+            Kind::Sawtooth(what, _) => (what, shape.values.get(1 + own.len())),
+            Kind::Waves(_) => return Vec::new(),
+        };
+        let lag = lag.copied().unwrap_or(0.0);
+        let mut falls = Vec::new();
+        for (which, pass) in own.iter().enumerate() {
+            let at = if kind == Kind::Lag { 1 } else { 1 + which };
+            let Some(&state) = shape.values.get(at) else {
+                continue;
+            };
+            // All indicators of a pass are read together: the closest readings about a slip tell it.
+            let mut of_pass: BTreeMap<i64, Fall> = BTreeMap::new();
+            for rows in pass.iter().flat_map(|t| t.clone().zip(t.clone().skip(1))) {
+                let runs = [rows.0, rows.1].map(|k| run(model, &model.places()[k]));
+                let wholes = runs.map(|run| (slips * run + state).floor());
+                if wholes[0] == wholes[1] {
+                    continue;
+                }
+                let height = what.change(model, rows.1, &model.places()[rows.1], lag);
+                let apart = (slips * (runs[1] - runs[0])).abs();
+                let fall = of_pass.entry(wholes[1] as i64).or_insert_with(|| Fall {
+                    by: vec![(0, 0.5 * (runs[0] + runs[1])), (at, 1.0)],
+                    apart,
+                    height: Column::default(),
+                });
+                fall.apart = fall.apart.min(apart);
+                fall.height.rows.push(rows.1);
+                fall.height.values.push(height);
+            }
+            falls.extend(of_pass.into_values());
+        }
+        falls
     }
 
     fn allowed(&self, model: &Linearised, shape: &Shape) -> bool {

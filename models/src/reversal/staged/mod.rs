@@ -239,7 +239,8 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
     let noise_figures = noise_figures(options, &traces, closing.as_ref());
     let noise = *noise_figures.first().ok_or(NoSolution::NoReadings)?;
     let known = noise.degrees_of_freedom.unwrap_or(f64::INFINITY);
-    let tilts = Tilts::of(&joint, (noise.sigma, known), &drifts);
+    let sheared = sheared_slopes(&traces, &estimates);
+    let tilts = Tilts::of(&joint, (noise.sigma, known), &drifts, &sheared);
     let lines = channel_lines(&traces, fits, estimates, &tilts);
     let forms = together.forms(&designs, &joint, noise.sigma);
     let contrasts = (traces.len() == 4).then(|| contrasts(&tilts));
@@ -341,6 +342,15 @@ fn estimate_errors(traces: &[Trace], lines: &[Line], options: &Options) -> Vec<E
             ErrorEstimates::of(&x, &rest, line, options.thickness, options.interpolation)
         })
         .collect()
+}
+
+/// The slope of the estimated shear error of each channel, µm/mm: a line fitted to readings that are not rotated holds it,
+/// whatever is done to the forms.
+fn sheared_slopes(traces: &[Trace], estimates: &[ErrorEstimates]) -> Vec<f64> {
+    let of = |(trace, own): (&Trace, &ErrorEstimates)| {
+        Line::fit(&trace.x, &own.shear, &trace.count).map_or(0.0, |line| line.slope)
+    };
+    traces.iter().zip(estimates).map(of).collect()
 }
 
 /// A shear error below this share of the noise is not worth an interpolation.

@@ -23,8 +23,14 @@ pub(super) struct Tilts {
 }
 
 impl Tilts {
-    /// With what the drifts of repeats add to the covariance of the channels' slopes, (µm/mm)².
-    pub(super) fn of(joint: &Joint, (sigma, freedom): (f64, f64), drifts: &Drifts) -> Self {
+    /// With what the drifts of repeats add to the covariance of the channels' slopes, (µm/mm)², and by how much
+    /// each slope may be off as its line was not rotated, µm/mm.
+    pub(super) fn of(
+        joint: &Joint,
+        (sigma, freedom): (f64, f64),
+        drifts: &Drifts,
+        sheared: &[f64],
+    ) -> Self {
         let values: Vec<f64> = joint
             .lines
             .iter()
@@ -48,6 +54,9 @@ impl Tilts {
         };
         let least = (0..values.len()).map(of).fold(f64::INFINITY, f64::min);
         covariance += &added;
+        for (c, slope) in sheared.iter().enumerate() {
+            covariance[(c, c)] += (gain[c] * slope).powi(2);
+        }
         Self {
             values,
             covariance,

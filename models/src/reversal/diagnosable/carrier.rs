@@ -13,6 +13,8 @@ use crate::reversal::{Channel, Observations, Reading};
 
 /// From one number of cells to the next, about.
 const FINER: f64 = 1.2;
+/// Positions of a channel a cell, at least, of the fit that is refined: with fewer forms swing between the positions.
+const POSITIONS_A_CELL: usize = 3;
 /// An end cell longer than so many others is long.
 const LONG: f64 = 1.5;
 
@@ -51,8 +53,8 @@ impl Carrier<'_> {
     /// The same of four channels with more cells, at most so many, as long as the criterion that chose the knots
     /// says that it is better.
     ///
-    /// That choice goes by steps of a factor of √2 and no further than the positions of a single channel. Channels read
-    /// at positions of their own tell the forms between those of each: what a finer form is there need not be told
+    /// It begins where a channel has three positions a cell, as forms that are finer swing between its positions. Channels
+    /// read at positions of their own tell the forms between those of each: what a finer form is there need not be told
     /// well, as long as `routes`, over less than a spacing, are.
     pub fn refined(
         self,
@@ -63,9 +65,16 @@ impl Carrier<'_> {
     ) -> Self {
         match self {
             Self::Four(fit) if fit.effects.is_empty() => {
+                let coarsest = positions_a_channel(observations) / POSITIONS_A_CELL;
                 let observations = as_four(observations);
+                let first = if cells_of(&fit) > coarsest.max(1) {
+                    let coarser = fit_four(&observations, assumptions, Knots::Cells(coarsest));
+                    coarser.map_or(*fit, Cow::Owned)
+                } else {
+                    *fit
+                };
                 Self::Four(Box::new(finer(
-                    *fit,
+                    first,
                     &observations,
                     assumptions,
                     (most, routes),
@@ -145,6 +154,22 @@ fn finer<'a>(
     }
 }
 
+/// Different positions of the channel that has most.
+fn positions_a_channel(observations: &DesignObservations) -> usize {
+    let channels = 0..observations.design.channels().len();
+    let of = |channel: usize| {
+        let own = observations
+            .readings
+            .iter()
+            .filter(|r| r.channel == channel);
+        let mut positions: Vec<f64> = own.map(|r| r.x).collect();
+        positions.sort_unstable_by(f64::total_cmp);
+        positions.dedup();
+        positions.len()
+    };
+    channels.map(of).max().unwrap_or(0)
+}
+
 fn cells_of(fit: &Simultaneous) -> usize {
     fit.knots.breaks.len().saturating_sub(1).max(1)
 }
@@ -213,11 +238,20 @@ fn fit_design(
     zero: Zero,
     assumptions: Assumptions,
 ) -> Result<DesignFit, NotDiagnosable> {
-    let options = DesignOptions {
+    let mut options = DesignOptions {
         zero,
         thickness_mm: assumptions.thickness.unwrap_or(0.0),
         noise: assumptions.noise.map_or(Noise::Estimated, Noise::Declared),
         ..DesignOptions::default()
     };
-    designs::fit(observations, &options).map_err(|why| NotDiagnosable::NoFit(why.to_string()))
+    let fitted = |options: &DesignOptions| {
+        designs::fit(observations, options).map_err(|why| NotDiagnosable::NoFit(why.to_string()))
+    };
+    let chosen = fitted(&options)?;
+    let most = (positions_a_channel(observations) / POSITIONS_A_CELL).max(1);
+    if chosen.cells().iter().all(|(_, cells)| *cells <= most) {
+        return Ok(chosen);
+    }
+    options.knots = Knots::Cells(most);
+    fitted(&options).or(Ok(chosen))
 }

@@ -23,7 +23,7 @@ use crate::basis::bspline::CubicBSpline;
 use crate::reversal::finer_forms::{Curves, FinerForms, TIMES};
 use crate::reversal::simultaneous::Knots;
 use crate::reversal::simultaneous::knots::{
-    KnotTrial, PATIENCE, ladder, most_by_positions, sparse, trial,
+    Carried, KnotTrial, PATIENCE, ladder, most_by_positions, sparse, trial,
 };
 
 /// The break points of a fit.
@@ -139,7 +139,9 @@ struct Rungs<'g, 'a> {
 impl<'g, 'a> Rungs<'g, 'a> {
     fn new(ground: &'g Ground<'a>) -> Result<Self, DesignFitError> {
         let mut breaks: Vec<Vec<f64>> = Vec::new();
-        for cells in ladder(most_by_positions(ground.positions())) {
+        let carried = Carried::by(ground.traces.iter().map(|t| t.x.as_slice()));
+        let most = most_by_positions(ground.positions());
+        for cells in ladder(most).take_while(|cells| carried.carries(*cells)) {
             let own = even(ground, cells)?;
             if breaks.last().is_none_or(|last| last.len() != own.len()) {
                 breaks.push(own);
@@ -216,6 +218,7 @@ impl<'g, 'a> Rungs<'g, 'a> {
         if !sparse::are_few(positions, readings, last) {
             return Ok(None);
         }
+        let carried = Carried::by(self.ground.traces.iter().map(|t| t.x.as_slice()));
         let forms = self.ground.layout.forms.len();
         let on = |cells: usize| -> Result<_, DesignFitError> {
             let breaks = even(self.ground, cells)?;
@@ -223,7 +226,10 @@ impl<'g, 'a> Rungs<'g, 'a> {
             Ok(fitted.map(|own| (breaks, own.0)))
         };
         let mut finest = None;
-        for cells in sparse::beyond(taken.cells, positions).into_iter().rev() {
+        for cells in sparse::beyond(taken.cells, positions, &carried)
+            .into_iter()
+            .rev()
+        {
             finest = on(cells)?;
             if finest.is_some() {
                 break;
@@ -236,7 +242,7 @@ impl<'g, 'a> Rungs<'g, 'a> {
             return Ok(None);
         }
         table.truncate(best + 1);
-        for cells in sparse::beyond(taken.cells, positions) {
+        for cells in sparse::beyond(taken.cells, positions, &carried) {
             let Some((breaks, own)) = on(cells)? else {
                 break;
             };

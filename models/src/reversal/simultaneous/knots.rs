@@ -3,12 +3,14 @@
 //! At the seed's tilts the cost of the linear fit with K cells is that of one linear problem. The choice
 //! is the least corrected Akaike criterion (Hurvich and Tsai, Biometrika 76, 1989),
 //! m ln(RSS/m) + 2pm/(m − p − 1); Schwarz's criterion and generalised cross-validation stand beside
-//! it in the table. The ladder ends where rung after rung is worse, or where the positions carry no finer
-//! rung. With few readings beside the unknowns the criterion's correction outweighs forms that stand far out of
+//! it in the table. The ladder ends where rung after rung is worse, or where the positions that the channels
+//! share carry no finer rung. With few readings beside the unknowns the criterion's correction outweighs forms that stand far out of
 //! the noise; there what the finest rung leaves is the measure (`sparse.rs`).
 
 mod climbed;
 pub mod sparse;
+
+use std::cell::OnceCell;
 
 use errsep_solvers::linear::bordered::{Bordered, Solved};
 use errsep_solvers::problem::NoValue;
@@ -58,6 +60,56 @@ fn most_read(channels: &[ChannelReadings]) -> &[f64] {
 
 fn different(x: &[f64]) -> usize {
     x.chunk_by(|a, b| a == b).count()
+}
+
+/// Positions of a channel a cell has at least where the channels were read at positions of their own: what is finer
+/// swings between those of each.
+const POSITIONS_A_CELL: usize = 3;
+
+/// Most cells of the ladder: as many as the positions carry that all channels share, and a third of those of a channel.
+pub struct Carried<'a> {
+    channels: Vec<&'a [f64]>,
+    positions: usize,
+    shared: OnceCell<usize>,
+}
+
+impl<'a> Carried<'a> {
+    /// Of channels' positions in ascending order.
+    pub fn by(channels: impl Iterator<Item = &'a [f64]>) -> Self {
+        let channels: Vec<&[f64]> = channels.collect();
+        Self {
+            positions: channels.iter().map(|x| different(x)).max().unwrap_or(0),
+            channels,
+            shared: OnceCell::new(),
+        }
+    }
+
+    /// Whether a rung of so many cells is carried.
+    pub fn carries(&self, cells: usize) -> bool {
+        if cells <= self.positions / POSITIONS_A_CELL {
+            return true;
+        }
+        let shared = self.shared.get_or_init(|| shared(&self.channels));
+        cells <= most_by_positions(*shared)
+    }
+}
+
+/// Positions that all channels have.
+fn shared(channels: &[&[f64]]) -> usize {
+    let Some((first, others)) = channels.split_first() else {
+        return 0;
+    };
+    let mut at = vec![0; others.len()];
+    let mut here = |x: f64| {
+        others.iter().zip(&mut at).all(|(other, at)| {
+            *at += other[*at..].iter().take_while(|own| **own < x).count();
+            other.get(*at) == Some(&x)
+        })
+    };
+    first
+        .chunk_by(|a, b| a == b)
+        .filter(|same| here(same[0]))
+        .count()
 }
 
 /// Most cells of a spline that has its slope and constant apart on so many positions.
@@ -230,8 +282,9 @@ impl Choice<'_> {
     ) -> Result<Climbed, ReversalError> {
         let readings = self.readings();
         let most = most_by_positions(positions(self.channels));
+        let carried = Carried::by(self.channels.iter().map(|c| c.x.as_slice()));
         let mut climbed = Climbed::default();
-        for cells in ladder(most) {
+        for cells in ladder(most).take_while(|cells| carried.carries(*cells)) {
             let (unknowns, bases) = self.rung(unknowns_of, cells)?;
             let count = unknowns.free_count();
             let cells = bases[0].cell_count();
@@ -252,7 +305,7 @@ impl Choice<'_> {
         }
         let last = climbed.table.last().map_or(0, |t| t.unknowns);
         if sparse::are_few(positions(self.channels), readings, last) {
-            self.climb_to_the_finest(unknowns_of, &mut squares, &mut climbed)?;
+            self.climb_to_the_finest(unknowns_of, &mut squares, &mut climbed, &carried)?;
         }
         self.look_finer(unknowns_of, squares, &mut climbed)?;
         Ok(climbed)

@@ -8,7 +8,7 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::{
-    Choice, Climbed, FEWEST_FREE, KnotTrial, RungFit, Squares, ladder, most_by_positions,
+    Carried, Choice, Climbed, FEWEST_FREE, KnotTrial, RungFit, Squares, ladder, most_by_positions,
     positions, trial,
 };
 use crate::basis::bspline::CubicBSpline;
@@ -34,13 +34,14 @@ pub fn are_few(positions: usize, readings: usize, unknowns: usize) -> bool {
     positions < POSITIONS || readings < READINGS * unknowns
 }
 
-/// Cells beyond so many up to the most: all where positions are few, else those of the ladder.
-pub fn beyond(cells: usize, positions: usize) -> Vec<usize> {
+/// Cells beyond so many up to the most: all where positions are few, else those of the ladder that are carried.
+pub fn beyond(cells: usize, positions: usize, carried: &Carried<'_>) -> Vec<usize> {
     let most = most_by_positions(positions);
     if positions < POSITIONS {
         (cells + 1..=most).collect()
     } else {
-        ladder(most).filter(|rung| *rung > cells).collect()
+        let rungs = ladder(most).filter(|rung| *rung > cells);
+        rungs.filter(|rung| carried.carries(*rung)).collect()
     }
 }
 
@@ -55,11 +56,12 @@ impl Choice<'_> {
             Vec<CubicBSpline>,
         ) -> Result<Option<(Squares, RungFit)>, ReversalError>,
         climbed: &mut Climbed,
+        carried: &Carried<'_>,
     ) -> Result<(), ReversalError> {
         let readings = self.readings();
         let tried = climbed.table.last().map_or(0, |t| t.cells);
         let mut finer: Vec<(KnotTrial, RungFit)> = Vec::new();
-        for cells in beyond(tried, positions(self.channels)) {
+        for cells in beyond(tried, positions(self.channels), carried) {
             let (unknowns, bases) = self.rung(unknowns_of, cells)?;
             let (count, cells) = (unknowns.free_count(), bases[0].cell_count());
             if readings < count + FEWEST_FREE {

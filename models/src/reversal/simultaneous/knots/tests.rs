@@ -54,6 +54,21 @@ fn campaign(seed: u64) -> (Plan, Options) {
     (plan, options)
 }
 
+/// *Definition*: the ladder goes as far as the positions carry that all channels share, and to a third of those of a channel.
+#[test]
+fn rungs_end_where_channels_share_no_positions() {
+    let grid: Vec<f64> = (0..60).map(f64::from).collect();
+    let beside: Vec<f64> = grid.iter().map(|x| x + 0.3).collect();
+    let twice: Vec<f64> = grid.iter().flat_map(|x| [*x; 2]).collect();
+    let most = |channels: &[&Vec<f64>]| {
+        let carried = Carried::by(channels.iter().map(|x| x.as_slice()));
+        (1..100).take_while(|cells| carried.carries(*cells)).count()
+    };
+    assert_eq!(most(&[&grid, &twice, &grid]), 57);
+    assert_eq!(most(&[&grid, &beside]), 20);
+    assert_eq!(most(&[&grid[..40].to_vec(), &grid]), 37);
+}
+
 #[test]
 fn normal_equations_choose_the_knots_that_orthogonal_factors_choose() {
     let (mut by_moments, mut compared) = (0, 0);

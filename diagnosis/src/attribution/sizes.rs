@@ -34,8 +34,9 @@ const SLOPE: f64 = 1e-3;
 /// Part of the time between two readings that is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Variance of where a signature falls between two readings, by the square of their distance: anywhere is as probable.
-const BETWEEN: f64 = 1.0 / 12.0;
+/// Variance of where a signature falls, by the square of the distance of two readings: as the search settles anywhere between
+/// two, not midway, anywhere up to that distance to either side is as probable.
+const BETWEEN: f64 = 1.0 / 3.0;
 
 /// What the noise adds to it, by the fourth power of the fall in units of the noise: that of the place of a step that is
 /// found among many readings (Yao, Annals of Statistics 15 (1987) 1321).

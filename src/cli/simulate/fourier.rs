@@ -93,6 +93,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
         amplitude,
         |name, size| Disturbance::named(name, size, what.spacings.len()),
     )?;
+    let is_beyond = |d: &Disturbance| matches!(d, Disturbance::BeyondTheSection(_));
+    if what.third_probe && disturbances.iter().any(is_beyond) {
+        let why =
+            "--effect beyond-the-section: three probes do not read what is behind the section";
+        return Err(Message::bad_input(why).remedy("give --two-probes with it"));
+    }
     let (scans, truth) = simulate_disturbed(&what, &disturbances, seed).map_err(|e| {
         Message::bad_input(e.to_string())
             .remedy("change --spacing, --length, --positions or --noise")

@@ -9,7 +9,7 @@
 
 use std::collections::HashMap;
 
-use errsep_solvers::linear::bordered::{Bordered, Solved};
+use errsep_solvers::linear::bordered::{Bordered, BorderedCovariance, Solved};
 use errsep_solvers::structured::{StructuredProblem, evaluate};
 use nalgebra::DVector;
 
@@ -19,9 +19,9 @@ use super::ground::Ground;
 use super::problem::DesignProblem;
 use super::readings::range;
 use super::staged;
-use crate::basis::bspline::CubicBSpline;
 use crate::reversal::finer_forms::{Curves, FinerForms, TIMES};
 use crate::reversal::simultaneous::Knots;
+use crate::reversal::simultaneous::knots::breaks::{are_equal, breaks as breaks_of};
 use crate::reversal::simultaneous::knots::{
     Carried, KnotTrial, PATIENCE, ladder, most_by_positions, sparse, trial,
 };
@@ -67,10 +67,10 @@ pub(super) fn breaks(ground: &Ground) -> Result<Chosen, DesignFitError> {
                 let asked = *asked;
                 Err(DesignFitError::TooManyKnots { asked, most })
             }
-            _ => Ok(alike(even(ground, *asked)?, Vec::new())),
+            _ => Ok(alike(on_cells(ground, *asked), Vec::new())),
         },
         Knots::Chosen => {
-            let mut rungs = Rungs::new(ground)?;
+            let mut rungs = Rungs::new(ground);
             let (best, mut table) = rungs.together()?;
             let refuting = rungs.refuting(best, &mut table)?;
             let forms = ground.layout.forms.len();
@@ -93,41 +93,28 @@ pub(super) fn breaks(ground: &Ground) -> Result<Chosen, DesignFitError> {
     }
 }
 
-/// Breaks of so many equal cells; a cell in which the channels with a reading do not tell all forms
-/// apart is joined to the next.
-fn even(ground: &Ground, cells: usize) -> Result<Vec<f64>, DesignFitError> {
+/// Breaks of so many cells.
+fn on_cells(ground: &Ground, cells: usize) -> Vec<f64> {
     let traces = ground.traces;
     let (low, high) = range(traces);
-    let even = CubicBSpline::uniform(low, high, cells.max(1))?;
-    let mut breaks = vec![low];
-    let mut seen = vec![false; traces.len()];
-    let mut at = vec![0; traces.len()];
+    let x: Vec<&[f64]> = traces.iter().map(|t| t.x.as_slice()).collect();
     let mut told: HashMap<Vec<bool>, bool> = HashMap::new();
-    for right in &even.breaks()[1..] {
-        for (c, trace) in traces.iter().enumerate() {
-            let next = at[c] + trace.x[at[c]..].partition_point(|x| x < right);
-            seen[c] |= next > at[c];
-            at[c] = next;
-        }
-        let apart = *told
-            .entry(seen.clone())
-            .or_insert_with(|| staged::tell_apart(&ground.determined.forms, &seen));
-        if apart {
-            breaks.push(*right);
-            seen.fill(false);
-        }
-    }
-    // What is left at the end belongs to the last cell.
-    if breaks.len() > 1 {
-        breaks.pop();
-    }
-    breaks.push(high);
-    Ok(breaks)
+    breaks_of(&x, [low, high], cells, |seen| {
+        let known = told.get(seen).copied();
+        known.unwrap_or_else(|| {
+            let apart = staged::tell_apart(&ground.determined.forms, seen);
+            told.insert(seen.to_vec(), apart);
+            apart
+        })
+    })
 }
 
 /// The ladder of cells.
 struct Rungs<'g, 'a> {
     ground: &'g Ground<'a>,
+    carried: Carried<'g>,
+    /// Place in the ladder of the next rung.
+    next: usize,
     /// Different break points, finer and finer, mm.
     breaks: Vec<Vec<f64>>,
     /// What was tried, by the rung of each form: the criterion, where the readings carry it.
@@ -137,22 +124,52 @@ struct Rungs<'g, 'a> {
 }
 
 impl<'g, 'a> Rungs<'g, 'a> {
-    fn new(ground: &'g Ground<'a>) -> Result<Self, DesignFitError> {
-        let mut breaks: Vec<Vec<f64>> = Vec::new();
-        let carried = Carried::by(ground.traces.iter().map(|t| t.x.as_slice()));
-        let most = most_by_positions(ground.positions());
-        for cells in ladder(most).take_while(|cells| carried.carries(*cells)) {
-            let own = even(ground, cells)?;
-            if breaks.last().is_none_or(|last| last.len() != own.len()) {
-                breaks.push(own);
-            }
-        }
-        Ok(Self {
+    fn new(ground: &'g Ground<'a>) -> Self {
+        let mut rungs = Self {
             ground,
-            breaks,
+            carried: Carried::by(ground.traces.iter().map(|t| t.x.as_slice())),
+            next: 0,
+            breaks: Vec::new(),
             tried: HashMap::new(),
             ladder: Vec::new(),
-        })
+        };
+        let surely = |rungs: &Self, cells| {
+            let equal = |cells| rungs.equal(cells);
+            rungs.carried.surely_carries(cells, equal)
+        };
+        while rungs.goes_on(surely) {}
+        rungs
+    }
+
+    /// Adds the next different rung of the ladder, if it is carried.
+    fn goes_on(&mut self, carries: impl Fn(&Self, usize) -> bool) -> bool {
+        while let Some(cells) = ladder().nth(self.next) {
+            if !carries(self, cells) {
+                break;
+            }
+            self.next += 1;
+            let own = on_cells(self.ground, cells);
+            if self
+                .breaks
+                .last()
+                .is_none_or(|last| last.len() != own.len())
+            {
+                self.breaks.push(own);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Whether the positions carry a rung of so many cells.
+    fn carries(&self, cells: usize) -> bool {
+        let variances = |cells| sureness(self.ground, cells);
+        let equal = |cells| self.equal(cells);
+        self.carried.carries(cells, equal, variances)
+    }
+
+    fn equal(&self, cells: usize) -> bool {
+        are_equal(&on_cells(self.ground, cells), cells)
     }
 
     /// The trial of a rung for each form; `None` where the readings do not carry it.
@@ -188,9 +205,9 @@ impl<'g, 'a> Rungs<'g, 'a> {
         let most = most_by_positions(self.ground.positions());
         let finer = own.iter().map(|b| {
             let cells = (TIMES * (b.len() - 1)).max(common);
-            even(self.ground, cells.min(most).max(1))
+            on_cells(self.ground, cells.min(most).max(1))
         });
-        let finer: Vec<Vec<f64>> = finer.collect::<Result<_, _>>()?;
+        let finer: Vec<Vec<f64>> = finer.collect();
         let mut both = own.iter().zip(&finer);
         if both.any(|(own, finer)| finer.len() <= own.len()) {
             return Ok(None);
@@ -218,18 +235,15 @@ impl<'g, 'a> Rungs<'g, 'a> {
         if !sparse::are_few(positions, readings, last) {
             return Ok(None);
         }
-        let carried = Carried::by(self.ground.traces.iter().map(|t| t.x.as_slice()));
         let forms = self.ground.layout.forms.len();
         let on = |cells: usize| -> Result<_, DesignFitError> {
-            let breaks = even(self.ground, cells)?;
+            let breaks = on_cells(self.ground, cells);
             let fitted = self.fitted(vec![breaks.clone(); forms])?;
             Ok(fitted.map(|own| (breaks, own.0)))
         };
         let mut finest = None;
-        for cells in sparse::beyond(taken.cells, positions, &carried)
-            .into_iter()
-            .rev()
-        {
+        let beyond = sparse::beyond(taken.cells, positions, |cells| self.carries(*cells));
+        for cells in beyond.iter().rev().copied() {
             finest = on(cells)?;
             if finest.is_some() {
                 break;
@@ -242,7 +256,7 @@ impl<'g, 'a> Rungs<'g, 'a> {
             return Ok(None);
         }
         table.truncate(best + 1);
-        for cells in sparse::beyond(taken.cells, positions, &carried) {
+        for cells in beyond {
             let Some((breaks, own)) = on(cells)? else {
                 break;
             };
@@ -288,7 +302,10 @@ impl<'g, 'a> Rungs<'g, 'a> {
     fn together(&mut self) -> Result<(usize, Vec<KnotTrial>), DesignFitError> {
         let (mut table, mut best): (Vec<KnotTrial>, usize) = (Vec::new(), 0);
         let forms = self.ground.layout.forms.len();
-        for rung in 0..self.breaks.len() {
+        for rung in 0.. {
+            if rung == self.breaks.len() && !self.goes_on(Self::carries) {
+                break;
+            }
             let all = vec![rung; forms];
             let breaks = vec![self.breaks[rung].clone(); forms];
             let fitted = self.fitted(breaks)?;
@@ -364,6 +381,19 @@ impl<'g, 'a> Rungs<'g, 'a> {
 fn near(cells: impl Iterator<Item = usize> + Clone) -> bool {
     let coarsest = cells.clone().min().unwrap_or(1);
     cells.max().unwrap_or(1) <= FINEST * coarsest
+}
+
+/// Variances of the slopes with all forms on so many cells, as far as their ratios tell; `None` where there are none.
+fn sureness(ground: &Ground, cells: usize) -> Option<Vec<f64>> {
+    let breaks = on_cells(ground, cells);
+    let (problem, start) = ground
+        .problem(vec![breaks; ground.layout.forms.len()])
+        .ok()?;
+    let system = evaluate(&problem, &start).ok()?.system;
+    let (_, solved) = squares_left(&problem, &system)?;
+    let covariance = BorderedCovariance::new(&system, &solved);
+    let slopes = 0..problem.layout.slope_count;
+    Some(slopes.map(|k| covariance.border()[(k, k)]).collect())
 }
 
 /// The sum of squares that the linear fit leaves, and the step there.

@@ -159,12 +159,12 @@ impl<'a> Ground<'a> {
                 });
             }
             // Not even one cell is carried: what is missing is told when the unknowns are counted.
-            Knots::Cells(_) if most == 0 => choice.breaks(&of(4), 1)?,
-            Knots::Cells(cells) => choice.breaks(&of(cells + 3), *cells)?,
+            Knots::Cells(_) if most == 0 => choice.breaks(&of(4), 1),
+            Knots::Cells(cells) => choice.breaks(&of(cells + 3), *cells),
             Knots::Chosen => {
                 let chosen = choice.choose(of)?;
                 return Ok(Breaks {
-                    points: choice.breaks(&of(chosen.cells + 3), chosen.cells)?,
+                    points: choice.breaks(&of(chosen.cells + 3), chosen.cells),
                     table: chosen.table,
                     linear: chosen.linear,
                     forms: chosen.forms,
@@ -179,11 +179,8 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// So many equal cells.
-    ///
-    /// # Errors
-    /// [`ReversalError::Breaks`].
-    pub fn even_breaks(&self, cells: usize) -> Result<Vec<f64>, ReversalError> {
+    /// So many cells.
+    pub fn even_breaks(&self, cells: usize) -> Vec<f64> {
         self.choice(None)
             .breaks(&self.unknowns(cells + 3, None), cells)
     }

@@ -3,16 +3,16 @@
 //! At the seed's tilts the cost of the linear fit with K cells is that of one linear problem. The choice
 //! is the least corrected Akaike criterion (Hurvich and Tsai, Biometrika 76, 1989),
 //! m ln(RSS/m) + 2pm/(m − p − 1); Schwarz's criterion and generalised cross-validation stand beside
-//! it in the table. The ladder ends where rung after rung is worse, or where the positions that the channels
-//! share carry no finer rung. With few readings beside the unknowns the criterion's correction outweighs forms that stand far out of
+//! it in the table. The ladder ends where rung after rung is worse, or where the positions carry no finer
+//! rung (`carried.rs`). With few readings beside the unknowns the criterion's correction outweighs forms that stand far out of
 //! the noise; there what the finest rung leaves is the measure (`sparse.rs`).
 
+pub mod breaks;
+mod carried;
 mod climbed;
 pub mod sparse;
 
-use std::cell::OnceCell;
-
-use errsep_solvers::linear::bordered::{Bordered, Solved};
+use errsep_solvers::linear::bordered::{Bordered, BorderedCovariance, Solved};
 use errsep_solvers::problem::NoValue;
 use errsep_solvers::structured::{Parameters, StructuredProblem, evaluate};
 
@@ -28,15 +28,16 @@ use crate::basis::bspline::CubicBSpline;
 use crate::reversal::finer_forms::{Curves, TIMES};
 use crate::reversal::forward::Attitude;
 
+pub use carried::Carried;
 pub use climbed::{Chosen, KnotTrial, LinearStep, trial};
 use climbed::{Climbed, RungFit};
 
 /// Rungs after the best one before the ladder is left.
 pub const PATIENCE: usize = 3;
 
-/// Cell counts of the ladder, from one to the most: a factor of about √2 apart.
-pub fn ladder(most: usize) -> impl Iterator<Item = usize> {
-    let powers = (2..).map(|k: u32| {
+/// Cell counts of the ladder, from one: a factor of about √2 apart.
+pub fn ladder() -> impl Iterator<Item = usize> {
+    let powers = (2..2 * usize::BITS - 2).map(|k: u32| {
         let power = 1_usize << (k / 2);
         if k.is_multiple_of(2) {
             power
@@ -44,7 +45,7 @@ pub fn ladder(most: usize) -> impl Iterator<Item = usize> {
             power + power / 2
         }
     });
-    std::iter::once(1).chain(powers.take_while(move |cells| *cells <= most))
+    std::iter::once(1).chain(powers)
 }
 
 /// Number of different positions of the channel that has most.
@@ -60,56 +61,6 @@ fn most_read(channels: &[ChannelReadings]) -> &[f64] {
 
 fn different(x: &[f64]) -> usize {
     x.chunk_by(|a, b| a == b).count()
-}
-
-/// Positions of a channel a cell has at least where the channels were read at positions of their own: what is finer
-/// swings between those of each.
-const POSITIONS_A_CELL: usize = 3;
-
-/// Most cells of the ladder: as many as the positions carry that all channels share, and a third of those of a channel.
-pub struct Carried<'a> {
-    channels: Vec<&'a [f64]>,
-    positions: usize,
-    shared: OnceCell<usize>,
-}
-
-impl<'a> Carried<'a> {
-    /// Of channels' positions in ascending order.
-    pub fn by(channels: impl Iterator<Item = &'a [f64]>) -> Self {
-        let channels: Vec<&[f64]> = channels.collect();
-        Self {
-            positions: channels.iter().map(|x| different(x)).max().unwrap_or(0),
-            channels,
-            shared: OnceCell::new(),
-        }
-    }
-
-    /// Whether a rung of so many cells is carried.
-    pub fn carries(&self, cells: usize) -> bool {
-        if cells <= self.positions / POSITIONS_A_CELL {
-            return true;
-        }
-        let shared = self.shared.get_or_init(|| shared(&self.channels));
-        cells <= most_by_positions(*shared)
-    }
-}
-
-/// Positions that all channels have.
-fn shared(channels: &[&[f64]]) -> usize {
-    let Some((first, others)) = channels.split_first() else {
-        return 0;
-    };
-    let mut at = vec![0; others.len()];
-    let mut here = |x: f64| {
-        others.iter().zip(&mut at).all(|(other, at)| {
-            *at += other[*at..].iter().take_while(|own| **own < x).count();
-            other.get(*at) == Some(&x)
-        })
-    };
-    first
-        .chunk_by(|a, b| a == b)
-        .filter(|same| here(same[0]))
-        .count()
 }
 
 /// Most cells of a spline that has its slope and constant apart on so many positions.
@@ -148,34 +99,11 @@ pub struct Choice<'a> {
 }
 
 impl Choice<'_> {
-    /// Breaks of so many equal cells, cells without the readings they need joined to a neighbour.
-    ///
-    /// A cell needs readings of channels that tell all fitted forms apart; otherwise coefficients
-    /// there would be determined by nothing.
-    pub fn breaks(&self, unknowns: &Unknowns, cells: usize) -> Result<Vec<f64>, ReversalError> {
+    /// Breaks of so many cells.
+    pub fn breaks(&self, unknowns: &Unknowns, cells: usize) -> Vec<f64> {
         let (low, high) = gauge::range(self.channels);
-        let even = CubicBSpline::uniform(low, high, cells.max(1))?;
-        let mut breaks = Vec::with_capacity(even.breaks().len() + 1);
-        breaks.push(low);
-        let mut seen = vec![false; self.channels.len()];
-        let mut at = vec![0; self.channels.len()];
-        for right in &even.breaks()[1..] {
-            for (c, channel) in self.channels.iter().enumerate() {
-                let next = at[c] + channel.x[at[c]..].partition_point(|x| x < right);
-                seen[c] |= next > at[c];
-                at[c] = next;
-            }
-            if unknowns.told_apart_by(&seen) {
-                breaks.push(*right);
-                seen.fill(false);
-            }
-        }
-        // What is left at the end belongs to the last cell.
-        if breaks.len() > 1 {
-            breaks.pop();
-        }
-        breaks.push(high);
-        Ok(breaks)
+        let x: Vec<&[f64]> = self.channels.iter().map(|c| c.x.as_slice()).collect();
+        breaks::breaks(&x, [low, high], cells, |seen| unknowns.told_apart_by(seen))
     }
 
     /// The bases of the fitted forms on these breaks: the slide's on the positions, the artefact's
@@ -281,10 +209,10 @@ impl Choice<'_> {
         ) -> Result<Option<(Squares, RungFit)>, ReversalError>,
     ) -> Result<Climbed, ReversalError> {
         let readings = self.readings();
-        let most = most_by_positions(positions(self.channels));
         let carried = Carried::by(self.channels.iter().map(|c| c.x.as_slice()));
+        let carries = |cells: &usize| self.carries(unknowns_of, &carried, *cells);
         let mut climbed = Climbed::default();
-        for cells in ladder(most).take_while(|cells| carried.carries(*cells)) {
+        for cells in ladder().take_while(carries) {
             let (unknowns, bases) = self.rung(unknowns_of, cells)?;
             let count = unknowns.free_count();
             let cells = bases[0].cell_count();
@@ -307,7 +235,7 @@ impl Choice<'_> {
         if sparse::are_few(positions(self.channels), readings, last) {
             self.climb_to_the_finest(unknowns_of, &mut squares, &mut climbed, &carried)?;
         }
-        self.look_finer(unknowns_of, squares, &mut climbed)?;
+        self.look_finer(unknowns_of, squares, &mut climbed, &carried)?;
         Ok(climbed)
     }
 
@@ -320,9 +248,9 @@ impl Choice<'_> {
             Vec<CubicBSpline>,
         ) -> Result<Option<(Squares, RungFit)>, ReversalError>,
         climbed: &mut Climbed,
+        carried: &Carried<'_>,
     ) -> Result<(), ReversalError> {
-        let most = most_by_positions(positions(self.channels));
-        let cells = (TIMES * climbed.cells()).min(most);
+        let cells = carried.at_most(TIMES * climbed.cells());
         if climbed.on_cells(cells) {
             return Ok(());
         }
@@ -338,13 +266,39 @@ impl Choice<'_> {
         self.channels.iter().map(ChannelReadings::len).sum()
     }
 
+    /// Whether the positions carry a rung of so many cells.
+    fn carries(
+        &self,
+        unknowns_of: &impl Fn(usize) -> Unknowns,
+        carried: &Carried<'_>,
+        cells: usize,
+    ) -> bool {
+        let equal = |cells: usize| {
+            let breaks = self.breaks(&unknowns_of(cells + 3), cells);
+            breaks::are_equal(&breaks, cells)
+        };
+        carried.carries(cells, equal, |cells| self.sureness(unknowns_of, cells))
+    }
+
+    /// Variances of the tilts on a rung, as far as their ratios from rung to rung tell; `None` where it has none.
+    fn sureness(&self, unknowns_of: &impl Fn(usize) -> Unknowns, cells: usize) -> Option<Vec<f64>> {
+        let (unknowns, bases) = self.rung(unknowns_of, cells).ok()?;
+        let tilts = unknowns.tilt_count();
+        let start = self.start(&unknowns);
+        let problem = self.problem(unknowns, bases);
+        let system = evaluate(&problem, &start).ok()?.system;
+        let solved = solved(&problem, &system)?;
+        let covariance = BorderedCovariance::new(&system, &solved);
+        Some((0..tilts).map(|k| covariance.border()[(k, k)]).collect())
+    }
+
     /// The unknowns and bases with so many cells.
     fn rung(
         &self,
         unknowns_of: &impl Fn(usize) -> Unknowns,
         cells: usize,
     ) -> Result<(Unknowns, Vec<CubicBSpline>), ReversalError> {
-        let breaks = self.breaks(&unknowns_of(cells + 3), cells)?;
+        let breaks = self.breaks(&unknowns_of(cells + 3), cells);
         let unknowns = unknowns_of(breaks.len() + 2);
         let bases = self.bases(&unknowns, &breaks)?;
         Ok((unknowns, bases))
@@ -369,7 +323,11 @@ impl Choice<'_> {
         bases: Vec<CubicBSpline>,
     ) -> Result<Option<(f64, Curves)>, ReversalError> {
         let start = self.start(&unknowns);
-        let problem = Reversal::new(
+        Ok(squares_left(self.problem(unknowns, bases), start)?)
+    }
+
+    fn problem(&self, unknowns: Unknowns, bases: Vec<CubicBSpline>) -> Reversal<'_> {
+        Reversal::new(
             self.channels,
             unknowns,
             bases,
@@ -377,8 +335,7 @@ impl Choice<'_> {
             self.thickness_mm,
             self.weights.to_vec(),
         )
-        .joining(self.effects.map(|e| &e.joined));
-        Ok(squares_left(problem, start)?)
+        .joining(self.effects.map(|e| &e.joined))
     }
 }
 

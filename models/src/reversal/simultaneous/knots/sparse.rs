@@ -8,8 +8,7 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::{
-    Carried, Choice, Climbed, FEWEST_FREE, KnotTrial, RungFit, Squares, ladder, most_by_positions,
-    positions, trial,
+    Carried, Choice, Climbed, FEWEST_FREE, KnotTrial, RungFit, Squares, ladder, positions, trial,
 };
 use crate::basis::bspline::CubicBSpline;
 use crate::reversal::simultaneous::ReversalError;
@@ -34,14 +33,13 @@ pub fn are_few(positions: usize, readings: usize, unknowns: usize) -> bool {
     positions < POSITIONS || readings < READINGS * unknowns
 }
 
-/// Cells beyond so many up to the most: all where positions are few, else those of the ladder that are carried.
-pub fn beyond(cells: usize, positions: usize, carried: &Carried<'_>) -> Vec<usize> {
-    let most = most_by_positions(positions);
+/// Cells beyond so many that are carried: any number where positions are few, else those of the ladder.
+pub fn beyond(cells: usize, positions: usize, carries: impl Fn(&usize) -> bool) -> Vec<usize> {
     if positions < POSITIONS {
-        (cells + 1..=most).collect()
+        (cells + 1..).take_while(carries).collect()
     } else {
-        let rungs = ladder(most).filter(|rung| *rung > cells);
-        rungs.filter(|rung| carried.carries(*rung)).collect()
+        let rungs = ladder().filter(|rung| *rung > cells);
+        rungs.take_while(carries).collect()
     }
 }
 
@@ -61,7 +59,8 @@ impl Choice<'_> {
         let readings = self.readings();
         let tried = climbed.table.last().map_or(0, |t| t.cells);
         let mut finer: Vec<(KnotTrial, RungFit)> = Vec::new();
-        for cells in beyond(tried, positions(self.channels), carried) {
+        let carries = |cells: &usize| self.carries(unknowns_of, carried, *cells);
+        for cells in beyond(tried, positions(self.channels), carries) {
             let (unknowns, bases) = self.rung(unknowns_of, cells)?;
             let (count, cells) = (unknowns.free_count(), bases[0].cell_count());
             if readings < count + FEWEST_FREE {

@@ -54,19 +54,33 @@ fn campaign(seed: u64) -> (Plan, Options) {
     (plan, options)
 }
 
-/// *Definition*: the ladder goes as far as the positions carry that all channels share, and to a third of those of a channel.
+/// *Definition*: the ladder goes as far as the positions carry that all channels share, and to a third of those of a channel;
+/// farther only as long as the variances of the tilts stay.
 #[test]
-fn rungs_end_where_channels_share_no_positions() {
+fn rungs_end_where_positions_carry_no_finer_one() {
     let grid: Vec<f64> = (0..60).map(f64::from).collect();
     let beside: Vec<f64> = grid.iter().map(|x| x + 0.3).collect();
     let twice: Vec<f64> = grid.iter().flat_map(|x| [*x; 2]).collect();
-    let most = |channels: &[&Vec<f64>]| {
+    let most = |channels: &[&Vec<f64>], variances: &dyn Fn(usize) -> Option<Vec<f64>>| {
         let carried = Carried::by(channels.iter().map(|x| x.as_slice()));
-        (1..100).take_while(|cells| carried.carries(*cells)).count()
+        (1..200)
+            .take_while(|cells| carried.carries(*cells, |_| true, variances))
+            .count()
     };
-    assert_eq!(most(&[&grid, &twice, &grid]), 57);
-    assert_eq!(most(&[&grid, &beside]), 20);
-    assert_eq!(most(&[&grid[..40].to_vec(), &grid]), 37);
+    let none = |_: usize| None;
+    assert_eq!(most(&[&grid, &twice, &grid], &none), 57);
+    assert_eq!(most(&[&grid, &beside], &none), 20);
+    assert_eq!(most(&[&grid[..40].to_vec(), &grid], &none), 37);
+    let rising = |cells: usize| Some(vec![1.0, if cells > 45 { 1.5 } else { 1.4 }]);
+    assert_eq!(
+        most(&[&grid, &beside], &|cells| {
+            let coarse = (cells == 5).then(|| vec![1.0, 1.0]);
+            coarse.or_else(|| rising(cells))
+        }),
+        45
+    );
+    // As many as places of all channels together, less three.
+    assert_eq!(most(&[&grid, &beside], &|_| Some(vec![1.0, 1.0])), 117);
 }
 
 #[test]

@@ -1,0 +1,105 @@
+//! How many cells the positions carry.
+//!
+//! At positions that all channels share the readings of a place belong together whatever the forms are between the
+//! places. Where channels were read at positions of their own, or at uneven ones, forms that are too fine swing between
+//! them, and what they make of the straight part is paid by the tilts: their uncertainty tells how fine is too fine.
+
+use std::cell::OnceCell;
+
+use super::{different, most_by_positions};
+
+/// Positions of a channel a cell has where nothing need be asked.
+const POSITIONS_A_CELL: usize = 3;
+
+/// Positions of a channel a cell has on few cells.
+const POSITIONS_A_CELL_OF_FEW: usize = 12;
+
+/// By so much at most the uncertainty of a tilt may be larger than on few cells.
+const DEARER: f64 = 1.2;
+
+/// How many cells the positions of channels carry.
+pub struct Carried<'a> {
+    channels: Vec<&'a [f64]>,
+    positions: usize,
+    shared: OnceCell<usize>,
+    most: OnceCell<usize>,
+    coarse: OnceCell<Option<Vec<f64>>>,
+}
+
+impl<'a> Carried<'a> {
+    /// Of channels' positions in ascending order.
+    pub fn by(channels: impl Iterator<Item = &'a [f64]>) -> Self {
+        let channels: Vec<&[f64]> = channels.collect();
+        Self {
+            positions: channels.iter().map(|x| different(x)).max().unwrap_or(0),
+            channels,
+            shared: OnceCell::new(),
+            most: OnceCell::new(),
+            coarse: OnceCell::new(),
+        }
+    }
+
+    /// So many cells, but no more than a form has that all channels show.
+    pub fn at_most(&self, cells: usize) -> usize {
+        if cells <= most_by_positions(self.positions) {
+            return cells;
+        }
+        let most = self.most.get_or_init(|| {
+            let mut all: Vec<f64> = self.channels.concat();
+            all.sort_by(f64::total_cmp);
+            most_by_positions(different(&all))
+        });
+        cells.min(*most)
+    }
+
+    /// Whether a rung of so many cells is carried by three positions of a channel each, or by the positions that all
+    /// channels share, where they carry `equal` cells.
+    pub fn surely_carries(&self, cells: usize, equal: impl Fn(usize) -> bool) -> bool {
+        let shared = || self.shared.get_or_init(|| shared(&self.channels));
+        cells <= self.positions / POSITIONS_A_CELL
+            || (cells <= most_by_positions(*shared()) && equal(cells))
+    }
+
+    /// Whether a rung of so many cells is carried, surely or because tilts are nearly as sure there as on few cells.
+    /// `variances` are those of the tilts, `None` where nothing determines them.
+    pub fn carries(
+        &self,
+        cells: usize,
+        equal: impl Fn(usize) -> bool,
+        variances: impl Fn(usize) -> Option<Vec<f64>>,
+    ) -> bool {
+        if self.surely_carries(cells, equal) {
+            return true;
+        }
+        if self.at_most(cells) < cells {
+            return false;
+        }
+        let coarse = self.coarse.get_or_init(|| {
+            let cells = self.positions / POSITIONS_A_CELL_OF_FEW;
+            variances(cells.max(1))
+        });
+        let Some((coarse, fine)) = coarse.as_ref().zip(variances(cells)) else {
+            return false;
+        };
+        let mut pairs = coarse.iter().zip(&fine);
+        coarse.len() == fine.len() && pairs.all(|(coarse, fine)| *fine <= DEARER.powi(2) * coarse)
+    }
+}
+
+/// Positions that all channels have.
+fn shared(channels: &[&[f64]]) -> usize {
+    let Some((first, others)) = channels.split_first() else {
+        return 0;
+    };
+    let mut at = vec![0; others.len()];
+    let mut here = |x: f64| {
+        others.iter().zip(&mut at).all(|(other, at)| {
+            *at += other[*at..].iter().take_while(|own| **own < x).count();
+            other.get(*at) == Some(&x)
+        })
+    };
+    first
+        .chunk_by(|a, b| a == b)
+        .filter(|same| here(same[0]))
+        .count()
+}

@@ -97,6 +97,9 @@ pub(super) fn traces_of(observations: &DesignObservations) -> Traces {
     traces
 }
 
+/// Positions a place, at most, at which the fit's values tell their line.
+const POSITIONS_A_PLACE: usize = 32;
+
 /// Whether readings must be gathered, from what all traces share.
 pub(super) fn is_needed(traces: usize, shared: usize, readings: usize) -> bool {
     ((shared * traces) as f64) < SHARED * readings as f64
@@ -171,6 +174,11 @@ pub(super) fn gather(
         })
         .collect();
     let left = filling::filled(&lanes);
+    let positions = positions_of(&members, readings);
+    let gauge = StraightLine::carried(&positions, centres);
+    let turned: Vec<f64> = (0..names.len())
+        .map(|channel| turned(&fit, (channel, &names[channel].name), &positions, centres))
+        .collect::<Result<_, _>>()?;
     let mut made = Vec::new();
     let mut spans = Vec::new();
     for ((key, inside), left) in members.iter().zip(&left) {
@@ -188,7 +196,7 @@ pub(super) fn gather(
                 },
                 time: times.as_ref().map(|times| times[k]),
                 x: centres[k],
-                value: there + left[k],
+                value: there + left[k] - turned[channel] * (centres[k] - gauge.center),
             });
             spans.push(span_of(own, readings));
         }
@@ -221,7 +229,7 @@ pub(super) fn gather(
         scatter: between_grids::variance(&lanes, &closures),
         ends: ends.map(|spread| spread.min(width)),
         repeated: are_repeated(&members, readings, width),
-        gauge: StraightLine::carried(&positions_of(&members, readings), centres),
+        gauge,
         offsets,
     };
     let made = DesignObservations {
@@ -229,6 +237,26 @@ pub(super) fn gather(
         readings: made,
     };
     Ok((made, gathered))
+}
+
+/// By how much the line that is carried from places to positions is steeper than that of the fit's own values at the
+/// positions: cubics through the places do not follow forms that are rough beside them, which would pass for a tilt.
+fn turned(
+    fit: &Carrier<'_>,
+    (channel, name): (usize, &str),
+    positions: &[f64],
+    places: &[f64],
+) -> Result<f64, NotDiagnosable> {
+    let apart = positions.len().div_ceil(POSITIONS_A_PLACE * places.len());
+    let some: Vec<f64> = positions.iter().copied().step_by(apart).collect();
+    let slope = |line: StraightLine, x: &[f64]| -> Result<f64, NotDiagnosable> {
+        let terms = x.iter().zip(line.slope.iter());
+        terms
+            .map(|(x, share)| Ok(share * fit.predict(channel, name, *x)?))
+            .sum()
+    };
+    let carried = slope(StraightLine::carried(&some, places), places)?;
+    Ok(carried - slope(StraightLine::of(&some), &some)?)
 }
 
 /// All positions that were read in the cells, growing, each once.

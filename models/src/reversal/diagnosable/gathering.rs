@@ -152,7 +152,8 @@ pub(super) fn gather(
     let names = observations.design.channels();
     let width = (edges[cells] - edges[0]) / cells as f64;
     let routes = routes(&members, readings, &centres, names);
-    let fit = fit.refined(observations, assumptions, most_cells(traces.len()), &routes);
+    let coarse = fit.coarse(observations, assumptions);
+    let fit = coarse.refined(observations, assumptions, most_cells(traces.len()), &routes);
     let residuals = fit.residuals();
     let told = fit.told();
     let from = centres.partition_point(|x| *x < told[0]);
@@ -176,16 +177,13 @@ pub(super) fn gather(
     let left = filling::filled(&lanes);
     let positions = positions_of(&members, readings);
     let gauge = StraightLine::carried(&positions, centres);
-    let mut whole: Vec<f64> = readings.iter().map(|reading| reading.x).collect();
-    whole.sort_by(f64::total_cmp);
-    whole.dedup();
     let turned: Vec<f64> = (0..names.len())
         .map(|channel| {
             turned(
-                &fit,
+                &coarse,
                 (channel, &names[channel].name),
-                (&positions, centres),
-                &whole,
+                &positions,
+                centres,
             )
         })
         .collect::<Result<_, _>>()?;
@@ -249,28 +247,25 @@ pub(super) fn gather(
     Ok((made, gathered))
 }
 
-/// By how much the line that is carried from places to positions in their cells is steeper than that of the fit's own
-/// values over the whole of the positions, by which the fit has no straight line in its forms. Cubics through the places
-/// do not follow forms that are rough beside them, and beyond the cells a form goes on: either would pass for a tilt.
+/// By how much the line that is carried from places to positions is steeper than that of a fit's own values at the
+/// positions: cubics through the places do not follow forms that are rough beside them, which would pass for a tilt. The
+/// fit is one whose forms do not swing between the positions of a channel.
 fn turned(
     fit: &Carrier<'_>,
     (channel, name): (usize, &str),
-    (positions, places): (&[f64], &[f64]),
-    whole: &[f64],
+    positions: &[f64],
+    places: &[f64],
 ) -> Result<f64, NotDiagnosable> {
-    let some = |x: &[f64]| -> Vec<f64> {
-        let apart = x.len().div_ceil(POSITIONS_A_PLACE * places.len());
-        x.iter().copied().step_by(apart).collect()
-    };
+    let apart = positions.len().div_ceil(POSITIONS_A_PLACE * places.len());
+    let some: Vec<f64> = positions.iter().copied().step_by(apart).collect();
     let slope = |line: StraightLine, x: &[f64]| -> Result<f64, NotDiagnosable> {
         let terms = x.iter().zip(line.slope.iter());
         terms
             .map(|(x, share)| Ok(share * fit.predict(channel, name, *x)?))
             .sum()
     };
-    let carried = slope(StraightLine::carried(&some(positions), places), places)?;
-    let whole = some(whole);
-    Ok(carried - slope(StraightLine::of(&whole), &whole)?)
+    let carried = slope(StraightLine::carried(&some, places), places)?;
+    Ok(carried - slope(StraightLine::of(&some), &some)?)
 }
 
 /// All positions that were read in the cells, growing, each once.

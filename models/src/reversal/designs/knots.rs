@@ -21,9 +21,9 @@ use super::readings::range;
 use super::staged;
 use crate::reversal::finer_forms::{Curves, FinerForms, TIMES};
 use crate::reversal::simultaneous::Knots;
-use crate::reversal::simultaneous::knots::breaks::{are_equal, breaks as breaks_of};
+use crate::reversal::simultaneous::knots::breaks::{are_even, breaks as breaks_of};
 use crate::reversal::simultaneous::knots::{
-    Carried, KnotTrial, PATIENCE, ladder, most_by_positions, sparse, trial,
+    Carried, KnotTrial, PATIENCE, REFUSED, ladder, most_by_positions, sparse, trial,
 };
 
 /// The break points of a fit.
@@ -95,11 +95,9 @@ pub(super) fn breaks(ground: &Ground) -> Result<Chosen, DesignFitError> {
 
 /// Breaks of so many cells.
 fn on_cells(ground: &Ground, cells: usize) -> Vec<f64> {
-    let traces = ground.traces;
-    let (low, high) = range(traces);
-    let x: Vec<&[f64]> = traces.iter().map(|t| t.x.as_slice()).collect();
+    let (low, high) = range(ground.traces);
     let mut told: HashMap<Vec<bool>, bool> = HashMap::new();
-    breaks_of(&x, [low, high], cells, |seen| {
+    breaks_of(&positions(ground), [low, high], cells, |seen| {
         let known = told.get(seen).copied();
         known.unwrap_or_else(|| {
             let apart = staged::tell_apart(&ground.determined.forms, seen);
@@ -107,6 +105,11 @@ fn on_cells(ground: &Ground, cells: usize) -> Vec<f64> {
             apart
         })
     })
+}
+
+/// Of the traces, mm, in ascending order.
+fn positions<'g>(ground: &'g Ground) -> Vec<&'g [f64]> {
+    ground.traces.iter().map(|t| t.x.as_slice()).collect()
 }
 
 /// The ladder of cells.
@@ -127,25 +130,30 @@ impl<'g, 'a> Rungs<'g, 'a> {
     fn new(ground: &'g Ground<'a>) -> Self {
         let mut rungs = Self {
             ground,
-            carried: Carried::by(ground.traces.iter().map(|t| t.x.as_slice())),
+            carried: Carried::by(positions(ground)),
             next: 0,
             breaks: Vec::new(),
             tried: HashMap::new(),
             ladder: Vec::new(),
         };
         let surely = |rungs: &Self, cells| {
-            let equal = |cells| rungs.equal(cells);
-            rungs.carried.surely_carries(cells, equal)
+            let even = |cells| rungs.even(cells);
+            rungs.carried.surely_carries(cells, even)
         };
-        while rungs.goes_on(surely) {}
+        while rungs.goes_on(0, surely) {}
         rungs
     }
 
-    /// Adds the next different rung of the ladder, if it is carried.
-    fn goes_on(&mut self, carries: impl Fn(&Self, usize) -> bool) -> bool {
+    /// Adds the next different rung of the ladder that is carried, unless as many in a row are refused.
+    fn goes_on(&mut self, mut refused: usize, carries: impl Fn(&Self, usize) -> bool) -> bool {
         while let Some(cells) = ladder().nth(self.next) {
             if !carries(self, cells) {
-                break;
+                if refused == 0 || self.carried.at_most(cells) < cells {
+                    break;
+                }
+                refused -= 1;
+                self.next += 1;
+                continue;
             }
             self.next += 1;
             let own = on_cells(self.ground, cells);
@@ -164,12 +172,13 @@ impl<'g, 'a> Rungs<'g, 'a> {
     /// Whether the positions carry a rung of so many cells.
     fn carries(&self, cells: usize) -> bool {
         let variances = |cells| sureness(self.ground, cells);
-        let equal = |cells| self.equal(cells);
-        self.carried.carries(cells, equal, variances)
+        self.carried
+            .carries(cells, |cells| self.even(cells), variances)
     }
 
-    fn equal(&self, cells: usize) -> bool {
-        are_equal(&on_cells(self.ground, cells), cells)
+    fn even(&self, cells: usize) -> bool {
+        let breaks = on_cells(self.ground, cells);
+        are_even(self.ground.most_read(), &breaks, cells)
     }
 
     /// The trial of a rung for each form; `None` where the readings do not carry it.
@@ -242,7 +251,9 @@ impl<'g, 'a> Rungs<'g, 'a> {
             Ok(fitted.map(|own| (breaks, own.0)))
         };
         let mut finest = None;
-        let beyond = sparse::beyond(taken.cells, positions, |cells| self.carries(*cells));
+        let beyond = sparse::beyond(taken.cells, positions, &self.carried, |cells| {
+            self.carries(cells)
+        });
         for cells in beyond.iter().rev().copied() {
             finest = on(cells)?;
             if finest.is_some() {
@@ -303,7 +314,7 @@ impl<'g, 'a> Rungs<'g, 'a> {
         let (mut table, mut best): (Vec<KnotTrial>, usize) = (Vec::new(), 0);
         let forms = self.ground.layout.forms.len();
         for rung in 0.. {
-            if rung == self.breaks.len() && !self.goes_on(Self::carries) {
+            if rung == self.breaks.len() && !self.goes_on(REFUSED, Self::carries) {
                 break;
             }
             let all = vec![rung; forms];

@@ -28,7 +28,7 @@ use crate::basis::bspline::CubicBSpline;
 use crate::reversal::finer_forms::{Curves, TIMES};
 use crate::reversal::forward::Attitude;
 
-pub use carried::Carried;
+pub use carried::{Carried, REFUSED};
 pub use climbed::{Chosen, KnotTrial, LinearStep, trial};
 use climbed::{Climbed, RungFit};
 
@@ -102,8 +102,13 @@ impl Choice<'_> {
     /// Breaks of so many cells.
     pub fn breaks(&self, unknowns: &Unknowns, cells: usize) -> Vec<f64> {
         let (low, high) = gauge::range(self.channels);
-        let x: Vec<&[f64]> = self.channels.iter().map(|c| c.x.as_slice()).collect();
-        breaks::breaks(&x, [low, high], cells, |seen| unknowns.told_apart_by(seen))
+        let told = |seen: &[bool]| unknowns.told_apart_by(seen);
+        breaks::breaks(&self.positions(), [low, high], cells, told)
+    }
+
+    /// Of the channels, mm, in ascending order.
+    fn positions(&self) -> Vec<&[f64]> {
+        self.channels.iter().map(|c| c.x.as_slice()).collect()
     }
 
     /// The bases of the fitted forms on these breaks: the slide's on the positions, the artefact's
@@ -209,10 +214,10 @@ impl Choice<'_> {
         ) -> Result<Option<(Squares, RungFit)>, ReversalError>,
     ) -> Result<Climbed, ReversalError> {
         let readings = self.readings();
-        let carried = Carried::by(self.channels.iter().map(|c| c.x.as_slice()));
-        let carries = |cells: &usize| self.carries(unknowns_of, &carried, *cells);
+        let carried = Carried::by(self.positions());
+        let carries = |cells: usize| self.carries(unknowns_of, &carried, cells);
         let mut climbed = Climbed::default();
-        for cells in ladder().take_while(carries) {
+        for cells in carried.rungs(ladder(), carries) {
             let (unknowns, bases) = self.rung(unknowns_of, cells)?;
             let count = unknowns.free_count();
             let cells = bases[0].cell_count();
@@ -273,11 +278,11 @@ impl Choice<'_> {
         carried: &Carried<'_>,
         cells: usize,
     ) -> bool {
-        let equal = |cells: usize| {
+        let even = |cells: usize| {
             let breaks = self.breaks(&unknowns_of(cells + 3), cells);
-            breaks::are_equal(&breaks, cells)
+            breaks::are_even(most_read(self.channels), &breaks, cells)
         };
-        carried.carries(cells, equal, |cells| self.sureness(unknowns_of, cells))
+        carried.carries(cells, even, |cells| self.sureness(unknowns_of, cells))
     }
 
     /// Variances of the tilts on a rung, as far as their ratios from rung to rung tell; `None` where it has none.

@@ -55,11 +55,25 @@ fn end([low, high]: [f64; 2], k: usize, cells: usize) -> f64 {
     low + (high - low) * (k as f64 / cells as f64)
 }
 
-/// Whether these are those of so many equal cells.
-pub fn are_equal(breaks: &[f64], cells: usize) -> bool {
+/// Whether these are so many equal cells and positions about even in them: at least two in each, or one or two.
+/// Where some cells have many and others one a spline follows the first and swings more from cell to cell of the others.
+pub fn are_even(x: &[f64], breaks: &[f64], cells: usize) -> bool {
     let range = [breaks[0], breaks[breaks.len() - 1]];
     let mut inner = breaks.iter().enumerate().skip(1).take(cells - 1);
-    breaks.len() == cells + 1 && inner.all(|(k, at)| *at == end(range, k, cells))
+    if breaks.len() != cells + 1 || !inner.all(|(k, at)| *at == end(range, k, cells)) {
+        return false;
+    }
+    let held = |k: usize| {
+        let from = x.partition_point(|x| *x < breaks[k]);
+        let to = if k + 1 == cells {
+            x.len()
+        } else {
+            x.partition_point(|x| *x < breaks[k + 1])
+        };
+        &x[from..to]
+    };
+    let several = |x: &[f64]| x.first() < x.last();
+    (0..cells).all(|k| several(held(k))) || (0..cells).all(|k| different(held(k)) <= 2)
 }
 
 /// A cell that can be split.
@@ -142,4 +156,67 @@ fn between(x: &[f64]) -> Option<f64> {
     let at = 0.5 * (x.get(second.checked_sub(1)?)? + x.get(second)?);
     // Neighbours one rounding apart have nothing between them.
     (x[second - 1] < at && at < x[second]).then_some(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all(seen: &[bool]) -> bool {
+        seen.iter().all(|seen| *seen)
+    }
+
+    /// Readings of a channel in each cell.
+    fn held(x: &[f64], breaks: &[f64]) -> Vec<usize> {
+        let to = |right: f64, last: bool| x.iter().filter(|x| **x < right || last).count();
+        let ends: Vec<usize> = (1..breaks.len())
+            .map(|k| to(breaks[k], k + 1 == breaks.len()))
+            .collect();
+        let from = std::iter::once(&0).chain(&ends);
+        ends.iter().zip(from).map(|(to, from)| to - from).collect()
+    }
+
+    #[test]
+    fn cells_at_even_positions_are_equal() {
+        // Definition.
+        let x: Vec<f64> = (0..41).map(f64::from).collect();
+        for cells in 1..=38 {
+            let own = breaks(&[&x, &x], [0.0, 40.0], cells, all);
+            assert!(are_even(&x, &own, cells), "{cells}: {own:?}");
+        }
+    }
+
+    #[test]
+    fn uneven_positions_carry_as_many_cells_as_even_ones() {
+        // Twenty positions 2 mm apart, then twenty 9 mm apart. Definition: as many cells as asked, each with a reading.
+        let x: Vec<f64> = (0..20)
+            .map(|k| 2.0 * f64::from(k))
+            .chain((0..20).map(|k| 40.0 + 9.0 * f64::from(k)))
+            .collect();
+        let range = [0.0, x[39]];
+        for cells in [10, 20, 30, 36] {
+            let own = breaks(&[&x, &x], range, cells, all);
+            assert_eq!(own.len(), cells + 1);
+            assert!(own.windows(2).all(|pair| pair[0] < pair[1]), "{own:?}");
+            assert!(held(&x, &own).iter().all(|held| *held > 0), "{own:?}");
+        }
+        // Of ten equal cells the first holds ten positions, the last two; of twenty some hold one.
+        for (cells, even) in [(10, true), (20, false), (30, false)] {
+            let own = breaks(&[&x, &x], range, cells, all);
+            assert_eq!(are_even(&x, &own, cells), even, "{cells}: {own:?}");
+        }
+    }
+
+    #[test]
+    fn every_cell_tells_all_forms_apart() {
+        // Two channels at positions of their own, of which the second ends early: definition.
+        let x: Vec<f64> = (0..30).map(|k| f64::from(k) + 0.3).collect();
+        let y: Vec<f64> = (0..12).map(|k| 1.7 * f64::from(k)).collect();
+        for cells in 1..=20 {
+            let own = breaks(&[&x, &y], [0.0, 30.0], cells, all);
+            for channel in [&x, &y] {
+                assert!(held(channel, &own).iter().all(|held| *held > 0), "{own:?}");
+            }
+        }
+    }
 }

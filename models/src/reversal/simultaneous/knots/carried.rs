@@ -15,7 +15,10 @@ const POSITIONS_A_CELL: usize = 3;
 const POSITIONS_A_CELL_OF_FEW: usize = 12;
 
 /// By so much at most the uncertainty of a tilt may be larger than on few cells.
-const DEARER: f64 = 1.2;
+const DEARER: f64 = 1.5;
+
+/// Rungs in a row that may be refused before the ladder ends: equal cells may lie badly to uneven positions.
+pub const REFUSED: usize = 2;
 
 /// How many cells the positions of channels carry.
 pub struct Carried<'a> {
@@ -28,8 +31,7 @@ pub struct Carried<'a> {
 
 impl<'a> Carried<'a> {
     /// Of channels' positions in ascending order.
-    pub fn by(channels: impl Iterator<Item = &'a [f64]>) -> Self {
-        let channels: Vec<&[f64]> = channels.collect();
+    pub fn by(channels: Vec<&'a [f64]>) -> Self {
         Self {
             positions: channels.iter().map(|x| different(x)).max().unwrap_or(0),
             channels,
@@ -37,6 +39,21 @@ impl<'a> Carried<'a> {
             most: OnceCell::new(),
             coarse: OnceCell::new(),
         }
+    }
+
+    /// The rungs that are carried, until some in a row are not.
+    pub fn rungs<'c>(
+        &'c self,
+        rungs: impl Iterator<Item = usize> + 'c,
+        carries: impl Fn(usize) -> bool + 'c,
+    ) -> impl Iterator<Item = usize> + 'c {
+        let mut refused = 0;
+        let all = rungs.map_while(move |cells| {
+            let carried = self.at_most(cells) == cells && carries(cells);
+            refused = if carried { 0 } else { refused + 1 };
+            (refused <= REFUSED).then_some(carried.then_some(cells))
+        });
+        all.flatten()
     }
 
     /// So many cells, but no more than a form has that all channels show.
@@ -53,11 +70,12 @@ impl<'a> Carried<'a> {
     }
 
     /// Whether a rung of so many cells is carried by three positions of a channel each, or by the positions that all
-    /// channels share, where they carry `equal` cells.
-    pub fn surely_carries(&self, cells: usize, equal: impl Fn(usize) -> bool) -> bool {
+    /// channels share, where positions are `even` in its cells.
+    pub fn surely_carries(&self, cells: usize, even: impl Fn(usize) -> bool) -> bool {
         let shared = || self.shared.get_or_init(|| shared(&self.channels));
-        cells <= self.positions / POSITIONS_A_CELL
-            || (cells <= most_by_positions(*shared()) && equal(cells))
+        let enough =
+            cells <= self.positions / POSITIONS_A_CELL || cells <= most_by_positions(*shared());
+        enough && even(cells)
     }
 
     /// Whether a rung of so many cells is carried, surely or because tilts are nearly as sure there as on few cells.
@@ -65,10 +83,10 @@ impl<'a> Carried<'a> {
     pub fn carries(
         &self,
         cells: usize,
-        equal: impl Fn(usize) -> bool,
+        even: impl Fn(usize) -> bool,
         variances: impl Fn(usize) -> Option<Vec<f64>>,
     ) -> bool {
-        if self.surely_carries(cells, equal) {
+        if self.surely_carries(cells, even) {
             return true;
         }
         if self.at_most(cells) < cells {

@@ -34,12 +34,17 @@ pub fn are_few(positions: usize, readings: usize, unknowns: usize) -> bool {
 }
 
 /// Cells beyond so many that are carried: any number where positions are few, else those of the ladder.
-pub fn beyond(cells: usize, positions: usize, carries: impl Fn(&usize) -> bool) -> Vec<usize> {
+pub fn beyond(
+    cells: usize,
+    positions: usize,
+    carried: &Carried<'_>,
+    carries: impl Fn(usize) -> bool,
+) -> Vec<usize> {
     if positions < POSITIONS {
-        (cells + 1..).take_while(carries).collect()
+        carried.rungs(cells + 1.., carries).collect()
     } else {
         let rungs = ladder().filter(|rung| *rung > cells);
-        rungs.take_while(carries).collect()
+        carried.rungs(rungs, carries).collect()
     }
 }
 
@@ -59,8 +64,8 @@ impl Choice<'_> {
         let readings = self.readings();
         let tried = climbed.table.last().map_or(0, |t| t.cells);
         let mut finer: Vec<(KnotTrial, RungFit)> = Vec::new();
-        let carries = |cells: &usize| self.carries(unknowns_of, carried, *cells);
-        for cells in beyond(tried, positions(self.channels), carries) {
+        let carries = |cells: usize| self.carries(unknowns_of, carried, cells);
+        for cells in beyond(tried, positions(self.channels), carried, carries) {
             let (unknowns, bases) = self.rung(unknowns_of, cells)?;
             let (count, cells) = (unknowns.free_count(), bases[0].cell_count());
             if readings < count + FEWEST_FREE {

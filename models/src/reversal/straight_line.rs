@@ -67,6 +67,24 @@ impl StraightLine {
     }
 }
 
+/// Weights of two slopes over positions, as [`StraightLine::carried`], one from every second place and one from the others;
+/// none of fewer than eight places.
+pub fn slopes_of_halves(positions: &[f64], places: &[f64]) -> Vec<DVector<f64>> {
+    if places.len() < 8 {
+        return Vec::new();
+    }
+    let of_half = |from: usize| {
+        let half: Vec<f64> = places.iter().copied().skip(from).step_by(2).collect();
+        let line = StraightLine::carried(positions, &half);
+        let mut slope = DVector::zeros(places.len());
+        for (k, weight) in line.slope.iter().enumerate() {
+            slope[from + 2 * k] = *weight;
+        }
+        slope
+    };
+    vec![of_half(0), of_half(1)]
+}
+
 /// Over how much the first positions of traces spread, and the last, mm; of the first and last of each. A repeat over
 /// part of the travel says nothing of where the travel ends.
 pub fn spread_of_ends(traces: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
@@ -148,6 +166,30 @@ mod tests {
         assert!(heights.abs() < 1e-6, "{heights:e}");
         let own = StraightLine::of(&places).slope.dot(&profile);
         assert!((own - truth).abs() > 100.0 * off, "{own} {truth} {off}");
+    }
+
+    /// *Limit*: of a line both halves have the slope; of a wave that places twice as far apart do not follow they differ by
+    /// much of what the places themselves miss of its slope over the positions.
+    #[test]
+    fn halves_tell_what_places_do_not_follow() {
+        let places: Vec<f64> = (0..24).map(|k| 10.0 * f64::from(k)).collect();
+        let positions: Vec<f64> = (0..=2300).map(|k| 0.1 * f64::from(k)).collect();
+        let halves = slopes_of_halves(&positions, &places);
+        let own = |x: &dyn Fn(f64) -> f64| {
+            let profile = DVector::from_iterator(24, places.iter().map(|place| x(*place)));
+            [halves[0].dot(&profile), halves[1].dot(&profile)]
+        };
+        for slope in own(&|x| 3.0 - 0.02 * x) {
+            // Rounding.
+            assert!((slope + 0.02).abs() < 1e-12, "{slope}");
+        }
+        let wave = |x: f64| (x / 4.5).sin();
+        let followed = StraightLine::carried(&positions, &places);
+        let profile = DVector::from_iterator(24, places.iter().map(|place| wave(*place)));
+        let all = DVector::from_iterator(2301, positions.iter().map(|x| wave(*x)));
+        let missed = followed.slope.dot(&profile) - StraightLine::of(&positions).slope.dot(&all);
+        let apart = own(&wave).map(|slope| (slope - followed.slope.dot(&profile)).abs());
+        assert!(apart[0].max(apart[1]) > missed.abs(), "{apart:?} {missed}");
     }
 
     /// *Limit*: the line of a line does not hang on its ends; that of t³ does, by what its line over a longer travel is.

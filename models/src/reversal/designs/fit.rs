@@ -20,7 +20,7 @@ use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::channel_noise::white::Told;
 use crate::reversal::channel_noise::{freedom_left, weights_of};
 use crate::reversal::simultaneous::fitted_knots::FittedKnots;
-use crate::reversal::simultaneous::knots::FEWEST_POSITIONS;
+use crate::reversal::simultaneous::knots::{FEWEST_POSITIONS, Finest};
 use crate::reversal::simultaneous::{self, Knots};
 
 /// Fewest readings beyond the unknowns from which the noise is told.
@@ -33,6 +33,19 @@ pub const FEWEST_FREE: usize = 3;
 pub fn fit(
     observations: &DesignObservations,
     options: &DesignOptions,
+) -> Result<DesignFit, DesignFitError> {
+    match fit_on(observations, options, Finest::Carried) {
+        Err(why @ DesignFitError::NotConverged { .. }) if options.knots == Knots::Chosen => {
+            fit_on(observations, options, Finest::ThreePositions).or(Err(why))
+        }
+        answer => answer,
+    }
+}
+
+fn fit_on(
+    observations: &DesignObservations,
+    options: &DesignOptions,
+    finest: Finest,
 ) -> Result<DesignFit, DesignFitError> {
     let began = Instant::now();
     options.check(observations)?;
@@ -61,7 +74,8 @@ pub fn fit(
     };
     let mut sigmas = survey.first_noise(options.noise);
     let weights = weights_of(&sigmas);
-    let ground = Ground::new(&observations.design, &determined, traces, weights, options)?;
+    let mut ground = Ground::new(&observations.design, &determined, traces, weights, options)?;
+    ground.finest = finest;
     let chosen = breaks(&ground, &survey)?;
     let unknowns = ground.layout.on(&chosen.breaks).free_count();
     enough(&ground, unknowns)?;

@@ -15,7 +15,7 @@ use super::staged;
 use crate::basis::bspline::CubicBSpline;
 use crate::reversal::forward::Attitude;
 use crate::reversal::simultaneous::Axis;
-use crate::reversal::simultaneous::knots::FEWEST_POSITIONS;
+use crate::reversal::simultaneous::knots::{FEWEST_POSITIONS, Finest};
 
 /// What every stage of a fit stands on.
 pub(super) struct Ground<'a> {
@@ -31,6 +31,8 @@ pub(super) struct Ground<'a> {
     body: Body,
     /// First weights, 1/σ by channel.
     weights: Vec<f64>,
+    /// How fine knots that are chosen may be.
+    pub finest: Finest,
 }
 
 impl<'a> Ground<'a> {
@@ -71,6 +73,7 @@ impl<'a> Ground<'a> {
                 crest,
             },
             weights,
+            finest: Finest::Carried,
         })
     }
 

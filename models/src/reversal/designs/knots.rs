@@ -130,7 +130,7 @@ impl<'g, 'a> Rungs<'g, 'a> {
     fn new(ground: &'g Ground<'a>) -> Self {
         let mut rungs = Self {
             ground,
-            carried: Carried::by(positions(ground)),
+            carried: Carried::by(positions(ground), ground.finest),
             next: 0,
             breaks: Vec::new(),
             tried: HashMap::new(),

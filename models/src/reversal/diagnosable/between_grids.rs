@@ -17,6 +17,10 @@ use crate::reversal::straight_line;
 /// Distance of a channel's positions from the centres of the cells, in parts of a cell, root mean square, up to
 /// which the channels are read at the same places.
 const ALIKE: f64 = 0.05;
+/// What the line from all centres misses, of what lines from half of them miss: of forms that the centres follow it is a
+/// sixteenth (a cubic's error goes with the fourth power of the distance), of forms that they do not all.
+const OF_HALVES: f64 = 0.5;
+
 /// One trace: its channel, and for every cell how far from the centre its readings are, in parts of a cell, and
 /// the value made of them.
 pub(super) struct Lane {
@@ -47,13 +51,23 @@ pub(super) fn scatter(
             .map(|channel| weights[*channel].powi(2))
             .sum();
         profile /= whole;
-        let slope = straight_line::definitional_std(&profile, &sorted.positions, gathered.ends);
+        let ends = straight_line::definitional_std(&profile, &sorted.positions, gathered.ends);
+        let slope = ends.hypot(missed(&profile, gathered));
         if slope > 0.0 {
             let column = line_column(&sorted.places, &weights, middle, slope);
             all.push(column);
         }
     }
     all
+}
+
+/// How far the line of a profile over all positions may be off, as its values at the cells' centres do not say what it is
+/// between them, µm/mm: standard deviation, by lines from every second centre.
+fn missed(profile: &DVector<f64>, gathered: &Gathered) -> f64 {
+    let slope = gathered.gauge.slope.dot(profile);
+    let off = gathered.halves.iter().map(|half| half.dot(profile) - slope);
+    let squares: f64 = off.map(|off| off * off).sum();
+    OF_HALVES * (squares / gathered.halves.len().max(1) as f64).sqrt()
 }
 
 /// Variance of what the forms differ by in a cell from channel to channel, in the unit of the readings squared;

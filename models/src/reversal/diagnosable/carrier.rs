@@ -50,43 +50,37 @@ impl Carrier<'_> {
         Ok(Self::Design(Box::new(Cow::Owned(fit))))
     }
 
-    /// The same of four channels with no more cells than a third of a channel's positions: forms that are finer swing
-    /// between them.
-    pub fn coarse(self, observations: &DesignObservations, assumptions: Assumptions) -> Self {
-        match self {
-            Self::Four(fit) if fit.effects.is_empty() => {
-                let most = positions_a_channel(observations) / POSITIONS_A_CELL;
-                if cells_of(&fit) <= most.max(1) {
-                    return Self::Four(fit);
-                }
-                let coarser = fit_four(&as_four(observations), assumptions, Knots::Cells(most));
-                coarser.map_or(Self::Four(fit), |own| Self::Four(Box::new(Cow::Owned(own))))
-            }
-            other => other,
-        }
-    }
-
     /// The same of four channels with more cells, at most so many, as long as the criterion that chose the knots
     /// says that it is better.
     ///
-    /// Channels read at positions of their own tell the forms between those of each: what a finer form is there need not
-    /// be told well, as long as `routes`, over less than a spacing, are.
+    /// It begins where a channel has three positions a cell, as forms that are finer swing between its positions. Channels
+    /// read at positions of their own tell the forms between those of each: what a finer form is there need not be told
+    /// well, as long as `routes`, over less than a spacing, are.
     pub fn refined(
-        &self,
+        self,
         observations: &DesignObservations,
         assumptions: Assumptions,
         most: usize,
         routes: &[Route],
-    ) -> Carrier<'_> {
+    ) -> Self {
         match self {
             Self::Four(fit) if fit.effects.is_empty() => {
+                let coarsest = positions_a_channel(observations) / POSITIONS_A_CELL;
                 let observations = as_four(observations);
-                let more = (most, routes);
-                let finer = finer(fit, &observations, assumptions, more);
-                Carrier::Four(Box::new(finer))
+                let first = if cells_of(&fit) > coarsest.max(1) {
+                    let coarser = fit_four(&observations, assumptions, Knots::Cells(coarsest));
+                    coarser.map_or(*fit, Cow::Owned)
+                } else {
+                    *fit
+                };
+                Self::Four(Box::new(finer(
+                    first,
+                    &observations,
+                    assumptions,
+                    (most, routes),
+                )))
             }
-            Self::Four(fit) => Carrier::Four(Box::new(Cow::Borrowed(fit))),
-            Self::Design(fit) => Carrier::Design(Box::new(Cow::Borrowed(fit))),
+            other => other,
         }
     }
 
@@ -138,12 +132,12 @@ impl Carrier<'_> {
 
 /// The fit with more cells as long as that is better and carries readings as surely as they are.
 fn finer<'a>(
-    first: &'a Simultaneous,
+    first: Cow<'a, Simultaneous>,
     observations: &Observations,
     assumptions: Assumptions,
     (most, routes): (usize, &[Route]),
 ) -> Cow<'a, Simultaneous> {
-    let mut best = Cow::Borrowed(first);
+    let mut best = first;
     loop {
         let cells = most.min((FINER * cells_of(&best) as f64).round() as usize);
         if cells <= cells_of(&best) {

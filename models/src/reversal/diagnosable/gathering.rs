@@ -11,6 +11,8 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::DVector;
+
 use super::arrangement::Arrangement;
 use super::between_grids;
 use super::carrier::{Carrier, Route};
@@ -21,7 +23,7 @@ use super::{Assumptions, NotDiagnosable};
 use crate::reversal::Direction;
 use crate::reversal::cells::Union;
 use crate::reversal::designs::{DesignChannel, DesignObservations, DesignReading};
-use crate::reversal::straight_line::StraightLine;
+use crate::reversal::straight_line::{StraightLine, slopes_of_halves};
 
 /// Gathered readings of all traces, about: what a diagnosis takes a second for.
 const MOST_READINGS: usize = 5000;
@@ -58,6 +60,8 @@ pub struct Gathered {
     pub(super) repeated: bool,
     /// The line of a profile over all positions that were read, from its values at the cells' centres.
     pub(super) gauge: StraightLine,
+    /// The same slope from every second centre, and from the others; none where every position is one.
+    pub(super) halves: Vec<DVector<f64>>,
     /// How far beyond its cell's centre each reading made was taken, in the mean, mm, in their order.
     pub(super) offsets: Vec<f64>,
 }
@@ -96,9 +100,6 @@ pub(super) fn traces_of(observations: &DesignObservations) -> Traces {
     }
     traces
 }
-
-/// Positions a place, at most, at which the fit's values tell their line.
-const POSITIONS_A_PLACE: usize = 32;
 
 /// Whether readings must be gathered, from what all traces share.
 pub(super) fn is_needed(traces: usize, shared: usize, readings: usize) -> bool {
@@ -152,8 +153,7 @@ pub(super) fn gather(
     let names = observations.design.channels();
     let width = (edges[cells] - edges[0]) / cells as f64;
     let routes = routes(&members, readings, &centres, names);
-    let coarse = fit.coarse(observations, assumptions);
-    let fit = coarse.refined(observations, assumptions, most_cells(traces.len()), &routes);
+    let fit = fit.refined(observations, assumptions, most_cells(traces.len()), &routes);
     let residuals = fit.residuals();
     let told = fit.told();
     let from = centres.partition_point(|x| *x < told[0]);
@@ -175,18 +175,6 @@ pub(super) fn gather(
         })
         .collect();
     let left = filling::filled(&lanes);
-    let positions = positions_of(&members, readings);
-    let gauge = StraightLine::carried(&positions, centres);
-    let turned: Vec<f64> = (0..names.len())
-        .map(|channel| {
-            turned(
-                &coarse,
-                (channel, &names[channel].name),
-                &positions,
-                centres,
-            )
-        })
-        .collect::<Result<_, _>>()?;
     let mut made = Vec::new();
     let mut spans = Vec::new();
     for ((key, inside), left) in members.iter().zip(&left) {
@@ -204,7 +192,7 @@ pub(super) fn gather(
                 },
                 time: times.as_ref().map(|times| times[k]),
                 x: centres[k],
-                value: there + left[k] - turned[channel] * (centres[k] - gauge.center),
+                value: there + left[k],
             });
             spans.push(span_of(own, readings));
         }
@@ -228,6 +216,12 @@ pub(super) fn gather(
     let offsets = lanes.iter().flat_map(|lane| &lane.offsets);
     let offsets = offsets.map(|parts| parts * width).collect();
     let closures: Vec<Vec<f64>> = arrangement.closures().map(|own| own.weights).collect();
+    let positions = positions_of(&members, readings);
+    let halves = if on_one_grid {
+        Vec::new()
+    } else {
+        slopes_of_halves(&positions, centres)
+    };
     let gathered = Gathered {
         cells,
         readings_per_cell: held / (made.len() - lacking.len()) as f64,
@@ -237,7 +231,8 @@ pub(super) fn gather(
         scatter: between_grids::variance(&lanes, &closures),
         ends: ends.map(|spread| spread.min(width)),
         repeated: are_repeated(&members, readings, width),
-        gauge,
+        gauge: StraightLine::carried(&positions, centres),
+        halves,
         offsets,
     };
     let made = DesignObservations {
@@ -245,27 +240,6 @@ pub(super) fn gather(
         readings: made,
     };
     Ok((made, gathered))
-}
-
-/// By how much the line that is carried from places to positions is steeper than that of a fit's own values at the
-/// positions: cubics through the places do not follow forms that are rough beside them, which would pass for a tilt. The
-/// fit is one whose forms do not swing between the positions of a channel.
-fn turned(
-    fit: &Carrier<'_>,
-    (channel, name): (usize, &str),
-    positions: &[f64],
-    places: &[f64],
-) -> Result<f64, NotDiagnosable> {
-    let apart = positions.len().div_ceil(POSITIONS_A_PLACE * places.len());
-    let some: Vec<f64> = positions.iter().copied().step_by(apart).collect();
-    let slope = |line: StraightLine, x: &[f64]| -> Result<f64, NotDiagnosable> {
-        let terms = x.iter().zip(line.slope.iter());
-        terms
-            .map(|(x, share)| Ok(share * fit.predict(channel, name, *x)?))
-            .sum()
-    };
-    let carried = slope(StraightLine::carried(&some, places), places)?;
-    Ok(carried - slope(StraightLine::of(&some), &some)?)
 }
 
 /// All positions that were read in the cells, growing, each once.

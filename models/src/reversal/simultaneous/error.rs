@@ -197,6 +197,16 @@ pub enum ReversalError {
     },
 }
 
+impl ReversalError {
+    /// Whether a fit was made that did not end at a minimum which determines everything.
+    pub(super) fn is_no_minimum(&self) -> bool {
+        matches!(
+            self,
+            Self::NotConverged { .. } | Self::EffectsNotConverged { .. }
+        )
+    }
+}
+
 impl From<FitError> for ReversalError {
     fn from(error: FitError) -> Self {
         match error {

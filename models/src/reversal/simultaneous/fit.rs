@@ -14,6 +14,7 @@ use super::effects::{CATALOGUE, HEIGHTS, Heights, Setting, times};
 use super::error::ReversalError;
 use super::fitted_knots::FittedKnots;
 use super::ground::{Begun, Breaks, Ground};
+use super::knots::Finest;
 use super::knots::{self, FEWEST_POSITIONS};
 use super::levelled::{Level, with_values};
 use super::options::{Knots, Noise, Options, Thickness};
@@ -37,6 +38,19 @@ use crate::units::mm_from_um;
 /// # Errors
 /// [`ReversalError`]: input that cannot be used, or a fit that has no answer.
 pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneous, ReversalError> {
+    match fit_on(observations, options, Finest::Carried) {
+        Err(why) if why.is_no_minimum() && matches!(options.knots, Knots::Chosen) => {
+            fit_on(observations, options, Finest::ThreePositions).or(Err(why))
+        }
+        answer => answer,
+    }
+}
+
+fn fit_on(
+    observations: &Observations,
+    options: &Options,
+    finest: Finest,
+) -> Result<Simultaneous, ReversalError> {
     let began = Instant::now();
     check(observations, options)?;
     let read = ChannelReadings::sort(observations);
@@ -56,7 +70,8 @@ pub fn fit(observations: &Observations, options: &Options) -> Result<Simultaneou
         .flatten()
         .map(|values| with_values(channels, values));
     let both = [&channels[..], alike.as_deref().unwrap_or(channels)];
-    let ground = Ground::new(observations, options, both, weights_of(&sigmas))?;
+    let mut ground = Ground::new(observations, options, both, weights_of(&sigmas))?;
+    ground.finest = finest;
     let mut solution = if options.effects.is_empty() {
         solve(&ground, &survey, sigmas, None)?
     } else {

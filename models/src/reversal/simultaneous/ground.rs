@@ -6,7 +6,7 @@ use super::effects::JoinedEffect;
 use super::error::{FEWEST_FREE, ReversalError};
 use super::gauge::Axis;
 use super::joined::Joined;
-use super::knots::{self, Choice, FEWEST_POSITIONS, KnotTrial, LinearStep};
+use super::knots::{self, Choice, FEWEST_POSITIONS, Finest, KnotTrial, LinearStep};
 use super::options::{Knots, Noise, Options, Thickness};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
@@ -34,6 +34,8 @@ pub struct Ground<'a> {
     pub thickness_free: bool,
     /// First weights, 1/σ by channel.
     pub weights: Vec<f64>,
+    /// How fine knots that are chosen may be.
+    pub finest: Finest,
 }
 
 /// Where the forms break.
@@ -102,6 +104,7 @@ impl<'a> Ground<'a> {
             thickness_mm,
             thickness_free,
             weights,
+            finest: Finest::Carried,
         })
     }
 
@@ -125,6 +128,7 @@ impl<'a> Ground<'a> {
             thickness_mm: self.thickness_mm,
             weights: &self.weights,
             effects,
+            finest: self.finest,
         }
     }
 

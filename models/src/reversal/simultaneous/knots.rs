@@ -28,7 +28,7 @@ use crate::basis::bspline::CubicBSpline;
 use crate::reversal::finer_forms::{Curves, TIMES};
 use crate::reversal::forward::Attitude;
 
-pub use carried::{Carried, REFUSED};
+pub use carried::{Carried, Finest, REFUSED};
 pub use climbed::{Chosen, KnotTrial, LinearStep, trial};
 use climbed::{Climbed, RungFit};
 
@@ -96,6 +96,8 @@ pub struct Choice<'a> {
     pub weights: &'a [f64],
     /// Effects in the fit.
     pub effects: Option<&'a Begun<'a>>,
+    /// How fine the rungs may be.
+    pub finest: Finest,
 }
 
 impl Choice<'_> {
@@ -214,7 +216,7 @@ impl Choice<'_> {
         ) -> Result<Option<(Squares, RungFit)>, ReversalError>,
     ) -> Result<Climbed, ReversalError> {
         let readings = self.readings();
-        let carried = Carried::by(self.positions());
+        let carried = Carried::by(self.positions(), self.finest);
         let carries = |cells: usize| self.carries(unknowns_of, &carried, cells);
         let mut climbed = Climbed::default();
         for cells in carried.rungs(ladder(), carries) {

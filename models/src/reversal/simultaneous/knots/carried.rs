@@ -20,8 +20,18 @@ const DEARER: f64 = 1.5;
 /// Rungs in a row that may be refused before the ladder ends: equal cells may lie badly to uneven positions.
 pub const REFUSED: usize = 2;
 
+/// How fine chosen knots may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Finest {
+    /// As fine as the positions carry.
+    Carried,
+    /// Three positions of a channel a cell: where finer ones left a fit without a minimum.
+    ThreePositions,
+}
+
 /// How many cells the positions of channels carry.
 pub struct Carried<'a> {
+    finest: Finest,
     channels: Vec<&'a [f64]>,
     positions: usize,
     shared: OnceCell<usize>,
@@ -31,8 +41,9 @@ pub struct Carried<'a> {
 
 impl<'a> Carried<'a> {
     /// Of channels' positions in ascending order.
-    pub fn by(channels: Vec<&'a [f64]>) -> Self {
+    pub fn by(channels: Vec<&'a [f64]>, finest: Finest) -> Self {
         Self {
+            finest,
             positions: channels.iter().map(|x| different(x)).max().unwrap_or(0),
             channels,
             shared: OnceCell::new(),
@@ -86,6 +97,9 @@ impl<'a> Carried<'a> {
         even: impl Fn(usize) -> bool,
         variances: impl Fn(usize) -> Option<Vec<f64>>,
     ) -> bool {
+        if self.finest == Finest::ThreePositions {
+            return cells <= (self.positions / POSITIONS_A_CELL).max(1);
+        }
         if self.surely_carries(cells, even) {
             return true;
         }

@@ -62,7 +62,10 @@ fn rungs_end_where_positions_carry_no_finer_one() {
     let beside: Vec<f64> = grid.iter().map(|x| x + 0.3).collect();
     let twice: Vec<f64> = grid.iter().flat_map(|x| [*x; 2]).collect();
     let most = |channels: &[&Vec<f64>], variances: &dyn Fn(usize) -> Option<Vec<f64>>| {
-        let carried = Carried::by(channels.iter().map(|x| x.as_slice()).collect());
+        let carried = Carried::by(
+            channels.iter().map(|x| x.as_slice()).collect(),
+            Finest::Carried,
+        );
         (1..200)
             .take_while(|cells| carried.carries(*cells, |_| true, variances))
             .count()

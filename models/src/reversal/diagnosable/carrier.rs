@@ -53,7 +53,8 @@ impl Carrier<'_> {
     /// The same of four channels with more cells, at most so many, as long as the criterion that chose the knots
     /// says that it is better.
     ///
-    /// It begins where a channel has three positions a cell, as forms that are finer swing between its positions. Channels
+    /// It begins where a channel has three positions a cell, as forms that are finer swing between its positions, and those
+    /// of its traces beside each other are one. Channels
     /// read at positions of their own tell the forms between those of each: what a finer form is there need not be told
     /// well, as long as `routes`, over less than a spacing, are.
     pub fn refined(
@@ -65,7 +66,7 @@ impl Carrier<'_> {
     ) -> Self {
         match self {
             Self::Four(fit) if fit.effects.is_empty() => {
-                let coarsest = positions_a_channel(observations) / POSITIONS_A_CELL;
+                let coarsest = (positions_a_channel(observations) / POSITIONS_A_CELL).min(most);
                 let observations = as_four(observations);
                 let first = if cells_of(&fit) > coarsest.max(1) {
                     let coarser = fit_four(&observations, assumptions, Knots::Cells(coarsest));

@@ -19,11 +19,11 @@ use super::ground::Ground;
 use super::problem::DesignProblem;
 use super::readings::range;
 use super::staged;
-use crate::reversal::finer_forms::{Curves, FinerForms, TIMES};
+use crate::reversal::finer_forms::{Curves, FinerForms};
 use crate::reversal::simultaneous::Knots;
 use crate::reversal::simultaneous::knots::breaks::{are_even, breaks as breaks_of};
 use crate::reversal::simultaneous::knots::{
-    Carried, KnotTrial, PATIENCE, REFUSED, ladder, most_by_positions, sparse, trial,
+    Carried, KnotTrial, PATIENCE, REFUSED, ladder, sparse, trial,
 };
 
 /// The break points of a fit.
@@ -211,10 +211,10 @@ impl<'g, 'a> Rungs<'g, 'a> {
     /// The forms on their breaks and on finer ones, no form's coarser than the cells that are best for all together;
     /// `None` where the readings carry none.
     fn finer(self, own: &[Vec<f64>], common: usize) -> Result<Option<FinerForms>, DesignFitError> {
-        let most = most_by_positions(self.ground.positions());
         let finer = own.iter().map(|b| {
-            let cells = (TIMES * (b.len() - 1)).max(common);
-            on_cells(self.ground, cells.min(most).max(1))
+            let cells = b.len() - 1;
+            let finer = self.carried.finer(cells, |cells| self.carries(cells));
+            on_cells(self.ground, finer.unwrap_or(cells).max(common))
         });
         let finer: Vec<Vec<f64>> = finer.collect();
         let mut both = own.iter().zip(&finer);

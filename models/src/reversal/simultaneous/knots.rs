@@ -25,7 +25,7 @@ use super::seed;
 use super::unknowns::Unknowns;
 use super::{Axis, ReversalError, gauge};
 use crate::basis::bspline::CubicBSpline;
-use crate::reversal::finer_forms::{Curves, TIMES};
+use crate::reversal::finer_forms::Curves;
 use crate::reversal::forward::Attitude;
 
 pub use carried::{Carried, Finest, REFUSED};
@@ -257,7 +257,10 @@ impl Choice<'_> {
         climbed: &mut Climbed,
         carried: &Carried<'_>,
     ) -> Result<(), ReversalError> {
-        let cells = carried.at_most(TIMES * climbed.cells());
+        let carries = |cells: usize| self.carries(unknowns_of, carried, cells);
+        let Some(cells) = carried.finer(climbed.cells(), carries) else {
+            return Ok(());
+        };
         if climbed.on_cells(cells) {
             return Ok(());
         }

@@ -7,6 +7,7 @@
 use std::cell::OnceCell;
 
 use super::{different, most_by_positions};
+use crate::reversal::finer_forms::TIMES;
 
 /// Positions of a channel a cell has where nothing need be asked.
 const POSITIONS_A_CELL: usize = 3;
@@ -65,6 +66,15 @@ impl<'a> Carried<'a> {
             (refused <= REFUSED).then_some(carried.then_some(cells))
         });
         all.flatten()
+    }
+
+    /// Twice as many cells, or the most below that are carried.
+    pub fn finer(&self, cells: usize, carries: impl Fn(usize) -> bool) -> Option<usize> {
+        let most = self.at_most(TIMES * cells);
+        let fewer = |finer: &usize| Some(finer - finer.div_ceil(8));
+        std::iter::successors(Some(most), fewer)
+            .take_while(|finer| *finer > cells)
+            .find(|finer| carries(*finer))
     }
 
     /// So many cells, but no more than a form has that all channels show.

@@ -74,7 +74,7 @@ fn rungs_end_where_positions_carry_no_finer_one() {
     assert_eq!(most(&[&grid, &twice, &grid], &none), 57);
     assert_eq!(most(&[&grid, &beside], &none), 20);
     assert_eq!(most(&[&grid[..40].to_vec(), &grid], &none), 37);
-    let rising = |cells: usize| Some(vec![1.0, if cells > 45 { 1.5 } else { 1.4 }]);
+    let rising = |cells: usize| Some(vec![1.0, if cells > 45 { 2.3 } else { 2.2 }]);
     assert_eq!(
         most(&[&grid, &beside], &|cells| {
             let coarse = (cells == 5).then(|| vec![1.0, 1.0]);

@@ -21,7 +21,7 @@ use super::readings::range;
 use super::staged;
 use crate::reversal::finer_forms::{Curves, FinerForms};
 use crate::reversal::simultaneous::Knots;
-use crate::reversal::simultaneous::knots::breaks::{are_even, breaks as breaks_of};
+use crate::reversal::simultaneous::knots::breaks::breaks as breaks_of;
 use crate::reversal::simultaneous::knots::{
     Carried, KnotTrial, PATIENCE, REFUSED, ladder, sparse, trial,
 };
@@ -137,8 +137,8 @@ impl<'g, 'a> Rungs<'g, 'a> {
             ladder: Vec::new(),
         };
         let surely = |rungs: &Self, cells| {
-            let even = |cells| rungs.even(cells);
-            rungs.carried.surely_carries(cells, even)
+            let breaks = |cells| on_cells(rungs.ground, cells);
+            rungs.carried.surely_carries(cells, breaks)
         };
         while rungs.goes_on(0, surely) {}
         rungs
@@ -173,12 +173,7 @@ impl<'g, 'a> Rungs<'g, 'a> {
     fn carries(&self, cells: usize) -> bool {
         let variances = |cells| sureness(self.ground, cells);
         self.carried
-            .carries(cells, |cells| self.even(cells), variances)
-    }
-
-    fn even(&self, cells: usize) -> bool {
-        let breaks = on_cells(self.ground, cells);
-        are_even(self.ground.most_read(), &breaks, cells)
+            .carries(cells, |cells| on_cells(self.ground, cells), variances)
     }
 
     /// The trial of a rung for each form; `None` where the readings do not carry it.

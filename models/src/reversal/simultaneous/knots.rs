@@ -283,11 +283,8 @@ impl Choice<'_> {
         carried: &Carried<'_>,
         cells: usize,
     ) -> bool {
-        let even = |cells: usize| {
-            let breaks = self.breaks(&unknowns_of(cells + 3), cells);
-            breaks::are_even(most_read(self.channels), &breaks, cells)
-        };
-        carried.carries(cells, even, |cells| self.sureness(unknowns_of, cells))
+        let breaks = |cells: usize| self.breaks(&unknowns_of(cells + 3), cells);
+        carried.carries(cells, breaks, |cells| self.sureness(unknowns_of, cells))
     }
 
     /// Variances of the tilts on a rung, as far as their ratios from rung to rung tell; `None` where it has none.

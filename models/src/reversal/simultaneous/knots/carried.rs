@@ -6,6 +6,7 @@
 
 use std::cell::OnceCell;
 
+use super::breaks::are_even;
 use super::{different, most_by_positions};
 use crate::reversal::finer_forms::TIMES;
 
@@ -35,6 +36,8 @@ pub struct Carried<'a> {
     finest: Finest,
     channels: Vec<&'a [f64]>,
     positions: usize,
+    /// The positions of the channel that has most different ones.
+    most_read: &'a [f64],
     shared: OnceCell<usize>,
     most: OnceCell<usize>,
     coarse: OnceCell<Option<Vec<f64>>>,
@@ -43,9 +46,13 @@ pub struct Carried<'a> {
 impl<'a> Carried<'a> {
     /// Of channels' positions in ascending order.
     pub fn by(channels: Vec<&'a [f64]>, finest: Finest) -> Self {
+        let counted = channels.iter().map(|x| (different(x), *x));
+        let most = counted.reduce(|most, own| if own.0 > most.0 { own } else { most });
+        let (positions, most_read) = most.unwrap_or_default();
         Self {
             finest,
-            positions: channels.iter().map(|x| different(x)).max().unwrap_or(0),
+            positions,
+            most_read,
             channels,
             shared: OnceCell::new(),
             most: OnceCell::new(),
@@ -91,12 +98,12 @@ impl<'a> Carried<'a> {
     }
 
     /// Whether a rung of so many cells is carried by three positions of a channel each, or by the positions that all
-    /// channels share, where positions are `even` in its cells.
-    pub fn surely_carries(&self, cells: usize, even: impl Fn(usize) -> bool) -> bool {
+    /// channels share, where positions are even in its cells; `breaks` of so many.
+    pub fn surely_carries(&self, cells: usize, breaks: impl Fn(usize) -> Vec<f64>) -> bool {
         let shared = || self.shared.get_or_init(|| shared(&self.channels));
         let enough =
             cells <= self.positions / POSITIONS_A_CELL || cells <= most_by_positions(*shared());
-        enough && even(cells)
+        enough && are_even(self.most_read, &breaks(cells), cells)
     }
 
     /// Whether a rung of so many cells is carried, surely or because tilts are nearly as sure there as on few cells.
@@ -104,13 +111,13 @@ impl<'a> Carried<'a> {
     pub fn carries(
         &self,
         cells: usize,
-        even: impl Fn(usize) -> bool,
+        breaks: impl Fn(usize) -> Vec<f64>,
         variances: impl Fn(usize) -> Option<Vec<f64>>,
     ) -> bool {
         if self.finest == Finest::ThreePositions {
             return cells <= (self.positions / POSITIONS_A_CELL).max(1);
         }
-        if self.surely_carries(cells, even) {
+        if self.surely_carries(cells, breaks) {
             return true;
         }
         if self.at_most(cells) < cells {

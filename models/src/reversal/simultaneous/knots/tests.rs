@@ -66,8 +66,12 @@ fn rungs_end_where_positions_carry_no_finer_one() {
             channels.iter().map(|x| x.as_slice()).collect(),
             Finest::Carried,
         );
+        let equal = |cells: usize| {
+            let x: Vec<&[f64]> = channels.iter().map(|x| x.as_slice()).collect();
+            breaks::breaks(&x[..1], [x[0][0], x[0][x[0].len() - 1]], cells, |_| true)
+        };
         (1..200)
-            .take_while(|cells| carried.carries(*cells, |_| true, variances))
+            .take_while(|cells| carried.carries(*cells, equal, variances))
             .count()
     };
     let none = |_: usize| None;

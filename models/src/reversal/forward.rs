@@ -47,7 +47,7 @@ impl Attitude {
     pub fn new(tilt_rad: f64, half_mm: f64) -> Result<Self, NoValue> {
         if !(tilt_rad.abs() <= LARGEST_TILT_RAD) || !half_mm.is_finite() {
             return Err(NoValue::new(format!(
-                "a tilt of {tilt_rad} rad with half a thickness of {half_mm} mm: the model holds up to 45°"
+                "a tilt of {tilt_rad:.4} rad with half a thickness of {half_mm} mm: the model holds up to 45°"
             )));
         }
         let (sin, cos) = tilt_rad.sin_cos();

@@ -144,24 +144,26 @@ impl<'g, 'a> Rungs<'g, 'a> {
         rungs
     }
 
-    /// Adds the next different rung of the ladder that is carried, unless as many in a row are refused.
+    /// Adds the next different rung of the ladder that is carried, unless more in a row are refused; in place of one that is
+    /// refused the most cells below it that are carried.
     fn goes_on(&mut self, mut refused: usize, carries: impl Fn(&Self, usize) -> bool) -> bool {
         while let Some(cells) = ladder().nth(self.next) {
-            if !carries(self, cells) {
-                if refused == 0 || self.carried.at_most(cells) < cells {
+            let last = self.breaks.last().map_or(0, |breaks| breaks.len() - 1);
+            let found = if refused == 0 {
+                Some(cells).filter(|cells| carries(self, *cells))
+            } else {
+                self.carried
+                    .below(cells, last, |cells| carries(self, cells))
+            };
+            if found != Some(cells) {
+                if refused == 0 {
                     break;
                 }
                 refused -= 1;
-                self.next += 1;
-                continue;
             }
             self.next += 1;
-            let own = on_cells(self.ground, cells);
-            if self
-                .breaks
-                .last()
-                .is_none_or(|last| last.len() != own.len())
-            {
+            let own = found.map(|cells| on_cells(self.ground, cells));
+            if let Some(own) = own.filter(|own| own.len() > last + 1) {
                 self.breaks.push(own);
                 return true;
             }

@@ -25,7 +25,7 @@ use super::seed;
 use super::unknowns::Unknowns;
 use super::{Axis, ReversalError, gauge};
 use crate::basis::bspline::CubicBSpline;
-use crate::reversal::finer_forms::Curves;
+use crate::reversal::finer_forms::{Curves, TIMES};
 use crate::reversal::forward::Attitude;
 
 pub use carried::{Carried, Finest, REFUSED};
@@ -261,7 +261,7 @@ impl Choice<'_> {
         let Some(cells) = carried.finer(climbed.cells(), carries) else {
             return Ok(());
         };
-        if climbed.on_cells(cells) {
+        if cells == TIMES * climbed.cells() && climbed.on_cells(cells) {
             return Ok(());
         }
         let (unknowns, bases) = self.rung(unknowns_of, cells)?;

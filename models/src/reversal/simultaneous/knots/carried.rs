@@ -60,28 +60,39 @@ impl<'a> Carried<'a> {
         }
     }
 
-    /// The rungs that are carried, until some in a row are not.
+    /// The rungs that are carried, until some in a row are not; in place of one that is not the most cells between it and the
+    /// last that are.
     pub fn rungs<'c>(
         &'c self,
         rungs: impl Iterator<Item = usize> + 'c,
         carries: impl Fn(usize) -> bool + 'c,
     ) -> impl Iterator<Item = usize> + 'c {
-        let mut refused = 0;
+        let (mut last, mut refused) = (0, 0);
         let all = rungs.map_while(move |cells| {
-            let carried = self.at_most(cells) == cells && carries(cells);
-            refused = if carried { 0 } else { refused + 1 };
-            (refused <= REFUSED).then_some(carried.then_some(cells))
+            let found = self.below(cells, last, &carries);
+            refused = if found == Some(cells) { 0 } else { refused + 1 };
+            last = found.unwrap_or(last);
+            (refused <= REFUSED).then_some(found)
         });
         all.flatten()
     }
 
     /// Twice as many cells, or the most below that are carried.
     pub fn finer(&self, cells: usize, carries: impl Fn(usize) -> bool) -> Option<usize> {
-        let most = self.at_most(TIMES * cells);
-        let fewer = |finer: &usize| Some(finer - finer.div_ceil(8));
-        std::iter::successors(Some(most), fewer)
-            .take_while(|finer| *finer > cells)
-            .find(|finer| carries(*finer))
+        self.below(TIMES * cells, cells, carries)
+    }
+
+    /// So many cells, or the most below that are carried, of numbers an eighth apart; more than the last.
+    pub fn below(
+        &self,
+        cells: usize,
+        last: usize,
+        carries: impl Fn(usize) -> bool,
+    ) -> Option<usize> {
+        let fewer = |cells: &usize| Some(cells - cells.div_ceil(8));
+        std::iter::successors(Some(self.at_most(cells)), fewer)
+            .take_while(|cells| *cells > last)
+            .find(|cells| carries(*cells))
     }
 
     /// So many cells, but no more than a form has that all channels show.

@@ -148,6 +148,9 @@ impl<'g, 'a> Rungs<'g, 'a> {
     /// refused the most cells below it that are carried.
     fn goes_on(&mut self, mut refused: usize, carries: impl Fn(&Self, usize) -> bool) -> bool {
         while let Some(cells) = ladder().nth(self.next) {
+            if self.carried.at_most(cells) < cells {
+                break;
+            }
             let last = self.breaks.last().map_or(0, |breaks| breaks.len() - 1);
             let found = if refused == 0 {
                 Some(cells).filter(|cells| carries(self, *cells))

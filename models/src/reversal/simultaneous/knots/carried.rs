@@ -69,7 +69,8 @@ impl<'a> Carried<'a> {
     ) -> impl Iterator<Item = usize> + 'c {
         let (mut last, mut refused) = (0, 0);
         let all = rungs.map_while(move |cells| {
-            let found = self.below(cells, last, &carries);
+            let within = self.at_most(cells) == cells;
+            let found = within.then(|| self.below(cells, last, &carries)).flatten();
             refused = if found == Some(cells) { 0 } else { refused + 1 };
             last = found.unwrap_or(last);
             (refused <= REFUSED).then_some(found)

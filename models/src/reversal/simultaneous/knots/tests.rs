@@ -67,8 +67,8 @@ fn rungs_end_where_positions_carry_no_finer_one() {
             Finest::Carried,
         );
         let equal = |cells: usize| {
-            let x: Vec<&[f64]> = channels.iter().map(|x| x.as_slice()).collect();
-            breaks::breaks(&x[..1], [x[0][0], x[0][x[0].len() - 1]], cells, |_| true)
+            let range = [grid[0], grid[grid.len() - 1]];
+            breaks::breaks(&[&grid], range, cells, |_| true)
         };
         (1..200)
             .take_while(|cells| carried.carries(*cells, equal, variances))

@@ -53,8 +53,8 @@ impl Carrier<'_> {
     /// The same of four channels with more cells, at most so many, as long as the criterion that chose the knots
     /// says that it is better.
     ///
-    /// It begins where a channel has three positions a cell, as forms that are finer swing between its positions, and those
-    /// of its traces beside each other are one. Channels
+    /// It begins where a channel has three positions a cell, as forms that are finer swing between its positions, and at
+    /// most with as many cells as places, where each trace has positions of its own. Channels
     /// read at positions of their own tell the forms between those of each: what a finer form is there need not be told
     /// well, as long as `routes`, over less than a spacing, are.
     pub fn refined(

@@ -184,7 +184,7 @@ impl<'a> Ground<'a> {
     }
 
     /// So many cells.
-    pub fn even_breaks(&self, cells: usize) -> Vec<f64> {
+    pub fn breaks_of(&self, cells: usize) -> Vec<f64> {
         self.choice(None)
             .breaks(&self.unknowns(cells + 3, None), cells)
     }

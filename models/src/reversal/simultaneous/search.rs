@@ -112,11 +112,11 @@ impl<'g, 'a> Search<'g, 'a> {
     ) -> Result<Self, ReversalError> {
         let breaks = match &ground.options.knots {
             Knots::At(breaks) => breaks.clone(),
-            Knots::Cells(cells) => ground.even_breaks((*cells).min(ground.most_cells(None))),
+            Knots::Cells(cells) => ground.breaks_of((*cells).min(ground.most_cells(None))),
             Knots::Chosen => {
                 let cells = knots::positions(ground.channels) / POSITIONS_A_CELL;
                 let most = MOST_CELLS.min(ground.most_cells(None));
-                ground.even_breaks(cells.min(most).max(1))
+                ground.breaks_of(cells.min(most).max(1))
             }
         };
         Ok(Self {

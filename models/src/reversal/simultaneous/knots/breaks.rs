@@ -2,9 +2,9 @@
 //!
 //! A cell needs readings of channels that tell all fitted forms apart; otherwise coefficients there would be determined
 //! by nothing. Where equal cells lack them they are joined, and in place of each the cell with most positions is split
-//! between two of them: as many cells as positions at uneven places carry then follow the forms where they are read. A
-//! cell much narrower than positions are apart is none of them: the slope of a form between two neighbours close to each
-//! other is noise, by which it swings wildly in a gap beside them.
+//! between two of them, so that the cells are where the readings are. No part may be much narrower than positions are
+//! apart: the slope of a form between two neighbours close to each other is mostly noise, and with it the form swings in
+//! the gap beside them.
 
 use super::different;
 

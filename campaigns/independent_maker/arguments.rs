@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::design::Design;
+use crate::design::{Count, Design};
 
 /// From here on seeds are kept for the last run.
 pub const FROZEN: u64 = 1000;
@@ -10,12 +10,13 @@ pub const FROZEN: u64 = 1000;
 /// How to call it.
 pub const USAGE: &str = "\
 cargo run --release -p errsep-campaigns --bin independent_maker -- [SET] [--cases N] [--seed S] [--from K]
-    [--design NAME] [--only EFFECT[/REALISATION]] [--dump DIR] [--certificate] [--severity N] [--frozen]
+    [--design NAME] [--positions N] [--repeats N] [--only EFFECT[/REALISATION]] [--dump DIR] [--certificate] [--severity N] [--frozen]
 SET: one effect a case (default), or --pairs, --withheld, --nulls
 --cases N     seeds a realisation; with --pairs, --withheld cases; with --nulls cases a law (4)
 --seed S      the first seed; of pairs, withheld and nulls the only one (1)
 --from K      first number of a pair, a withheld case or a null (0)
---design      shared, jittered, shifted, thinned, different-grids, three-channels, unequal-repeats
+--design      shared, jittered, shifted, thinned, different-grids, uneven, own-positions, three-channels, unequal-repeats
+--positions N of a pass (150); --repeats N in each spindle position (4)
 --dump DIR    writes readings and set-up of every case too
 --certificate works out of every effect whether the certificate tells it from others
 --severity N  rivals of each family for the severity of names (0: left out)
@@ -47,6 +48,8 @@ pub struct Arguments {
     pub from: u64,
     /// Where readings are taken, with its name.
     pub design: (&'static str, Design),
+    /// How many readings.
+    pub count: Count,
     /// One effect, and perhaps one realisation of it.
     pub only: Option<(String, Option<usize>)>,
     /// Where readings are written to.
@@ -66,6 +69,7 @@ impl Arguments {
             seed: 1,
             from: 0,
             design: Design::ALL[0],
+            count: Count::default(),
             only: None,
             dump: None,
             certificate: false,
@@ -83,6 +87,8 @@ impl Arguments {
                 "--seed" => read.seed = whole(&next()?)?,
                 "--from" => read.from = whole(&next()?)?,
                 "--design" => read.design = design(&next()?)?,
+                "--positions" => read.count.positions = whole(&next()?)?.max(3) as usize,
+                "--repeats" => read.count.repeats = whole(&next()?)?.clamp(1, 100) as u32,
                 "--only" => read.only = Some(only(&next()?)?),
                 "--dump" => read.dump = Some(PathBuf::from(next()?)),
                 "--certificate" => read.certificate = true,

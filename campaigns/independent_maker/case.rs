@@ -3,7 +3,7 @@
 use errsep_models::reversal::{Channel, Direction, Observations, Reading};
 
 use crate::chance::Chance;
-use crate::design::{Design, Schedule};
+use crate::design::{Count, Design, Schedule};
 use crate::forms::Form;
 use crate::noise::{Law, Noise};
 use crate::physics::{Facts, Recipe, Source};
@@ -22,6 +22,8 @@ pub struct Order<'a> {
     pub law: Law,
     /// Where readings are taken.
     pub design: Design,
+    /// How many.
+    pub count: Count,
 }
 
 /// A source as it was put in.
@@ -69,7 +71,7 @@ pub fn made(order: &Order) -> Case {
     let tilted = order.sources.iter().any(|(source, _)| source.tilted);
     let sigma = chance.log_between(0.02, 0.2);
     let rig = rig(&mut chance, tilted, order.law, sigma);
-    let shared = Schedule::shared(&mut chance, rig.length);
+    let shared = Schedule::shared(&mut chance, rig.length, order.count);
     let rig = rig.levelled(&shared, &[]);
     let bare = rig.readings(&shared, &[]);
     let facts = facts(&rig, &shared, &bare);

@@ -53,6 +53,8 @@ impl Trace {
 pub struct Schedule {
     /// The passes.
     pub traces: Vec<Trace>,
+    /// Nominal positions of a pass.
+    pub positions: usize,
     /// Travel, mm.
     pub length: f64,
     /// Distance of the nominal positions, mm.
@@ -63,27 +65,44 @@ pub struct Schedule {
     pub end: f64,
 }
 
-/// Positions, repeats and unread stops before every pass.
-pub const POSITIONS: usize = 150;
-const REPEATS: u32 = 4;
+/// How many readings are taken.
+#[derive(Debug, Clone, Copy)]
+pub struct Count {
+    /// Positions of a pass.
+    pub positions: usize,
+    /// Repeats in each spindle position, each forward and backward.
+    pub repeats: u32,
+}
+
+impl Default for Count {
+    fn default() -> Self {
+        Self {
+            positions: 150,
+            repeats: 4,
+        }
+    }
+}
+
+/// Unread stops before every pass.
 const RUN_IN: usize = 6;
 
 impl Schedule {
-    /// Four channels on one even grid, four repeats, both directions; the feed is uneven, both
+    /// Four channels on one even grid, several repeats, both directions; the feed is uneven, both
     /// indicators are read together, the spindle is turned once.
-    pub fn shared(chance: &mut Chance, length: f64) -> Self {
-        let spacing = length / (POSITIONS - 1) as f64;
+    pub fn shared(chance: &mut Chance, length: f64, count: Count) -> Self {
+        let spacing = length / (count.positions - 1) as f64;
         let dwell = chance.log_between(0.4, 3.0);
         let uneven = chance.between(0.05, 0.3);
         let mut clock = 0.0;
         let mut traces = Vec::new();
         let mut turn = [0.0; 2];
         for position in 0..2 {
-            for repeat in 1..=REPEATS {
+            for repeat in 1..=count.repeats {
                 for direction in [1.0, -1.0] {
                     let slower = 1.0 + 0.15 * chance.normal().clamp(-2.0, 2.0);
                     let stops = pass(
                         chance,
+                        count.positions,
                         [direction, spacing, dwell * slower, uneven],
                         &mut clock,
                     );
@@ -112,6 +131,7 @@ impl Schedule {
         let end = last(&traces, 1);
         Self {
             traces,
+            positions: count.positions,
             length,
             spacing,
             turn,
@@ -133,7 +153,7 @@ impl Schedule {
         distinct.sort_by(f64::total_cmp);
         // The same position is worked out from either end.
         distinct.dedup_by(|a, b| (*a - *b).abs() < 1e-6 * self.spacing);
-        let one = distinct.len() <= POSITIONS;
+        let one = distinct.len() <= self.positions;
         let low = grids.iter().filter_map(|at| at.first().copied());
         let high = grids.iter().filter_map(|at| at.last().copied());
         let ends = [
@@ -162,16 +182,17 @@ fn times(traces: &[Trace], position: usize) -> impl Iterator<Item = f64> {
 /// One pass with its run-in.
 fn pass(
     chance: &mut Chance,
+    positions: usize,
     [direction, spacing, dwell, uneven]: [f64; 4],
     clock: &mut f64,
 ) -> Vec<Stop> {
-    let mut stops = Vec::with_capacity(POSITIONS + RUN_IN);
-    for k in 0..POSITIONS + RUN_IN {
+    let mut stops = Vec::with_capacity(positions + RUN_IN);
+    for k in 0..positions + RUN_IN {
         let along = (k as f64 - RUN_IN as f64) * spacing;
         let x = if direction > 0.0 {
             along
         } else {
-            (POSITIONS - 1) as f64 * spacing - along
+            (positions - 1) as f64 * spacing - along
         };
         stops.push(Stop {
             x,
@@ -199,6 +220,10 @@ pub enum Design {
     Thinned,
     /// Each channel has its own spacing and its own begin.
     DifferentGrids,
+    /// One set of positions for all, each anywhere within its cell.
+    Uneven,
+    /// Each channel's own set of positions, each anywhere within its cell.
+    OwnPositions,
     /// One channel is missing.
     ThreeChannels,
     /// One to four repeats, by channel.
@@ -207,12 +232,14 @@ pub enum Design {
 
 impl Design {
     /// All with their names on the command line.
-    pub const ALL: [(&'static str, Self); 7] = [
+    pub const ALL: [(&'static str, Self); 9] = [
         ("shared", Self::Shared),
         ("jittered", Self::Jittered),
         ("shifted", Self::Shifted),
         ("thinned", Self::Thinned),
         ("different-grids", Self::DifferentGrids),
+        ("uneven", Self::Uneven),
+        ("own-positions", Self::OwnPositions),
         ("three-channels", Self::ThreeChannels),
         ("unequal-repeats", Self::UnequalRepeats),
     ];
@@ -249,6 +276,8 @@ impl Design {
                         .for_each(|stop| stop.x = begin + scale * stop.x);
                 }
             }
+            Self::Uneven => within_cells(&mut schedule, chance, false),
+            Self::OwnPositions => within_cells(&mut schedule, chance, true),
             Self::ThreeChannels => {
                 let gone = chance.pick(4);
                 schedule
@@ -270,6 +299,24 @@ impl Design {
             }
         }
         schedule
+    }
+}
+
+/// Every position moved within its cell, in the same way for all traces or for those of each channel.
+fn within_cells(schedule: &mut Schedule, chance: &mut Chance, own: bool) {
+    let half = 0.49 * schedule.spacing;
+    let moves: [Vec<f64>; 4] = [(); 4].map(|()| {
+        let one = |_| chance.between(-half, half);
+        (0..schedule.positions).map(one).collect()
+    });
+    let (spacing, last) = (schedule.spacing, schedule.positions as f64 - 1.0);
+    for trace in &mut schedule.traces {
+        let channel = trace.stops.first().map_or(0, |s| trace.moment(s).channel());
+        let moves = &moves[if own { channel } else { 0 }];
+        for stop in &mut trace.stops {
+            let cell = (stop.x / spacing).round().clamp(0.0, last) as usize;
+            stop.x += moves[cell];
+        }
     }
 }
 

@@ -4,11 +4,12 @@
 //! straight line, that of M belongs to α. Readings of one channel at one position, whatever repeat and
 //! direction, share one expectation.
 
-use std::sync::OnceLock;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::design::{POSITIONS, Schedule};
+use crate::design::Schedule;
 use crate::rig::Moment;
 
 /// Signs of M and α, of β, and the surface of each channel 1A, 1B, 2A, 2B.
@@ -37,9 +38,7 @@ pub fn true_gap(schedule: &Schedule, change: &[Vec<f64>]) -> f64 {
     let cells = Cells::of(schedule, change);
     let first = cells.count.first().copied().unwrap_or(0.0);
     if cells.count.iter().all(|n| *n == first && first > 0.0) {
-        static EVEN: OnceLock<Absorbed> = OnceLock::new();
-        let absorbed = EVEN.get_or_init(|| Absorbed::of(&vec![1.0; 4 * POSITIONS]));
-        cells.gap(absorbed)
+        cells.gap(&Absorbed::of_even(cells.count.len()))
     } else {
         cells.gap(&Absorbed::of(&cells.count))
     }
@@ -48,7 +47,7 @@ pub fn true_gap(schedule: &Schedule, change: &[Vec<f64>]) -> f64 {
 /// The cell of a reading.
 pub fn cell(schedule: &Schedule, moment: &Moment) -> usize {
     let nearest = (moment.x / schedule.spacing).round().max(0.0) as usize;
-    moment.channel() * POSITIONS + nearest.min(POSITIONS - 1)
+    moment.channel() * schedule.positions + nearest.min(schedule.positions - 1)
 }
 
 /// What the fit takes up of single readings: independent columns, one row a cell in use, and the row of each cell.
@@ -71,7 +70,7 @@ pub fn absorbed(schedule: &Schedule) -> (DMatrix<f64>, Vec<usize>) {
 
 impl Cells {
     fn of(schedule: &Schedule, change: &[Vec<f64>]) -> Self {
-        let zero = vec![0.0; 4 * POSITIONS];
+        let zero = vec![0.0; 4 * schedule.positions];
         let mut cells = Self {
             count: zero.clone(),
             sum: zero.clone(),
@@ -107,11 +106,21 @@ impl Cells {
 }
 
 impl Absorbed {
+    /// Of cells that all have as many readings; worked out once for each number of them.
+    fn of_even(cells: usize) -> Arc<Self> {
+        static EVEN: Mutex<BTreeMap<usize, Arc<Absorbed>>> = Mutex::new(BTreeMap::new());
+        let mut known = EVEN.lock().unwrap_or_else(PoisonError::into_inner);
+        let absorbed = known
+            .entry(cells)
+            .or_insert_with(|| Arc::new(Self::of(&vec![1.0; cells])));
+        Arc::clone(absorbed)
+    }
+
     fn of(count: &[f64]) -> Self {
         let used: Vec<usize> = (0..count.len()).filter(|k| count[*k] > 0.0).collect();
-        let n = POSITIONS;
+        let n = count.len() / 4;
         let t = |k: usize| 2.0 * k as f64 / (n - 1) as f64 - 1.0;
-        let level = without_line();
+        let level = without_line(n);
         let mut columns: Vec<DVector<f64>> = Vec::new();
         let mut column = |value: &dyn Fn(usize, usize) -> f64| {
             columns.push(DVector::from_iterator(
@@ -147,8 +156,7 @@ impl Absorbed {
 }
 
 /// An orthonormal basis of the profiles without mean and straight line.
-fn without_line() -> DMatrix<f64> {
-    let n = POSITIONS;
+fn without_line(n: usize) -> DMatrix<f64> {
     let mut all = DMatrix::identity(n, n + 2);
     for k in 0..n {
         all[(k, 0)] = 1.0;

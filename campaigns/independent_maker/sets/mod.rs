@@ -47,6 +47,7 @@ pub fn known() -> Result<Vec<String>, String> {
         sources: Vec::new(),
         law: Law::White,
         design: crate::design::Design::Shared,
+        count: crate::design::Count::default(),
     };
     catalogue(&made(&any).observations)
 }

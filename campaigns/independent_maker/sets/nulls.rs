@@ -70,6 +70,7 @@ fn one(arguments: &Arguments, law: Law, number: u64) -> Result<Option<(f64, bool
         sources: Vec::new(),
         law,
         design: arguments.design.1,
+        count: arguments.count,
     };
     let case = prepared(arguments, &order)?;
     let said = ask(&case, &[], (arguments.severity, number));

@@ -74,6 +74,7 @@ fn one(
         sources: vec![(first, which[0]), (*second, which[1])],
         law,
         design: arguments.design.1,
+        count: arguments.count,
     };
     let case = prepared(arguments, &order)?;
     let said = ask(&case, &[], (arguments.severity, number));

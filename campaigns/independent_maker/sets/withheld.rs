@@ -112,6 +112,7 @@ fn one(
         sources: vec![(source, which)],
         law,
         design: arguments.design.1,
+        count: arguments.count,
     };
     let case = prepared(arguments, &order)?;
     let said = ask(&case, &[source.name], (arguments.severity, number));

@@ -10,13 +10,14 @@ pub const FROZEN: u64 = 1000;
 /// How to call it.
 pub const USAGE: &str = "\
 cargo run --release -p errsep-campaigns --bin independent_maker -- [SET] [--cases N] [--seed S] [--from K]
-    [--design NAME] [--positions N] [--repeats N] [--only EFFECT[/REALISATION]] [--dump DIR] [--certificate] [--severity N] [--frozen]
+    [--design NAME] [--positions N] [--repeats N] [--one-way] [--only EFFECT[/REALISATION]] [--dump DIR] [--certificate] [--severity N] [--frozen]
 SET: one effect a case (default), or --pairs, --withheld, --nulls
 --cases N     seeds a realisation; with --pairs, --withheld cases; with --nulls cases a law (4)
 --seed S      the first seed; of pairs, withheld and nulls the only one (1)
 --from K      first number of a pair, a withheld case or a null (0)
 --design      shared, jittered, shifted, thinned, different-grids, uneven, own-positions, three-channels, unequal-repeats
---positions N of a pass (150); --repeats N in each spindle position (4)
+--positions N of a pass (150); --repeats N in each spindle position (4), each forward and
+              backward unless --one-way is given
 --dump DIR    writes readings and set-up of every case too
 --certificate works out of every effect whether the certificate tells it from others
 --severity N  rivals of each family for the severity of names (0: left out)
@@ -89,6 +90,7 @@ impl Arguments {
                 "--design" => read.design = design(&next()?)?,
                 "--positions" => read.count.positions = whole(&next()?)?.max(3) as usize,
                 "--repeats" => read.count.repeats = whole(&next()?)?.clamp(1, 100) as u32,
+                "--one-way" => read.count.one_way = true,
                 "--only" => read.only = Some(only(&next()?)?),
                 "--dump" => read.dump = Some(PathBuf::from(next()?)),
                 "--certificate" => read.certificate = true,

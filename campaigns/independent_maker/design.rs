@@ -70,8 +70,10 @@ pub struct Schedule {
 pub struct Count {
     /// Positions of a pass.
     pub positions: usize,
-    /// Repeats in each spindle position, each forward and backward.
+    /// Repeats in each spindle position.
     pub repeats: u32,
+    /// Whether each is forward only.
+    pub one_way: bool,
 }
 
 impl Default for Count {
@@ -79,6 +81,7 @@ impl Default for Count {
         Self {
             positions: 150,
             repeats: 4,
+            one_way: false,
         }
     }
 }
@@ -98,7 +101,12 @@ impl Schedule {
         let mut turn = [0.0; 2];
         for position in 0..2 {
             for repeat in 1..=count.repeats {
-                for direction in [1.0, -1.0] {
+                let directions = if count.one_way {
+                    &[1.0][..]
+                } else {
+                    &[1.0, -1.0]
+                };
+                for &direction in directions {
                     let slower = 1.0 + 0.15 * chance.normal().clamp(-2.0, 2.0);
                     let stops = pass(
                         chance,

@@ -7,6 +7,7 @@
 //! with Student's law of as many degrees of freedom as make the same tails, pulled in likewise.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::DVector;
@@ -33,9 +34,16 @@ pub struct Tails {
     pub variance: f64,
 }
 
-/// Where spikes are looked for: traces on the same cells in the same direction.
+/// Where spikes are looked for.
 pub(crate) struct Spikes {
-    groups: Vec<Group>,
+    piles: Vec<Pile>,
+}
+
+/// Traces of one channel on the same cells: of one direction, or of both where one alone has too few.
+struct Pile {
+    /// The rows of each trace, in the order of the cells.
+    traces: Vec<Vec<usize>>,
+    backward: Vec<bool>,
 }
 
 pub(crate) struct Group {
@@ -90,13 +98,32 @@ pub(crate) fn calmed(model: &AnyModel) -> (Option<AnyModel>, Calmed) {
 impl Spikes {
     pub fn new(model: &AnyModel) -> Self {
         if model.names_single_readings() {
-            return Self { groups: Vec::new() };
+            return Self { piles: Vec::new() };
         }
-        Self {
-            groups: groups(model)
-                .filter(|g| g.starts.len() >= SPIKE_REPEATS && g.length >= SPIKE_TRACE)
-                .collect(),
+        let mut piles = Vec::new();
+        let mut few: BTreeMap<Vec<usize>, Pile> = BTreeMap::new();
+        for group in groups(model).filter(|g| g.length >= SPIKE_TRACE) {
+            let pile = Pile::of(model, &group);
+            if group.starts.len() >= SPIKE_REPEATS {
+                piles.push(pile);
+                continue;
+            }
+            let cells = pile.traces[0].iter().map(|row| model.places()[*row].cell);
+            match few.entry(cells.collect()) {
+                Entry::Vacant(place) => {
+                    place.insert(pile);
+                }
+                Entry::Occupied(mut known) => {
+                    known.get_mut().traces.extend(pile.traces);
+                    known.get_mut().backward.extend(pile.backward);
+                }
+            }
         }
+        piles.extend(
+            few.into_values()
+                .filter(|p| p.traces.len() >= SPIKE_REPEATS),
+        );
+        Self { piles }
     }
 
     /// The readings with their spikes pulled in, and the law of heavy tails if they have them.
@@ -136,8 +163,8 @@ impl Spikes {
 
     fn weight(&self, readings: &DVector<f64>) -> Option<Weight> {
         let mut heights: Vec<(f64, bool)> = Vec::new();
-        for group in &self.groups {
-            for (away, near) in group.heights(readings) {
+        for pile in &self.piles {
+            for (away, near) in pile.heights(readings) {
                 let own = near.iter().enumerate();
                 heights.extend(own.map(|(k, h)| (h.abs(), alone(&away, k, *h))));
             }
@@ -168,14 +195,10 @@ impl Spikes {
     /// median of its four neighbours it holds no drift and nothing wider than a reading or two. Beside
     /// a step it stands out of one side only, and in a bump the nearer neighbours have their part.
     pub fn pull_in(&self, readings: &mut DVector<f64>) -> usize {
-        let mut found: Vec<(&Group, usize, Vec<f64>, Vec<f64>)> = Vec::new();
-        let mut sizes: Vec<f64> = Vec::new();
-        for group in &self.groups {
-            for (own, (away, near)) in group.heights(readings).into_iter().enumerate() {
-                sizes.extend(near.iter().map(|h| h.abs()));
-                found.push((group, own, away, near));
-            }
-        }
+        let heights: Vec<Vec<(Vec<f64>, Vec<f64>)>> =
+            self.piles.iter().map(|p| p.heights(readings)).collect();
+        let all = heights.iter().flatten().flat_map(|(_, near)| near);
+        let mut sizes: Vec<f64> = all.map(|h| h.abs()).collect();
         if sizes.is_empty() {
             return 0;
         }
@@ -183,16 +206,19 @@ impl Spikes {
         let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
         let edge = SPIKE * SIGMA * *median;
         let mut pulled = Vec::new();
-        for (group, own, away, near) in found {
-            for (k, height) in near.iter().enumerate() {
-                let spike = || {
-                    let far = away[k] - around(&away, k, SIDE);
-                    height.abs() > KEPT * far.abs()
-                        && alone(&away, k, *height)
-                        && group.farthest(readings, own, k)
-                };
-                if height.abs() > edge && spike() {
-                    pulled.push((group.starts[own] + k, height - edge.copysign(*height)));
+        for (pile, heights) in self.piles.iter().zip(&heights) {
+            for (own, (away, near)) in heights.iter().enumerate() {
+                for (k, height) in near.iter().enumerate() {
+                    let spike = || {
+                        let far = away[k] - around(away, k, SIDE);
+                        height.abs() > KEPT * far.abs()
+                            && alone(away, k, *height)
+                            && pile.farthest(readings, own, k)
+                            && pile.is_of_one(heights, own, k)
+                    };
+                    if height.abs() > edge && spike() {
+                        pulled.push((pile.traces[own][k], height - edge.copysign(*height)));
+                    }
                 }
             }
         }
@@ -209,27 +235,50 @@ pub(crate) const SIGMA: f64 = 1.4826;
 impl Group {
     /// For each trace the deviations from the median of the other repeats.
     pub fn away(&self, readings: &DVector<f64>) -> Vec<Vec<f64>> {
-        let mut others = Vec::with_capacity(self.starts.len());
-        (0..self.starts.len())
-            .map(|own| {
-                (0..self.length)
-                    .map(|k| {
-                        others.clear();
-                        let rest = self.starts.iter().enumerate().filter(|(j, _)| *j != own);
-                        others.extend(rest.map(|(_, start)| readings[start + k]));
-                        readings[self.starts[own] + k] - median(&mut others)
-                    })
-                    .collect()
-            })
-            .collect()
+        let traces = self.starts.iter().map(|s| (*s..s + self.length).collect());
+        away(&traces.collect::<Vec<Vec<usize>>>(), readings)
+    }
+}
+
+/// For each of some traces the deviations from the median of the others.
+fn away(traces: &[Vec<usize>], readings: &DVector<f64>) -> Vec<Vec<f64>> {
+    let mut others = Vec::with_capacity(traces.len());
+    (0..traces.len())
+        .map(|own| {
+            (0..traces[own].len())
+                .map(|k| {
+                    others.clear();
+                    let rest = traces.iter().enumerate().filter(|(j, _)| *j != own);
+                    others.extend(rest.map(|(_, rows)| readings[rows[k]]));
+                    readings[traces[own][k]] - median(&mut others)
+                })
+                .collect()
+        })
+        .collect()
+}
+
+impl Pile {
+    /// The traces of a group, in the order of their cells.
+    fn of(model: &AnyModel, group: &Group) -> Self {
+        let places = model.places();
+        let rows = |start: &usize| {
+            let mut rows: Vec<usize> = (*start..start + group.length).collect();
+            rows.sort_by_key(|row| places[*row].cell);
+            rows
+        };
+        let backward = |start: &usize| places[*start].direction < 0.0;
+        Self {
+            traces: group.starts.iter().map(rows).collect(),
+            backward: group.starts.iter().map(backward).collect(),
+        }
     }
 
     /// The same, and their heights over the neighbours.
     fn heights(&self, readings: &DVector<f64>) -> Vec<(Vec<f64>, Vec<f64>)> {
-        self.away(readings)
+        away(&self.traces, readings)
             .into_iter()
             .map(|away| {
-                let near = (0..self.length)
+                let near = (0..away.len())
                     .map(|k| away[k] - around(&away, k, 2))
                     .collect();
                 (away, near)
@@ -239,10 +288,23 @@ impl Group {
 
     /// Whether no other repeat is farther from the median of all.
     fn farthest(&self, readings: &DVector<f64>, own: usize, k: usize) -> bool {
-        let all: Vec<f64> = self.starts.iter().map(|s| readings[s + k]).collect();
+        let all: Vec<f64> = self.traces.iter().map(|t| readings[t[k]]).collect();
         let usual = median(&mut all.clone());
         let distance = |value: &f64| (value - usual).abs();
         all.iter().all(|v| distance(v) <= distance(&all[own]))
+    }
+
+    /// Whether the other traces of its direction do not show a height, where the pile is of both directions: what
+    /// differs between these is no spike.
+    fn is_of_one(&self, heights: &[(Vec<f64>, Vec<f64>)], own: usize, k: usize) -> bool {
+        if self.backward.iter().all(|b| *b == self.backward[0]) {
+            return true;
+        }
+        let height = heights[own].1[k];
+        let alike = |j: &usize| *j != own && self.backward[*j] == self.backward[own];
+        let mut others = (0..self.traces.len()).filter(alike).peekable();
+        others.peek().is_some()
+            && others.all(|j| (height - heights[j].1[k]) * height.signum() > KEPT * height.abs())
     }
 }
 

@@ -5,10 +5,10 @@ use rayon::prelude::*;
 
 use crate::attribution::context::Context;
 use crate::attribution::examined::examined;
+use crate::detection::calm::calmed;
 use crate::detection::estimate::estimate;
 use crate::detection::fitted::without_misfit;
 use crate::diagnose::diagnose_with;
-use crate::noise::spikes::calmed;
 use crate::options::Options;
 use crate::severity::grounds::Grounds;
 use crate::severity::rivals::{Drawn, Family};

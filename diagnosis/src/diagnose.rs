@@ -4,8 +4,8 @@ use errsep_models::model::{AnyModel, Effect, FittedModel};
 
 use crate::attribution::context::Context;
 use crate::attribution::examined::examined;
+use crate::detection::calm::calmed;
 use crate::detection::estimate::estimate;
-use crate::noise::spikes::calmed;
 use crate::options::Options;
 use crate::verdict::compose::compose;
 use crate::verdict::types::Diagnosis;

@@ -64,6 +64,13 @@ pub(crate) const LIKELIER_BY_JUMPS: f64 = 3.0;
 /// independent maker), 12.3 where a slow cause is withheld (one of 60); drifts of six standard deviations of a reading make
 /// 27 to 70.
 pub(crate) const LIKELIER_BY_DRIFTS: f64 = 12.0;
+/// *Quantile*, twenty to one: logarithm of how much likelier residuals must be, where there are no repeats, under noise that
+/// may be correlated along its trace than under white noise, for it to be, and causes beside white noise than such noise, for
+/// them to be named.
+pub(crate) const LIKELIER_BY_CORRELATION: f64 = 3.0;
+/// *Limit.* Standard deviation of the part of noise that is correlated over that of the white part, where there are no
+/// repeats: what is more is no noise.
+pub(crate) const MOST_CORRELATED: f64 = 3.0;
 /// *Limit.* Jumps of so little height that are taken out of all readings; of more none is.
 pub(crate) const MOST_JUMPS: usize = 3;
 /// *Limit.* Steps that are taken out of one group of repeats.

@@ -6,10 +6,11 @@ use nalgebra::{DMatrix, DVector};
 use crate::attribution::attribute::{attribute, roughly};
 use crate::attribution::confidence::Answer;
 use crate::attribution::context::{Cause, Context};
+use crate::attribution::correlated::correlated_instead;
 use crate::attribution::drifting::drifts_instead;
 use crate::attribution::remainder::Remainder;
 use crate::detection::estimate::estimate_where;
-use crate::noise::law::{Drifts, NoiseLaw};
+use crate::noise::law::{Drifts, NoiseLaw, NoiseSource};
 
 /// What a diagnosis has come to before it is put in words.
 pub(crate) struct Examined<'a> {
@@ -58,6 +59,9 @@ pub(crate) fn examined<R>(
         let law = estimate_where(context.model, readings, Drifts::Possible);
         return self::examined(&context.under(law), readings, false_alarm, then);
     }
+    if let Some(law) = correlated_instead(context, &examined) {
+        return self::examined(&context.under(law), readings, false_alarm, then);
+    }
     then(examined)
 }
 
@@ -81,6 +85,9 @@ pub(crate) fn afresh(
     };
     // The readings themselves keep what an effect had hidden of the state.
     let clean = context.model.refit(observed - &change).linearised();
-    let law = estimate_where(&state, &clean, context.law.drifts);
+    let law = match context.law.source {
+        NoiseSource::Residuals => context.law.clone(),
+        _ => estimate_where(&state, &clean, context.law.drifts).with_tails_of(&context.law),
+    };
     (state, law, clean + change)
 }

@@ -9,6 +9,7 @@ mod by_traces;
 pub(super) mod candidates;
 pub(super) mod confidence;
 pub(super) mod context;
+mod correlated;
 pub(super) mod doubt;
 mod drifting;
 pub(super) mod examined;

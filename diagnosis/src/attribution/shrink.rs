@@ -82,7 +82,7 @@ impl GapMeter {
                 let contrasts = Contrasts::of(model, model.observed());
                 (law.freedom.min(contrasts.count() as f64) / freedom).min(1.0)
             }
-            NoiseSource::Stated | NoiseSource::Neighbours => 0.0,
+            NoiseSource::Stated | NoiseSource::Neighbours | NoiseSource::Residuals => 0.0,
         };
         let rest = 1.0 - shared;
         Self {

@@ -23,9 +23,15 @@ const PANEL: usize = 48;
 /// An orthonormal basis of the columns that are longer than rounding compared with `sizes`: Gram and Schmidt's, twice
 /// (Giraud, Langou and Rozložník 2005), by panels, whose products are those of matrices.
 pub(crate) fn orthonormal(columns: &DMatrix<f64>, sizes: &[f64]) -> DMatrix<f64> {
+    with_volume(columns, sizes).0
+}
+
+/// The same, and the logarithm of the volume that the columns it is made of span.
+pub(crate) fn with_volume(columns: &DMatrix<f64>, sizes: &[f64]) -> (DMatrix<f64>, f64) {
     let (rows, count) = columns.shape();
     let mut kept = DMatrix::<f64>::zeros(rows, count);
     let mut rank = 0;
+    let mut log_volume = 0.0;
     for from in (0..count).step_by(PANEL) {
         let mut panel = columns.columns(from, PANEL.min(count - from)).into_owned();
         let before = kept.columns(0, rank).into_owned();
@@ -53,10 +59,11 @@ pub(crate) fn orthonormal(columns: &DMatrix<f64>, sizes: &[f64]) -> DMatrix<f64>
             if length > DEPENDENT * size && length > 0.0 {
                 kept.set_column(rank, &(vector / length));
                 rank += 1;
+                log_volume += length.ln();
             }
         }
     }
-    kept.columns(0, rank).into_owned()
+    (kept.columns(0, rank).into_owned(), log_volume)
 }
 
 #[cfg(test)]

@@ -101,7 +101,7 @@ fn of_repeats(model: &AnyModel, readings: &DVector<f64>, drifts: Drifts, floor: 
         && model.correlated_noise()
         && let Some(allowed) = allowed(&contrasts, drifts, SEED)
     {
-        return NoiseLaw::mean_of(allowed, drifts);
+        return NoiseLaw::mean_of(allowed, drifts, NoiseSource::Repeats);
     }
     NoiseLaw::white(variance.sqrt().max(floor), freedom, NoiseSource::Repeats)
 }

@@ -56,6 +56,11 @@ impl Loose {
         }
     }
 
+    /// ln of the determinant of the covariance in these directions.
+    pub fn log_determinant(&self) -> f64 {
+        self.parts.iter().map(|part| -2.0 * (1.0 - part).ln()).sum()
+    }
+
     /// The inverse root times each column, in place.
     pub fn take(&self, columns: &mut DMatrix<f64>) {
         if self.directions.ncols() > 0 {

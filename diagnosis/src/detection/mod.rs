@@ -3,6 +3,7 @@
 //! stand out with nothing there.
 
 pub(super) mod basis;
+pub(super) mod calm;
 pub(super) mod dictionary;
 pub(super) mod estimate;
 pub(super) mod fitted;
@@ -11,6 +12,7 @@ pub(super) mod gram;
 pub(super) mod localise;
 pub(super) mod loose;
 pub(super) mod null;
+pub(super) mod residuals;
 pub(super) mod scatter;
 pub(super) mod shared_scatter;
 pub(super) mod smallest;

@@ -14,6 +14,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use crate::detection::calm::spikes;
 use crate::detection::dictionary::{Dictionary, Family, inverse, surprise};
 use crate::detection::folding::Sums;
 use crate::detection::space::Space;
@@ -118,7 +119,7 @@ impl NullLaw {
         draws: usize,
         seed: u64,
     ) -> Self {
-        let spikes = Spikes::new(model);
+        let spikes = spikes(model);
         let batches = draws.div_ceil(BATCH);
         let all: Vec<Vec<Vec<f64>>> = (0..batches)
             .into_par_iter()

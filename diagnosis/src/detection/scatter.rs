@@ -31,6 +31,14 @@ impl Scatter {
         }
     }
 
+    /// ln |I + U Uᵀ|.
+    pub fn log_determinant(&self) -> f64 {
+        match self {
+            Self::Points(root) => root.log_determinant(),
+            Self::Shared(root) => root.log_determinant(),
+        }
+    }
+
     /// The transposed root times a vector, in place.
     pub fn apply_transposed(&self, vector: &mut [f64]) {
         match self {
@@ -95,6 +103,12 @@ impl ScatterRoot {
         let all: Vec<usize> = (0..readings).collect();
         root.common = directions(&rest, &all);
         root
+    }
+
+    /// ln |I + U Uᵀ|.
+    pub fn log_determinant(&self) -> f64 {
+        let all = self.own.iter().chain(&self.common);
+        all.map(|d| -2.0 * (1.0 - d.part).ln()).sum()
     }
 
     /// The root times a vector, in place.
@@ -171,7 +185,11 @@ mod tests {
                 root.apply_transposed(transposed.column_mut(k).as_mut_slice());
             }
             let covariance = DMatrix::identity(10, 10) + &columns * columns.transpose();
-            let identity = &inverse * covariance * inverse.transpose();
+            let identity = &inverse * &covariance * inverse.transpose();
+            let factor = covariance.clone().cholesky().unwrap();
+            let dense: f64 = factor.l().diagonal().map(|pivot| 2.0 * pivot.ln()).sum();
+            // Rounding, and directions of variance below 1e-9, ten at most.
+            prop_assert!((root.log_determinant() - dense).abs() < 1e-7);
             // Rounding: variances to 12 · 9; directions of variance below 1e-9 are left.
             prop_assert!((identity - DMatrix::identity(10, 10)).amax() < 1e-8);
             prop_assert!((transposed - inverse.transpose()).amax() < 1e-12);

@@ -96,6 +96,12 @@ impl SharedRoot {
         }
     }
 
+    /// ln |I + Σ s 1 1ᵀ|.
+    pub fn log_determinant(&self) -> f64 {
+        let each = self.groups.iter().map(|g| -2.0 * (1.0 - g.part).ln());
+        self.length as f64 * each.sum::<f64>()
+    }
+
     /// The root times weights of the traces.
     pub fn of_traces(&self, weights: &DVector<f64>) -> DVector<f64> {
         let mut left = weights.clone();

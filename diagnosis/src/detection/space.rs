@@ -11,7 +11,7 @@ use std::sync::Arc;
 use errsep_models::model::{AnyModel, Column, FittedModel, Freedom, Profiles, Record};
 use nalgebra::{DMatrix, DVector};
 
-use crate::detection::basis::{inner_products, orthonormal};
+use crate::detection::basis::{inner_products, orthonormal, with_volume};
 use crate::detection::loose::Loose;
 use crate::detection::scatter::{Scatter, ScatterRoot};
 use crate::detection::shared_scatter::SharedRoot;
@@ -39,6 +39,8 @@ pub struct Space {
     pub(super) loose: Loose,
     /// Number of directions the fit absorbs.
     pub rank: usize,
+    /// ln |V| + ln |Jᵀ V⁻¹ J|, to a constant of the model and its positions.
+    log_determinant: f64,
 }
 
 /// Whether scatter is of one position of some traces.
@@ -127,6 +129,7 @@ impl Space {
             absorbed: DMatrix::zeros(start, 0),
             loose: Loose::none(start),
             rank: 0,
+            log_determinant: 0.0,
         };
         space.scatter = space.scatter_root(scatter, freedom, record, &rows);
         let columns = freedom.columns.select_rows(&rows);
@@ -141,8 +144,12 @@ impl Space {
             space.free_profiles(profiles, chosen, &law.covariance(&x));
         }
         space.project_profiles(&mut whitened);
-        space.absorbed = orthonormal(&whitened, &sizes);
+        let (absorbed, log_volume) = with_volume(&whitened, &sizes);
+        space.absorbed = absorbed;
         space.rank += space.absorbed.ncols();
+        let noise = space.whitening.iter().map(|w| w.log_determinant());
+        let expected = space.scatter.as_ref().map_or(0.0, Scatter::log_determinant);
+        space.log_determinant += noise.sum::<f64>() + expected + 2.0 * log_volume;
         if let Some(Scatter::Shared(_)) = &space.scatter {
             let along = scatter.iter().filter(|c| !is_of_a_position(c, record));
             let dense = along.map(|column| column.dense(record.places.len()).select_rows(&rows));
@@ -150,6 +157,7 @@ impl Space {
             if !dense.is_empty() {
                 let (seen, _) = space.forward(DMatrix::from_columns(&dense));
                 space.loose = Loose::new(&seen);
+                space.log_determinant += space.loose.log_determinant();
             }
         }
         space
@@ -193,8 +201,11 @@ impl Space {
             }
         }
         let sizes: Vec<f64> = patterns.column_iter().map(|c| c.norm()).collect();
-        let basis = orthonormal(&patterns, &sizes);
+        let (basis, log_volume) = with_volume(&patterns, &sizes);
         let length = self.traces.first().map_or(0, Range::len);
+        // |(B ⊗ I)ᵀ (I ⊗ V⁻¹) (B ⊗ I)| of the noise V of one trace.
+        let noise = self.whitening.first().map_or(0.0, |w| w.log_determinant());
+        self.log_determinant += 2.0 * length as f64 * log_volume - basis.ncols() as f64 * noise;
         let mut returned = DMatrix::zeros(self.readings, 0);
         for (function, profile) in &profiles.withheld {
             // The part of this function's pattern that no other function has.
@@ -219,6 +230,8 @@ impl Space {
                     .copy_from(&(&normal * own[t]));
             }
             let size = column.norm();
+            // Of the profiles with fᵀ profile = 0 alone: |profile| of unit length.
+            self.log_determinant += 2.0 * (normal.norm() / profile.norm()).ln();
             let at = returned.ncols();
             returned = returned.insert_column(at, 0.0);
             returned.column_mut(at).copy_from(&(column / size));
@@ -226,6 +239,11 @@ impl Space {
         self.rank += basis.ncols() * length - returned.ncols();
         self.patterns = Some(basis);
         self.returned = returned;
+    }
+
+    /// ln |V| + ln |Jᵀ V⁻¹ J| of the noise V and of what the fit absorbs, to a constant of the model and its positions.
+    pub fn log_determinant(&self) -> f64 {
+        self.log_determinant
     }
 
     /// Number of readings.

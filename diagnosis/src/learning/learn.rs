@@ -7,6 +7,7 @@ use thiserror::Error;
 use crate::attribution::context::Context;
 use crate::catalogue::curve::Curve;
 use crate::catalogue::tabulated::Tabulated;
+use crate::detection::calm::calmed;
 use crate::detection::estimate::estimate;
 use crate::detection::space::Space;
 use crate::learning::ground::Ground;
@@ -14,7 +15,6 @@ use crate::learning::smooth::Smooth;
 use crate::learning::weighed::{HeldOutAlong, Weighed, seen_with_prior, weighed};
 use crate::levels::ADEQUATE;
 use crate::noise::law::NoiseLaw;
-use crate::noise::spikes::calmed;
 use crate::options::Options;
 
 /// Rounds of learning: noise and state are found again without what was learnt.

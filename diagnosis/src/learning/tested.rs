@@ -10,9 +10,9 @@ use serde::Serialize;
 use crate::attribution::shrink::{GapMeter, HeldOut, Size, shrink};
 use crate::catalogue::curve::{Along, Curve};
 use crate::catalogue::tabulated::{Seen, Tabulated};
+use crate::detection::calm::calmed;
 use crate::detection::estimate::estimate;
 use crate::detection::space::Space;
-use crate::noise::spikes::calmed;
 use crate::options::Options;
 
 /// Curves that are drawn to say what chance explains.

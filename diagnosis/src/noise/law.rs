@@ -31,6 +31,8 @@ pub enum NoiseSource {
     Stated,
     /// From differences of neighbouring readings: effects rougher than the spacing count as noise.
     Neighbours,
+    /// From all that the fit leaves: effects count as noise that is correlated.
+    Residuals,
 }
 
 /// Whether whole traces may drift, each by a slope of its own, as noise.
@@ -96,7 +98,11 @@ impl NoiseLaw {
     }
 
     /// The mean of laws drawn from what the repeats allow.
-    pub(crate) fn mean_of(Allowed { laws, log_evidence }: Allowed, drifts: Drifts) -> Self {
+    pub(crate) fn mean_of(
+        Allowed { laws, log_evidence }: Allowed,
+        drifts: Drifts,
+        source: NoiseSource,
+    ) -> Self {
         let count = laws.len().max(1) as f64;
         let mean = |value: fn(&Law) -> f64| laws.iter().map(value).sum::<f64>() / count;
         let whole = mean(Law::variance);
@@ -121,7 +127,7 @@ impl NoiseLaw {
             },
             drifts,
             freedom: (2.0 * whole * whole / variance.max(f64::MIN_POSITIVE)).clamp(1.0, 1e9),
-            source: NoiseSource::Repeats,
+            source,
             possible: Arc::new(laws),
             tails: None,
             log_evidence: Some(log_evidence),
@@ -148,7 +154,10 @@ impl NoiseLaw {
     /// The law with heavy tails of the single readings.
     pub(crate) fn with_tails(mut self, tails: Option<Tails>) -> Self {
         self.tails = tails;
-        self
+        match (self.source, tails) {
+            (NoiseSource::Neighbours, Some(tails)) => self.whiter(tails.by_neighbours),
+            _ => self,
+        }
     }
 
     /// The law with the tails of another one.

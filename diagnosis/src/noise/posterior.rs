@@ -55,11 +55,12 @@ fn kinds(drifts: Drifts) -> impl Iterator<Item = Kind> {
 }
 
 /// A proposed law and its logarithmic weight.
-struct Proposal {
+pub(crate) struct Proposal {
     /// The law, its white variance one.
-    ratios: Law,
-    quadratic: f64,
-    weight: f64,
+    pub ratios: Law,
+    /// Square of what is seen in units of that law.
+    pub quadratic: f64,
+    pub weight: f64,
 }
 
 /// What contrasts allow.
@@ -309,7 +310,11 @@ fn spread(mode: &[f64], value: impl Fn(&[f64]) -> f64) -> Option<DMatrix<f64>> {
 }
 
 /// Laws drawn by their weights, each with a white variance drawn from its posterior.
-fn resampled(proposals: &[Proposal], count: f64, random: &mut ChaCha8Rng) -> Option<Allowed> {
+pub(crate) fn resampled(
+    proposals: &[Proposal],
+    count: f64,
+    random: &mut ChaCha8Rng,
+) -> Option<Allowed> {
     let top = proposals
         .iter()
         .map(|p| p.weight)

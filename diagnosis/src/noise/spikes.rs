@@ -15,13 +15,16 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StudentT};
 
-use crate::levels::{HEAVY_TAILS, KEPT, SPIKE, SPIKE_REPEATS, SPIKE_TRACE};
+use crate::levels::{FEWEST_CONTRASTS, HEAVY_TAILS, KEPT, SPIKE, SPIKE_REPEATS, SPIKE_TRACE};
+use crate::noise::by_fit::ByFit;
 use crate::noise::contrasts::Contrasts;
 
 /// Neighbours on one side.
 const SIDE: usize = 7;
 /// Degrees of freedom among which the tails are sought.
 const FREEDOMS: [f64; 10] = [2.1, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0];
+/// Readings of noise with which tails are compared, at least.
+const DRAWN: usize = 3000;
 /// Seed of the noise with which tails are compared.
 const SEED: u64 = 0x7461_696c;
 
@@ -32,19 +35,42 @@ pub struct Tails {
     pub freedom: f64,
     /// Variance that is left of noise of unit scale when its spikes are pulled in.
     pub variance: f64,
+    /// That over what differences of neighbours tell of it.
+    pub by_neighbours: f64,
+}
+
+impl Tails {
+    /// Noise of unit scale of all readings of a model.
+    pub(crate) fn draw(&self, model: &AnyModel, random: &mut ChaCha8Rng) -> Option<DVector<f64>> {
+        let law = StudentT::new(self.freedom).ok()?;
+        Some(DVector::from_fn(model.places().len(), |_, _| {
+            law.sample(random)
+        }))
+    }
+}
+
+/// What a fit leaves of readings whose noise is white.
+pub(crate) struct Residual {
+    pub of: Box<dyn Fn(&DVector<f64>) -> DVector<f64> + Send + Sync>,
+    /// Its degrees of freedom.
+    pub freedom: usize,
 }
 
 /// Where spikes are looked for.
 pub(crate) struct Spikes {
     piles: Vec<Pile>,
+    by_fit: Option<ByFit>,
 }
 
 /// Traces of one channel on the same cells: of one direction, or of both where one alone has too few.
-struct Pile {
+pub(crate) struct Pile {
     /// The rows of each trace, in the order of the cells.
-    traces: Vec<Vec<usize>>,
+    pub traces: Vec<Vec<usize>>,
     backward: Vec<bool>,
 }
+
+/// Deviations along a trace, and their heights over the neighbours.
+pub(crate) type Heights = (Vec<f64>, Vec<f64>);
 
 pub(crate) struct Group {
     pub starts: Vec<usize>,
@@ -86,19 +112,14 @@ struct Weight {
     ratio: f64,
 }
 
-/// A model fitted to readings whose spikes are pulled in, where there are any, and what was done.
-pub(crate) fn calmed(model: &AnyModel) -> (Option<AnyModel>, Calmed) {
-    let readings = model.linearised();
-    let calm = Spikes::new(model).calmed(model, &readings);
-    let changed =
-        (calm.count > 0).then(|| model.refit(model.observed() + (&calm.readings - &readings)));
-    (changed, calm)
-}
-
 impl Spikes {
-    pub fn new(model: &AnyModel) -> Self {
+    /// `residual`: what the model's fit leaves, asked for where repeats are too few.
+    pub fn new(model: &AnyModel, residual: impl FnOnce() -> Residual) -> Self {
         if model.names_single_readings() {
-            return Self { piles: Vec::new() };
+            return Self {
+                piles: Vec::new(),
+                by_fit: None,
+            };
         }
         let mut piles = Vec::new();
         let mut few: BTreeMap<Vec<usize>, Pile> = BTreeMap::new();
@@ -119,11 +140,12 @@ impl Spikes {
                 }
             }
         }
-        piles.extend(
-            few.into_values()
-                .filter(|p| p.traces.len() >= SPIKE_REPEATS),
-        );
-        Self { piles }
+        let (enough, few): (Vec<Pile>, Vec<Pile>) = few
+            .into_values()
+            .partition(|p| p.traces.len() >= SPIKE_REPEATS);
+        piles.extend(enough);
+        let by_fit = (!few.is_empty()).then(|| ByFit::new(model, few, residual()));
+        Self { piles, by_fit }
     }
 
     /// The readings with their spikes pulled in, and the law of heavy tails if they have them.
@@ -151,22 +173,44 @@ impl Spikes {
     fn compared(&self, model: &AnyModel, freedom: f64, seen: &Weight) -> Option<(f64, Tails)> {
         let law = StudentT::new(freedom).ok()?;
         let mut random = ChaCha8Rng::seed_from_u64(SEED);
-        let mut noise = DVector::from_fn(model.places().len(), |_, _| law.sample(&mut random));
-        let weight = self.weight(&noise)?;
-        self.pull_in(&mut noise);
-        let (variance, _) = Contrasts::of(model, &noise).scatter();
-        Some((
-            (weight.ratio / seen.ratio).ln().abs(),
-            Tails { freedom, variance },
-        ))
+        let count = model.places().len();
+        let sets = DRAWN.div_ceil(count.max(1));
+        let (mut ratio, mut variance) = (0.0, 0.0);
+        for _ in 0..sets {
+            let mut noise = DVector::from_fn(count, |_, _| law.sample(&mut random));
+            ratio += self.weight(&noise)?.ratio / sets as f64;
+            self.pull_in(&mut noise);
+            let contrasts = Contrasts::of(model, &noise);
+            let (own, _) = contrasts.scatter();
+            let by_fit = self.by_fit.as_ref();
+            let by_fit = by_fit.filter(|_| contrasts.count() < FEWEST_CONTRASTS);
+            variance += by_fit.map_or(own, |b| b.variance(&noise)) / sets as f64;
+        }
+        let tails = Tails {
+            freedom,
+            variance,
+            by_neighbours: 1.0,
+        };
+        Some(((ratio / seen.ratio).ln().abs(), tails))
     }
 
     fn weight(&self, readings: &DVector<f64>) -> Option<Weight> {
         let mut heights: Vec<(f64, bool)> = Vec::new();
+        let mut add = |away: &[f64], near: &[f64]| {
+            let own = near.iter().enumerate();
+            heights.extend(own.map(|(k, h)| (h.abs(), alone(away, k, *h))));
+        };
         for pile in &self.piles {
             for (away, near) in pile.heights(readings) {
-                let own = near.iter().enumerate();
-                heights.extend(own.map(|(k, h)| (h.abs(), alone(&away, k, *h))));
+                add(&away, &near);
+            }
+        }
+        if self.piles.is_empty()
+            && let Some(by_fit) = &self.by_fit
+        {
+            let residual = (by_fit.residual.of)(readings);
+            for (away, near) in by_fit.heights(&residual).iter().flatten() {
+                add(away, near);
             }
         }
         if heights.is_empty() {
@@ -190,29 +234,27 @@ impl Spikes {
     }
 
     /// Pulls single spikes in, and counts them.
+    pub fn pull_in(&self, readings: &mut DVector<f64>) -> usize {
+        let by_fit = self.by_fit.as_ref();
+        self.pull_in_by_repeats(readings) + by_fit.map_or(0, |by_fit| by_fit.pull_in(readings))
+    }
+
+    /// The same where repeats tell.
     ///
     /// The deviation of a reading from the median of its other repeats holds no form; less the
     /// median of its four neighbours it holds no drift and nothing wider than a reading or two. Beside
     /// a step it stands out of one side only, and in a bump the nearer neighbours have their part.
-    pub fn pull_in(&self, readings: &mut DVector<f64>) -> usize {
-        let heights: Vec<Vec<(Vec<f64>, Vec<f64>)>> =
-            self.piles.iter().map(|p| p.heights(readings)).collect();
-        let all = heights.iter().flatten().flat_map(|(_, near)| near);
-        let mut sizes: Vec<f64> = all.map(|h| h.abs()).collect();
-        if sizes.is_empty() {
+    fn pull_in_by_repeats(&self, readings: &mut DVector<f64>) -> usize {
+        let heights: Vec<Vec<Heights>> = self.piles.iter().map(|p| p.heights(readings)).collect();
+        let Some(edge) = edge(&heights) else {
             return 0;
-        }
-        let middle = sizes.len() / 2;
-        let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-        let edge = SPIKE * SIGMA * *median;
+        };
         let mut pulled = Vec::new();
         for (pile, heights) in self.piles.iter().zip(&heights) {
             for (own, (away, near)) in heights.iter().enumerate() {
                 for (k, height) in near.iter().enumerate() {
                     let spike = || {
-                        let far = away[k] - around(away, k, SIDE);
-                        height.abs() > KEPT * far.abs()
-                            && alone(away, k, *height)
+                        stands_out(away, k, *height)
                             && pile.farthest(readings, own, k)
                             && pile.is_of_one(heights, own, k)
                     };
@@ -227,6 +269,26 @@ impl Spikes {
         }
         pulled.len()
     }
+}
+
+/// Deviations along a trace with their heights over the median of four neighbours.
+pub(crate) fn over_neighbours(away: Vec<f64>) -> Heights {
+    let near = (0..away.len())
+        .map(|k| away[k] - around(&away, k, 2))
+        .collect();
+    (away, near)
+}
+
+/// How high a spike may stand: by the median of all heights; none where there are no heights.
+pub(crate) fn edge(heights: &[Vec<Heights>]) -> Option<f64> {
+    let all = heights.iter().flatten().flat_map(|(_, near)| near);
+    let mut sizes: Vec<f64> = all.map(|h| h.abs()).collect();
+    if sizes.is_empty() {
+        return None;
+    }
+    let middle = sizes.len() / 2;
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    Some(SPIKE * SIGMA * *median)
 }
 
 /// The standard deviation of normal numbers over the median of their absolute values.
@@ -273,17 +335,10 @@ impl Pile {
         }
     }
 
-    /// The same, and their heights over the neighbours.
-    fn heights(&self, readings: &DVector<f64>) -> Vec<(Vec<f64>, Vec<f64>)> {
-        away(&self.traces, readings)
-            .into_iter()
-            .map(|away| {
-                let near = (0..away.len())
-                    .map(|k| away[k] - around(&away, k, 2))
-                    .collect();
-                (away, near)
-            })
-            .collect()
+    /// For each trace the deviations from the median of the others, and their heights over the neighbours.
+    fn heights(&self, readings: &DVector<f64>) -> Vec<Heights> {
+        let away = away(&self.traces, readings);
+        away.into_iter().map(over_neighbours).collect()
     }
 
     /// Whether no other repeat is farther from the median of all.
@@ -296,7 +351,7 @@ impl Pile {
 
     /// Whether the other traces of its direction do not show a height, where the pile is of both directions: what
     /// differs between these is no spike.
-    fn is_of_one(&self, heights: &[(Vec<f64>, Vec<f64>)], own: usize, k: usize) -> bool {
+    fn is_of_one(&self, heights: &[Heights], own: usize, k: usize) -> bool {
         if self.backward.iter().all(|b| *b == self.backward[0]) {
             return true;
         }
@@ -306,6 +361,12 @@ impl Pile {
         others.peek().is_some()
             && others.all(|j| (height - heights[j].1[k]) * height.signum() > KEPT * height.abs())
     }
+}
+
+/// Whether a height is that of a single value.
+pub(crate) fn stands_out(values: &[f64], k: usize, height: f64) -> bool {
+    let far = values[k] - around(values, k, SIDE);
+    height.abs() > KEPT * far.abs() && alone(values, k, height)
 }
 
 /// Whether a value stands out of its neighbours on either side by a part of its height.
@@ -349,6 +410,7 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detection::calm::spikes as sought;
     use errsep_models::reversal::diagnosable::{Assumptions, Linearised};
     use errsep_models::reversal::exact_readings::{Scene, SceneNoise};
     use rand_distr::StandardNormal;
@@ -365,7 +427,7 @@ mod tests {
     #[test]
     fn heavy_tails_are_told_from_normal_ones() {
         let model = model();
-        let spikes = Spikes::new(&model);
+        let spikes = sought(&model);
         let n = model.observed().len();
         for seed in 0..10 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -385,7 +447,7 @@ mod tests {
     #[test]
     fn a_step_is_left() {
         let model = model();
-        let spikes = Spikes::new(&model);
+        let spikes = sought(&model);
         let mut random = ChaCha8Rng::seed_from_u64(6);
         let n = model.observed().len();
         let noise = DVector::from_fn(n, |_, _| StandardNormal.sample(&mut random));
@@ -407,7 +469,7 @@ mod tests {
     #[test]
     fn a_bump_is_left_and_a_spike_is_pulled_in() {
         let model = model();
-        let spikes = Spikes::new(&model);
+        let spikes = sought(&model);
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let n = model.observed().len();
         let noise = DVector::from_fn(n, |_, _| StandardNormal.sample(&mut random));

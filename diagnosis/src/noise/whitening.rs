@@ -86,6 +86,13 @@ impl Whitening {
         }
     }
 
+    /// ln |V|.
+    pub fn log_determinant(&self) -> f64 {
+        let own: f64 = self.scale.iter().map(|s| -2.0 * s.ln()).sum();
+        let whole = self.of_whole.iter().map(|(w, _)| w.norm_squared().ln_1p());
+        own + whole.sum::<f64>()
+    }
+
     /// L⁻¹ y, in place.
     pub fn whiten(&self, y: &mut [f64]) {
         self.filter(y);
@@ -155,6 +162,10 @@ mod tests {
                 whitening.adjoint(adjoint.column_mut(k).as_mut_slice());
             }
             let identity = &inverse * law.covariance(&x) * inverse.transpose();
+            let factor = law.covariance(&x).cholesky().unwrap();
+            let dense: f64 = factor.l().diagonal().map(|pivot| 2.0 * pivot.ln()).sum();
+            // Rounding: twenty logarithms of pivots between 0.1 and 10.
+            prop_assert!((whitening.log_determinant() - dense).abs() < 1e-10);
             // Rounding: the condition of V is below 20·8/0.1, each product has 20 terms.
             prop_assert!((identity - DMatrix::identity(n, n)).amax() < 1e-11);
             prop_assert!((adjoint - inverse.transpose()).amax() < 1e-13 * 20.0 / white);

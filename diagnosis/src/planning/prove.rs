@@ -17,11 +17,11 @@ use serde::Serialize;
 
 use crate::attribution::context::Context;
 use crate::attribution::examined::{Examined, examined};
+use crate::detection::calm::{calm, spikes};
 use crate::detection::estimate::estimate;
 use crate::detection::space::Space;
 use crate::levels::PLANNED;
 use crate::noise::law::{NoiseLaw, NoiseSource};
-use crate::noise::spikes::Spikes;
 use crate::options::Options;
 
 /// Most steps towards a size at which amplitude and signature belong together.
@@ -53,8 +53,8 @@ pub(crate) fn prove(
     trials: usize,
 ) -> Trials {
     let readings = model.linearised();
-    let spikes = Spikes::new(model);
-    let tails = spikes.calmed(model, &readings).tails;
+    let spikes = spikes(model);
+    let tails = calm(model, &spikes, &readings).tails;
     let context = Context::new(
         model,
         catalogue,

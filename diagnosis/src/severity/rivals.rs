@@ -7,11 +7,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::attribution::context::Context;
+use crate::detection::calm::spikes;
 use crate::detection::dictionary::{Entry, Meaning};
 use crate::detection::null::{BATCH, seen, statistics};
 use crate::levels::{INVISIBLE, SAME};
 use crate::noise::law::draw_scatter;
-use crate::noise::spikes::Spikes;
 use crate::search::Reach;
 use crate::severity::grounds::{Ground, Grounds};
 use crate::severity::stage::Name;
@@ -109,7 +109,7 @@ impl Drawn {
             Family::Effect(k) => effects(context, name, k, most, &mut random),
             family => of_no_effect(grounds, context, name, family, most, &mut random),
         };
-        let spikes = Spikes::new(context.model);
+        let spikes = spikes(context.model);
         let mut readings = DMatrix::zeros(context.space.readings(), BATCH);
         for (k, gap) in gaps.iter().enumerate() {
             let draw = batch * BATCH + k;

@@ -9,11 +9,11 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::attribution::context::{Cause, Context};
+use crate::detection::calm::spikes;
 use crate::detection::null::{BATCH, Tail};
 use crate::levels::{ADEQUATE, CONFIRMED, LAW_LEFT, LAW_ODDS};
 use crate::noise::dependence::Dependence;
 use crate::noise::law::{NoiseLaw, draw_scatter};
-use crate::noise::spikes::Spikes;
 use crate::options::Options;
 use crate::symbolic::evidence::evidence;
 use crate::symbolic::grammar::{Grammar, Term};
@@ -139,7 +139,7 @@ impl<'a> Bench<'a> {
 
     /// Noise of all readings.
     pub fn noise(&self, draw: usize, random: &mut ChaCha8Rng) -> DVector<f64> {
-        let spikes = Spikes::new(self.model);
+        let spikes = spikes(self.model);
         self.law.draw_possible(self.model, &spikes, draw, random) + draw_scatter(self.model, random)
     }
 

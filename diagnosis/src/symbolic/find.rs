@@ -5,9 +5,10 @@ use nalgebra::DVector;
 use serde::Serialize;
 
 use crate::catalogue::tabulated::Tabulated;
+use crate::detection::calm::calmed;
 use crate::detection::estimate::estimate;
 use crate::noise::law::NoiseLaw;
-use crate::noise::spikes::{Tails, calmed};
+use crate::noise::spikes::Tails;
 use crate::options::Options;
 use crate::symbolic::bench::{Accepted, Bench, Refusal};
 use crate::symbolic::injected::{Power, power};

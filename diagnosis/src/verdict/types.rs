@@ -369,6 +369,7 @@ impl NoiseOut {
                 NoiseSource::Repeats => "repeats",
                 NoiseSource::Stated => "stated",
                 NoiseSource::Neighbours => "neighbours",
+                NoiseSource::Residuals => "residuals",
             },
             degrees_of_freedom: Some(law.freedom).filter(|freedom| freedom.is_finite()),
             between_channels: dependence.between_channels.as_ref().map(|both| {

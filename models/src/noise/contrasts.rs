@@ -1,10 +1,8 @@
 //! Differences between repeats of a trace, and how likely a law of noise makes them.
 
+use super::LONG;
 use super::likelihood::{Likelihood, Likelihoods, OfWhole};
 use super::posterior::NoiseValues;
-
-/// A trace of this many readings can show what is correlated along it.
-const LONG: usize = 20;
 
 /// Contrasts of repeats: orthonormal combinations over the repeats of a trace, orthogonal to what all
 /// repeats have in common. Each has the covariance of one trace.

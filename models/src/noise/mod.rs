@@ -11,9 +11,14 @@ mod law;
 mod likelihood;
 mod moments;
 mod posterior;
+mod without_lines;
 
 pub use contrasts::Contrasts;
 pub use law::{Law, about_middle, decays, drift_form, markov_form};
 pub use likelihood::{Likelihood, Likelihoods, OfWhole};
 pub use moments::Moments;
 pub use posterior::{NoiseValues, Possible, Posterior};
+pub use without_lines::WithoutLines;
+
+/// A trace of this many readings can show what is correlated along it.
+const LONG: usize = 20;

@@ -151,6 +151,12 @@ impl Posterior {
         &self.possible
     }
 
+    /// Probability of laws in which a part is correlated along traces.
+    pub fn correlated(&self) -> f64 {
+        let own = self.possible.iter().filter(|p| p.law.correlated > 0.0);
+        own.map(|p| p.probability).sum()
+    }
+
     /// The mean of the laws.
     pub fn mean(&self) -> Law {
         let mean = |of: fn(&Law) -> f64| {

@@ -35,6 +35,16 @@ pub fn words(
                 shared.map_or(String::new(), |s| together(s.correlation))
             );
         }
+        NoiseOrigin::BetweenChannels { law } => {
+            let part = |variance: f64| number::plain(variance.sqrt(), 2);
+            return format!(
+                "from what the channels read against each other, whatever the forms are, {of}: white {} µm, correlated \
+                 along a trace {} µm over {} mm; nothing is repeated, so that what the model misses would look the same",
+                part(law.white),
+                part(law.correlated),
+                number::plain(law.length, 2)
+            );
+        }
         NoiseOrigin::Declared => "declared in the set-up".to_owned(),
         NoiseOrigin::Residuals => {
             format!("from the residuals, {of}, {freedom:.0} degrees of freedom")

@@ -208,6 +208,7 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         degrees_of_freedom: fit.degrees_of_freedom,
         noise_law: match fit.noise_origin {
             NoiseOrigin::Repeats { law, shared } => Some((law, shared.map(|s| s.correlation))),
+            NoiseOrigin::BetweenChannels { law } => Some((law, None)),
             _ => None,
         },
         noise_freedom: freedom(fit.tilts().iter().map(|t| t.degrees_of_freedom)),

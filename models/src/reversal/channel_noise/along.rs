@@ -10,6 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::between;
 use super::gathered::{Cells, Derivatives, Gathered, ones};
 use super::laws::{Laws, Products};
 use super::pairs::{Pair, Pairs};
@@ -74,11 +75,7 @@ impl AlongTraces {
         survey: &Survey,
         residuals: &[Vec<f64>],
     ) -> Result<Option<Self>, NoValue> {
-        let weighted: Vec<Vec<f64>> = residuals
-            .iter()
-            .zip(fit.weights)
-            .map(|(own, weight)| own.iter().map(|r| weight * r).collect())
-            .collect();
+        let weighted = times(residuals, fit.weights);
         let ones = ones(fit.weights);
         let mut contrasts = Contrasts::default();
         for group in &survey.repeats {
@@ -93,6 +90,27 @@ impl AlongTraces {
         let gathered = Gathered::new(&fit.row, survey, &survey.repeats, fit.weights)?;
         let together = Pairs::of(survey, &gathered, fit.weights)
             .and_then(|pairs| Together::new(pairs, survey, &weighted, &ones));
+        let mut along = Self::with(gathered, apart, together);
+        along.missed = along.missed(fit, survey, &weighted);
+        Ok(Some(along))
+    }
+
+    /// The laws that channels allow against each other where nothing is repeated; `None` where noise may be white.
+    pub fn between_channels<R: Fn(usize, usize) -> Result<Derivatives, NoValue>>(
+        fit: &AtRest<R>,
+        survey: &Survey,
+        residuals: &[Vec<f64>],
+    ) -> Result<Option<Self>, NoValue> {
+        let weighted = times(residuals, fit.weights);
+        let Some((groups, posterior)) = between::correlated(survey, &weighted, fit.weights) else {
+            return Ok(None);
+        };
+        let gathered = Gathered::new(&fit.row, survey, &groups, fit.weights)?;
+        Ok(Some(Self::with(gathered, posterior, None)))
+    }
+
+    /// Nothing missed as yet.
+    fn with(gathered: Gathered, apart: Posterior, together: Option<Together>) -> Self {
         let (cells, readings) = gathered
             .traces
             .iter()
@@ -100,15 +118,13 @@ impl AlongTraces {
             .fold((0.0, 0.0), |(c, r), row| (c + 1.0, r + row.count));
         let positions = gathered.traces.iter().map(|t| &t.positions[..]);
         let apart = Laws::new(apart, positions);
-        let mut along = Self {
+        Self {
             gathered,
             apart,
             together,
             missed: (0.0, 1.0),
             readings_a_cell: readings / f64::max(cells, 1.0),
-        };
-        along.missed = along.missed(fit, survey, &weighted);
-        Ok(Some(along))
+        }
     }
 
     /// The variance of a combination in weighted units, and its degrees of freedom.
@@ -303,6 +319,13 @@ impl AlongTraces {
             .sum();
         sum / PROBES as f64
     }
+}
+
+/// Residuals in weighted units.
+fn times(residuals: &[Vec<f64>], weights: &[f64]) -> Vec<Vec<f64>> {
+    let all = residuals.iter().zip(weights);
+    all.map(|(own, weight)| own.iter().map(|r| weight * r).collect())
+        .collect()
 }
 
 impl Together {

@@ -7,6 +7,7 @@
 
 pub mod alike;
 pub mod along;
+mod between;
 pub mod gathered;
 pub mod heights;
 pub mod laws;
@@ -61,6 +62,11 @@ impl Seat {
     /// Whether one indicator reads both.
     pub fn has_indicator_of(&self, other: &Self) -> bool {
         is_same(self.indicator, other.indicator)
+    }
+
+    /// Whether the spindle stands alike in both.
+    pub fn is_at_the_spindle_of(&self, other: &Self) -> bool {
+        is_same(self.spindle, other.spindle)
     }
 
     /// Whether two indicators that stand opposite each other read both at one position of the spindle.

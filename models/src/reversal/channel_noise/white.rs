@@ -80,7 +80,34 @@ impl Told {
         (of_weight * self.unit).hypot(self.shift_um2.sqrt())
     }
 
-    /// The laws of noise that repeats allow; `None` where they do not tell.
+    /// The law of noise that channels tell against each other where nothing is repeated; `None` where it may be white.
+    /// Whether model and readings agree is then not known: what the model misses would look like such noise.
+    fn between_channels<R: Fn(usize, usize) -> Result<Derivatives, NoValue>>(
+        fit: &AtRest<R>,
+        survey: &Survey,
+        residuals: &[Vec<f64>],
+        sigmas: &[f64],
+    ) -> Result<Option<Self>, NoValue> {
+        let found = AlongTraces::between_channels(fit, survey, residuals)?;
+        Ok(found.map(|along| {
+            let law = along.law();
+            Self {
+                unit: law.of_readings().sqrt(),
+                shift_um2: 0.0,
+                origin: NoiseOrigin::BetweenChannels {
+                    law: law.times(rms(sigmas).powi(2)),
+                },
+                agreement: Agreement {
+                    disagree: None,
+                    missed: 0.0,
+                },
+                scatter: Scatter::Along(Arc::new(along)),
+            }
+        }))
+    }
+
+    /// The laws of noise that repeats allow, or channels against each other where there are none; `None` where they do not
+    /// tell.
     ///
     /// # Errors
     /// [`NoValue`] where a reading has no derivatives.
@@ -90,6 +117,9 @@ impl Told {
         residuals: &[Vec<f64>],
         sigmas: &[f64],
     ) -> Result<Option<Self>, NoValue> {
+        if survey.repeats.is_empty() {
+            return Self::between_channels(fit, survey, residuals, sigmas);
+        }
         let Some(along) = AlongTraces::new(fit, survey, residuals)? else {
             return Ok(None);
         };

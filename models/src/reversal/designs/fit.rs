@@ -159,7 +159,7 @@ fn not_converged(problem: &DesignProblem, fit: &StructuredFit) -> DesignFitError
     }
 }
 
-/// What the fit tells of its noise: white, unless repeats tell more.
+/// What the fit tells of its noise: white, unless repeats or channels tell more.
 fn told(
     problem: &DesignProblem,
     settled: &Settled,
@@ -169,7 +169,7 @@ fn told(
     options: &DesignOptions,
 ) -> Result<Told, DesignFitError> {
     let white = Told::white(problem, settled, sigmas, options.noise, Loss::Quadratic);
-    if options.is_declared() || survey.repeats.is_empty() {
+    if options.is_declared() {
         return Ok(white);
     }
     let prepared = problem.at(&settled.fit.parameters)?;

@@ -150,8 +150,8 @@ fn solve(
     solution.finer = forms;
     is_determined(&solution, &solution.covariance, channels, &problem.weights)?;
     let declared = matches!(options.noise, Noise::Declared(_));
-    if !declared && options.loss == Loss::Quadratic && !survey.repeats.is_empty() {
-        learn_from_repeats(&mut solution, &problem, survey, &settled, &sigmas)?;
+    if !declared && options.loss == Loss::Quadratic {
+        learn_law(&mut solution, &problem, survey, &settled, &sigmas)?;
     }
     let (fit, residuals) = (&settled.fit, &settled.residuals);
     let ends = survey.spread_of_ends();
@@ -239,8 +239,8 @@ pub(super) fn not_converged(problem: &Reversal, fit: &StructuredFit) -> Reversal
     }
 }
 
-/// Puts the laws of noise that repeats allow in the place of white noise, where they tell.
-fn learn_from_repeats(
+/// Puts the laws of noise that repeats allow, or channels against each other, in the place of white noise, where they tell.
+fn learn_law(
     solution: &mut Simultaneous,
     problem: &Reversal,
     survey: &Survey,

@@ -75,7 +75,7 @@ pub fn monte_carlo(
     let laws = laws(solution);
     let shared = match solution.noise_origin {
         NoiseOrigin::Repeats { shared, .. } => shared,
-        NoiseOrigin::Declared | NoiseOrigin::Residuals => None,
+        _ => None,
     };
     let times = times(observations);
     let joined = solution.joined(observations, &times);
@@ -196,7 +196,7 @@ fn laws(solution: &Simultaneous) -> Vec<Law> {
     let variances = || solution.noise.iter().map(|n| n.sigma * n.sigma);
     match solution.noise_origin {
         // Shifts and drifts are as great in channels of any noise.
-        NoiseOrigin::Repeats { law, .. } => variances()
+        NoiseOrigin::Repeats { law, .. } | NoiseOrigin::BetweenChannels { law } => variances()
             .map(|v| {
                 let own = (v - law.shift) / law.of_readings().max(f64::MIN_POSITIVE);
                 Law {

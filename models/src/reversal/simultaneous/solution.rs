@@ -86,6 +86,11 @@ pub enum NoiseOrigin {
     Declared,
     /// White, from what the fit leaves of the readings.
     Residuals,
+    /// From what channels read against each other, free of forms, where nothing is repeated.
+    BetweenChannels {
+        /// Variances of the parts of one reading, µm².
+        law: Law,
+    },
     /// From what differs between repeats.
     Repeats {
         /// Variances of the parts of one reading, µm².

@@ -84,6 +84,7 @@ pub fn json(o: &Outcome) -> Result<Value, Message> {
             "noise_source": match fit.noise_origin {
                 NoiseOrigin::Declared => "declared",
                 NoiseOrigin::Residuals => "residuals",
+                NoiseOrigin::BetweenChannels { .. } => "channels",
                 NoiseOrigin::Repeats { .. } => "repeats",
             },
             "noise_words": o.noise_words(),
@@ -95,6 +96,14 @@ pub fn json(o: &Outcome) -> Result<Value, Message> {
                     "shift": law.shift.sqrt(),
                     "drift": 1e-3 * law.drift.sqrt(),
                     "between_indicators": shared.map(|s| s.correlation),
+                }),
+                NoiseOrigin::BetweenChannels { law } => json!({
+                    "white": law.white.sqrt(),
+                    "correlated": law.correlated.sqrt(),
+                    "length": law.length,
+                    "shift": 0.0,
+                    "drift": 0.0,
+                    "between_indicators": Value::Null,
                 }),
                 _ => Value::Null,
             },

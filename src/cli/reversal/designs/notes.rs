@@ -174,6 +174,9 @@ pub(super) fn warnings(
     if fit.knots.verdict == KnotVerdict::TooFew {
         let counted = match fit.noise_origin {
             NoiseOrigin::Repeats { .. } => "; the uncertainties follow the law of the repeats",
+            NoiseOrigin::BetweenChannels { .. } => {
+                "; the uncertainties count it as correlated noise"
+            }
             _ if fit.agreement.disagree == Some(true) => "",
             _ => "; the uncertainties are too small then",
         };

@@ -250,6 +250,12 @@ fn notes(context: &Context<'_>, clean: &DVector<f64>, calm: &Calmed) -> Vec<Stri
             "The noise is not measured: there are no repeats. It is taken from differences of neighbouring readings, so anything rougher than the spacing counts as noise; measure at least three repeats."
                 .to_owned(),
         );
+    } else if context.law.source == NoiseSource::Residuals {
+        notes.push(format!(
+            "The noise is not measured: there are no repeats. It is told from all that the fit leaves, correlated along its traces over {} {}: an effect as smooth and as small as such noise would look the same. Measure at least three repeats to tell them apart.",
+            plain(context.law.parts.length, 2),
+            for_people(context.model.position_unit())
+        ));
     } else if context.law.source == NoiseSource::Stated {
         notes.push(stated(context, clean));
     }

@@ -52,8 +52,8 @@ pub fn words(
     };
     match supposed() {
         Some((length, quantity, factor)) => format!(
-            "{source}; taken as independent from reading to reading, which only repeats would \
-             show: were half of its variance correlated over {} mm along a trace, u of {quantity} would be \
+            "{source}; taken as independent from reading to reading, of which repeats would tell \
+             more: were half of its variance correlated over {} mm along a trace, u of {quantity} would be \
              {} times as large",
             number::plain(length, 2),
             number::plain(factor, 2)

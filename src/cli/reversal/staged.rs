@@ -130,7 +130,18 @@ fn noise_words(s: &Staged) -> String {
             number::plain(other.sigma, 3)
         );
     }
-    words + "; taken as equal in all channels and independent from reading to reading"
+    match s.correlated {
+        Some(law) => {
+            words
+                + &format!(
+                    "; taken as equal in all channels, and a part of {} µm as correlated over {} mm along a trace, as the \
+                     closure profile is, which tilts are told with",
+                    number::plain(law.correlated.sqrt(), 2),
+                    number::plain(law.length, 2)
+                )
+        }
+        None => words + "; taken as equal in all channels and independent from reading to reading",
+    }
 }
 
 fn method_errors(s: &Staged) -> Vec<(String, f64, String)> {

@@ -138,10 +138,14 @@ pub(super) fn correlated(
             add(&found);
         }
     }
-    let posterior = Posterior::of(&values)?;
+    let posterior = Posterior::of(&values).filter(may_be_noise)?;
+    Some((passes.groups, posterior))
+}
+
+/// Whether a part is likelier to be correlated along a trace than not, and no greater than noise may be.
+pub fn may_be_noise(posterior: &Posterior) -> bool {
     let law = posterior.mean();
-    let is_noise = law.correlated <= MOST_CORRELATED * law.white;
-    (posterior.correlated() > 0.5 && is_noise).then_some((passes.groups, posterior))
+    posterior.correlated() > 0.5 && law.correlated <= MOST_CORRELATED * law.white
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 
 pub mod alike;
 pub mod along;
-mod between;
+pub mod between;
 pub mod gathered;
 pub mod heights;
 pub mod laws;

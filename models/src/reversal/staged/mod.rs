@@ -6,6 +6,7 @@
 //! `docs/theory/reversal-staged.md`.
 
 mod answers;
+mod correlated;
 mod designs;
 mod drift;
 mod estimates;
@@ -32,6 +33,7 @@ pub use trace::Trace;
 use super::cells::Union;
 use super::convention::{Contrast, Convention};
 use super::{Channel, Observations};
+use crate::noise::Law;
 use designs::Designs;
 use estimates::rms;
 use forms::{rotated_together, sheared_together, take_tilt_out};
@@ -186,6 +188,9 @@ pub struct Staged {
     pub noise: Noise,
     /// Every noise figure at hand, the one in use first.
     pub noise_figures: Vec<Noise>,
+    /// The law of the noise of the mean of a channel's traces, µm², as the closure tells it, where a part is likelier to be
+    /// correlated along a trace than not.
+    pub correlated: Option<Law>,
 }
 
 /// The names of the forms.
@@ -204,7 +209,7 @@ const MOST: f64 = std::f64::consts::FRAC_PI_4;
 pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, NoSolution> {
     check(observations, options)?;
     let (mut traces, levelled_um) = Trace::all(observations);
-    let drifts = drift::take_out(observations, &mut traces);
+    let mut drifts = drift::take_out(observations, &mut traces);
     let channels: Vec<Channel> = traces.iter().map(|t| t.channel).collect();
     let designs = Designs::of(&channels);
     let first = fit_lines(&traces)?;
@@ -238,6 +243,19 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
     let closing = (traces.len() == 4).then(|| together.closure(&designs, &joint));
     let noise_figures = noise_figures(options, &traces, closing.as_ref());
     let noise = *noise_figures.first().ok_or(NoSolution::NoReadings)?;
+    let by_closure = noise_figures
+        .iter()
+        .find(|n| n.source == NoiseSource::Closure);
+    let correlated = match (&closing, by_closure) {
+        // A closure that repeats do not explain is no noise.
+        (Some((x, profile, _)), Some(told))
+            if noise.source != NoiseSource::Declared && noise.exceeded_by(told).is_none() =>
+        {
+            let white = joint.slopes().diagonal() * noise.sigma.powi(2);
+            correlated::add(&mut drifts, &traces, (x, profile), white.as_slice())
+        }
+        _ => None,
+    };
     let known = noise.degrees_of_freedom.unwrap_or(f64::INFINITY);
     let sheared = sheared_slopes(&traces, &estimates);
     let tilts = Tilts::of(&joint, (noise.sigma, known), &drifts, &sheared);
@@ -280,6 +298,7 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
         closure,
         noise,
         noise_figures,
+        correlated,
     };
     staged.residual.rms = rms(staged.residuals().iter().flat_map(|(_, r)| r));
     Ok(staged)

@@ -1,0 +1,42 @@
+//! Noise that is correlated along traces, as the closure profile tells it.
+//!
+//! (R1A + R1B − R2A − R2B)/2 has the covariance of the noise of one trace, whatever the forms are. White noise makes a slope
+//! sure by n^−3/2; of noise that is correlated over many readings there are fewer independent ones.
+
+use super::drift::Drifts;
+use super::trace::Trace;
+use crate::noise::{Law, Posterior, WithoutLines, decays, markov_form};
+use crate::reversal::channel_noise::between::may_be_noise;
+
+/// Adds to the covariance of the channels' slopes what correlated noise adds to that of white noise, `slopes` (variances,
+/// (µm/mm)²), and of drifts, and gives its law for the mean of a channel's traces; nothing where it is likelier to be white. `closure`: the profile
+/// (R1A + R1B − R2A − R2B)/4 at the positions of all traces, µm.
+pub(super) fn add(
+    drifts: &mut Drifts,
+    traces: &[Trace],
+    (x, closure): (&[f64], &[f64]),
+    slopes: &[f64],
+) -> Option<Law> {
+    let as_often = |t: &Trace| t.count.iter().all(|n| *n == traces[0].count[0]);
+    if !traces.iter().all(|t| t.x == x && as_often(t)) {
+        return None;
+    }
+    let mut values = WithoutLines::default();
+    values.add(x, closure.iter().map(|c| 2.0 * c).collect());
+    let posterior = Posterior::of(&values).filter(may_be_noise)?;
+    let middle = x.iter().sum::<f64>() / x.len() as f64;
+    let spread: f64 = x.iter().map(|x| (x - middle).powi(2)).sum();
+    let weights: Vec<f64> = x.iter().map(|x| (x - middle) / spread).collect();
+    let white = 1.0 / spread;
+    let of = posterior.possible().iter().map(|p| {
+        let along = markov_form(&decays(x, p.law.length), &weights, &weights);
+        p.law.white * white + p.law.correlated * along
+    });
+    let (variance, freedom) = posterior.variance(&of.collect::<Vec<f64>>());
+    for (c, white) in slopes.iter().enumerate() {
+        let own = drifts.covariance[(c, c)];
+        drifts.covariance[(c, c)] = own.max(variance - white);
+    }
+    drifts.freedom = drifts.freedom.min(freedom);
+    Some(posterior.mean())
+}

@@ -16,6 +16,7 @@ use super::laws::{Laws, Products};
 use super::pairs::{Pair, Pairs};
 use super::sum_of_squares;
 use super::survey::Survey;
+use super::traces::Group;
 use crate::noise::{Contrasts, Law, Moments, Posterior, about_middle, decays};
 use crate::reversal::simultaneous::SharedNoise;
 
@@ -28,7 +29,7 @@ const SEED: u64 = 0x7472_6163;
 const RATIO: f64 = 100.0;
 /// Probability below which it is not thought of.
 const NEGLIGIBLE: f64 = 1e-3;
-/// The means of the repeats leave more than noise where their sum of squares exceeds what the noise
+/// The means of the repeats, or traces that are not repeated, leave more than noise where their sum of squares exceeds what the noise
 /// explains by so many standard deviations.
 const CLEAR: f64 = 4.0;
 
@@ -91,7 +92,7 @@ impl AlongTraces {
         let together = Pairs::of(survey, &gathered, fit.weights)
             .and_then(|pairs| Together::new(pairs, survey, &weighted, &ones));
         let mut along = Self::with(gathered, apart, together);
-        along.missed = along.missed(fit, survey, &weighted);
+        along.missed = along.missed(fit, survey, &survey.repeats, &weighted);
         Ok(Some(along))
     }
 
@@ -106,7 +107,9 @@ impl AlongTraces {
             return Ok(None);
         };
         let gathered = Gathered::new(&fit.row, survey, &groups, fit.weights)?;
-        Ok(Some(Self::with(gathered, posterior, None)))
+        let mut along = Self::with(gathered, posterior, None);
+        along.missed = along.missed(fit, survey, &groups, &weighted);
+        Ok(Some(along))
     }
 
     /// Nothing missed as yet.
@@ -193,13 +196,19 @@ impl AlongTraces {
     ///
     /// With V the covariance of the noise and H the hat matrix their sum of squares is expected to be
     /// tr V − tr HV; the last is found by drawn signs, ηᵀHVη.
-    fn missed<R>(&self, fit: &AtRest<R>, survey: &Survey, weighted: &[Vec<f64>]) -> (f64, f64) {
+    fn missed<R>(
+        &self,
+        fit: &AtRest<R>,
+        survey: &Survey,
+        groups: &[Group],
+        weighted: &[Vec<f64>],
+    ) -> (f64, f64) {
         let mean_law = self.apart.mean();
         let shared = self.likelier().map(Together::means);
         let (mut squares, mut expected, mut variance) = (0.0, 0.0, 0.0);
         let (mut readings, mut cells) = (0.0, 0.0);
         let mut first = 0;
-        for group in &survey.repeats {
+        for group in groups {
             let traces = &self.gathered.traces[first..first + group.traces.len()];
             first += group.traces.len();
             let one = traces.first().map_or(1.0, |t| t.one);

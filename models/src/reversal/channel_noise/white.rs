@@ -80,32 +80,6 @@ impl Told {
         (of_weight * self.unit).hypot(self.shift_um2.sqrt())
     }
 
-    /// The law of noise that channels tell against each other where nothing is repeated; `None` where it may be white.
-    /// Whether model and readings agree is then not known: what the model misses would look like such noise.
-    fn between_channels<R: Fn(usize, usize) -> Result<Derivatives, NoValue>>(
-        fit: &AtRest<R>,
-        survey: &Survey,
-        residuals: &[Vec<f64>],
-        sigmas: &[f64],
-    ) -> Result<Option<Self>, NoValue> {
-        let found = AlongTraces::between_channels(fit, survey, residuals)?;
-        Ok(found.map(|along| {
-            let law = along.law();
-            Self {
-                unit: law.of_readings().sqrt(),
-                shift_um2: 0.0,
-                origin: NoiseOrigin::BetweenChannels {
-                    law: law.times(rms(sigmas).powi(2)),
-                },
-                agreement: Agreement {
-                    disagree: None,
-                    missed: 0.0,
-                },
-                scatter: Scatter::Along(Arc::new(along)),
-            }
-        }))
-    }
-
     /// The laws of noise that repeats allow, or channels against each other where there are none; `None` where they do not
     /// tell.
     ///
@@ -117,10 +91,13 @@ impl Told {
         residuals: &[Vec<f64>],
         sigmas: &[f64],
     ) -> Result<Option<Self>, NoValue> {
-        if survey.repeats.is_empty() {
-            return Self::between_channels(fit, survey, residuals, sigmas);
-        }
-        let Some(along) = AlongTraces::new(fit, survey, residuals)? else {
+        let repeated = !survey.repeats.is_empty();
+        let found = if repeated {
+            AlongTraces::new(fit, survey, residuals)
+        } else {
+            AlongTraces::between_channels(fit, survey, residuals)
+        };
+        let Some(along) = found? else {
             return Ok(None);
         };
         let (law, missed) = (along.law(), along.missed_variance());
@@ -128,9 +105,15 @@ impl Told {
         Ok(Some(Self {
             unit: law.of_readings().sqrt(),
             shift_um2: law.shift * mean_square,
-            origin: NoiseOrigin::Repeats {
-                law: law.times(mean_square),
-                shared: along.shared(mean_square),
+            origin: if repeated {
+                NoiseOrigin::Repeats {
+                    law: law.times(mean_square),
+                    shared: along.shared(mean_square),
+                }
+            } else {
+                NoiseOrigin::BetweenChannels {
+                    law: law.times(mean_square),
+                }
             },
             agreement: Agreement {
                 disagree: Some(missed > 0.0),

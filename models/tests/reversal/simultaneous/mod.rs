@@ -5,6 +5,7 @@ mod effects;
 mod few_positions;
 mod minimum;
 mod noise;
+mod one_pass;
 mod own_positions;
 mod plan;
 mod refusals;

@@ -7,14 +7,14 @@ use errsep_models::reversal::simulate::{Plan, simulate};
 use errsep_models::reversal::simultaneous::{
     Knots, Noise, NoiseOrigin, Options, ReversalError, Simultaneous, Thickness, fit,
 };
-use errsep_models::reversal::{Channel, Observations, staged};
+use errsep_models::reversal::{Channel, Direction, Observations, staged};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::plan::*;
 
-fn plain() -> Options {
+pub fn plain() -> Options {
     Options {
         thickness: Thickness::Known(42.0),
         ..Options::default()
@@ -22,18 +22,25 @@ fn plain() -> Options {
 }
 
 /// Noise of a law on every trace of readings without any.
-fn with_noise(mut data: Observations, law: &Law, seed: u64) -> Observations {
+pub fn with_noise(mut data: Observations, law: &Law, seed: u64) -> Observations {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let repeats = data.readings.iter().map(|r| r.repeat).max().unwrap_or(1);
+    let passes = (1..=repeats).flat_map(|repeat| {
+        [Direction::Forward, Direction::Backward].map(|direction| (repeat, direction))
+    });
+    let passes: Vec<_> = passes.collect();
     for channel in Channel::ALL {
-        for repeat in 1..=repeats {
+        for (repeat, direction) in &passes {
             let own: Vec<usize> = (0..data.readings.len())
                 .filter(|i| {
                     let r = &data.readings[*i];
-                    r.channel == channel && r.repeat == repeat
+                    (r.channel, r.repeat, r.direction) == (channel, *repeat, *direction)
                 })
                 .collect();
             let x: Vec<f64> = own.iter().map(|i| data.readings[*i].x).collect();
+            if own.is_empty() {
+                continue;
+            }
             let mut noise = vec![0.0; x.len()];
             law.draw(&x, &mut random, &mut noise);
             for (i, e) in own.iter().zip(noise) {

@@ -1,0 +1,77 @@
+//! Channels that are read once each: noise that is correlated along traces.
+
+use errsep_models::noise::Law;
+use errsep_models::reversal::simulate::simulate;
+use errsep_models::reversal::simultaneous::{NoiseOrigin, fit};
+use errsep_models::reversal::staged;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::noise::{plain, with_noise};
+use super::plan::{spline_plan, truths};
+
+const SEEDS: u64 = 24;
+
+/// Half of the variance correlated over 15 mm of 300, 0.1 µm in all.
+const LAW: Law = Law {
+    white: 0.005,
+    correlated: 0.005,
+    length: 15.0,
+    shift: 0.0,
+    drift: 0.0,
+};
+
+/// How many of the tilts of all seeds lie within their 95 % intervals: simultaneous and staged; and how often the fit tells
+/// correlated noise, and a misfit.
+fn counted(law: &Law) -> ([usize; 2], usize, usize) {
+    let (mut inside, mut correlated, mut disagree) = ([0; 2], 0, 0);
+    for seed in 0..SEEDS {
+        let (mut plan, _) = spline_plan(10, 61, 0.0, seed);
+        plan.gamma_rad = 20e-6;
+        plan.both_directions = true;
+        let (exact, truth) = simulate(&plan, &[]).unwrap();
+        let readings = with_noise(exact, law, seed);
+        let found = fit(&readings, &plain()).unwrap();
+        let is_told = matches!(found.noise_origin, NoiseOrigin::BetweenChannels { .. });
+        correlated += usize::from(is_told);
+        disagree += usize::from(found.agreement.disagree == Some(true));
+        let options = staged::Options {
+            thickness: Some(42.0),
+            ..staged::Options::default()
+        };
+        let stages = staged::solve(&readings, &options).unwrap();
+        let of_stages = stages.slope_freedom.unwrap_or(f64::INFINITY);
+        let mut count = |which: usize, name: &str, value: f64, std: f64, freedom: f64| {
+            let truth = truths(&truth).iter().find(|t| t.0 == name).unwrap().1;
+            let law = StudentsT::new(0.0, 1.0, freedom.min(1e6)).unwrap();
+            inside[which] += usize::from((value - truth).abs() < law.inverse_cdf(0.975) * std);
+        };
+        for tilt in found.tilts() {
+            let (angle, freedom) = (tilt.angle, tilt.degrees_of_freedom);
+            count(0, &tilt.name, angle.value, angle.std, freedom);
+        }
+        for tilt in &stages.tilts {
+            count(1, &tilt.name, tilt.angle.value, tilt.angle.std, of_stages);
+        }
+    }
+    (inside, correlated, disagree)
+}
+
+/// *Simulated truth*, 24 seeds, 72 tilts: 95 % intervals hold 68.4 of them, with a standard deviation of 1.8; 61 is four below.
+/// With noise taken as white they hold some 52.
+#[test]
+fn intervals_hold_the_tilts_where_noise_is_correlated() {
+    let (inside, correlated, disagree) = counted(&LAW);
+    assert!(inside.iter().all(|n| *n >= 61), "{inside:?} of 72");
+    assert!(correlated >= 20, "{correlated}");
+    assert_eq!(disagree, 0);
+}
+
+/// *Limit*: white noise is rarely taken for correlated, and intervals hold as before. Even odds are wrong at most half of the
+/// time; at one in five 12 of 24 have 0.1 %.
+#[test]
+fn white_noise_stays_white() {
+    let (inside, correlated, disagree) = counted(&Law::of_white(0.01));
+    assert!(inside.iter().all(|n| *n >= 61), "{inside:?} of 72");
+    assert!(correlated < 12, "{correlated}");
+    assert_eq!(disagree, 0);
+}

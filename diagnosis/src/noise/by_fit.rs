@@ -10,7 +10,8 @@ use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::DVector;
 
 use crate::levels::KEPT;
-use crate::noise::spikes::{Heights, Pile, Residual, edge, over_neighbours, stands_out};
+use crate::noise::piles::{Heights, Pile, edge, over_neighbours, stands_out};
+use crate::noise::spikes::Residual;
 
 /// Rounds in which readings are pulled in: the fit follows a reading that is off, and leaves a part of it.
 const ROUNDS: usize = 6;

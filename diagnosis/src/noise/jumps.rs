@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::noise::contrasts::Contrasts;
 use crate::noise::law::{NoiseLaw, NoiseSource};
-use crate::noise::spikes::{Group, groups};
+use crate::noise::piles::{Group, groups};
 
 /// The readings without the jump, of any channel, that a law of the noise makes likelier most without it; whether it is
 /// one at all the law does not say, which may hold the jump itself.

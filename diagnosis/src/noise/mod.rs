@@ -7,6 +7,7 @@ mod course;
 pub(super) mod dependence;
 pub(super) mod jumps;
 pub(super) mod law;
+pub(super) mod piles;
 pub(super) mod posterior;
 pub(super) mod spikes;
 pub(super) mod steps;

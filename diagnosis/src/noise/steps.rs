@@ -8,7 +8,7 @@ use errsep_models::model::{AnyModel, FittedModel};
 use nalgebra::{DMatrix, DVector};
 
 use crate::levels::{AS_BESIDE, KEPT, LASTING_STEP, MOST_STEPS, STAYS, STAYS_FREEDOM, STEP};
-use crate::noise::spikes::{Group, SIGMA, groups, median};
+use crate::noise::piles::{Group, SIGMA, groups, median};
 
 /// Readings on either side that tell its height.
 const SIDE: usize = 8;

@@ -200,7 +200,7 @@ mod tests {
                 shift: 0.0,
             };
             let each = (0..30).filter(|seed| {
-                let model = model(61, noise.clone(), *seed);
+                let model = model(61, noise, *seed);
                 let found = by_residuals(&model, &[&model.linearised()], 0.1).unwrap();
                 found[0].any.log_evidence - found[0].white > crate::levels::LIKELIER_BY_CORRELATION
             });

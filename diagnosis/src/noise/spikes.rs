@@ -48,9 +48,12 @@ impl Tails {
     }
 }
 
+/// What is left of readings.
+type Left = dyn Fn(&DVector<f64>) -> DVector<f64> + Send + Sync;
+
 /// What a fit leaves of readings whose noise is white.
 pub(crate) struct Residual {
-    pub of: Box<dyn Fn(&DVector<f64>) -> DVector<f64> + Send + Sync>,
+    pub of: Box<Left>,
     /// Its degrees of freedom.
     pub freedom: usize,
 }

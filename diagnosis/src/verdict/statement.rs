@@ -5,7 +5,9 @@ use crate::levels::MOSTLY;
 use crate::planning::splitting::Split;
 use crate::severity::{Confidence, JUMP, NO_NOISE, Severity, TOGETHER};
 use crate::verdict::told::for_people;
-use crate::verdict::types::{Fingerprint, Gap, Hidden, Kind, NoiseOut, Verdict, Where};
+use crate::verdict::types::{
+    Fingerprint, Gap, Hidden, Kind, NOT_REPEATED, NoiseOut, Verdict, Where,
+};
 use errsep_models::number::{percent, plain, probability};
 
 /// The sentence.
@@ -28,7 +30,7 @@ pub(crate) fn statement(
         format!(", {part} in {} {}{range}", p.axis, p.value)
     });
     match verdict.kind {
-        Kind::None => nothing(gap, hidden),
+        Kind::None => nothing((gap, noise), hidden),
         Kind::Unknown => {
             let missed = if gap.before.rms > 0.0 {
                 format!("The model misses {}{place}", gap.before.in_words(gap.unit))
@@ -66,7 +68,7 @@ pub(crate) fn statement(
 }
 
 /// No gap, and what would not have shown.
-fn nothing(gap: &Gap, hidden: &[Hidden]) -> String {
+fn nothing((gap, noise): (&Gap, &NoiseOut), hidden: &[Hidden]) -> String {
     let said = |implausible: bool, what: &str| {
         let names: Vec<&str> = hidden
             .iter()
@@ -79,15 +81,26 @@ fn nothing(gap: &Gap, hidden: &[Hidden]) -> String {
             format!("; {} would {what}", names.join(", "))
         }
     };
-    format!(
-        "No significant misfit at a noise of {} {}{}{}{}.",
+    let level = format!(
+        "{} {}{}",
         gap.noise_figure(),
         for_people(gap.unit),
         if gap.is_of_means() {
             format!(" in {}", gap.of_what())
         } else {
             String::new()
-        },
+        }
+    );
+    let begin = if noise.source == NOT_REPEATED {
+        format!(
+            "Nothing stands out of a noise of {level} that is correlated along its traces, as these readings alone tell \
+             it: without repeats a smooth cause looks the same"
+        )
+    } else {
+        format!("No significant misfit at a noise of {level}")
+    };
+    format!(
+        "{begin}{}{}.",
         said(false, "not show in such readings whatever their size"),
         said(true, "show only at sizes that are not plausible")
     )

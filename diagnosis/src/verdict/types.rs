@@ -356,6 +356,9 @@ pub struct Uneven {
     pub p_value: f64,
 }
 
+/// The source of a noise that is told from all that the fit leaves, where nothing is repeated.
+pub(crate) const NOT_REPEATED: &str = "residuals";
+
 impl NoiseOut {
     pub(crate) fn of(model: &AnyModel, law: &NoiseLaw, dependence: &Dependence) -> Self {
         use crate::noise::law::NoiseSource;
@@ -369,7 +372,7 @@ impl NoiseOut {
                 NoiseSource::Repeats => "repeats",
                 NoiseSource::Stated => "stated",
                 NoiseSource::Neighbours => "neighbours",
-                NoiseSource::Residuals => "residuals",
+                NoiseSource::Residuals => NOT_REPEATED,
             },
             degrees_of_freedom: Some(law.freedom).filter(|freedom| freedom.is_finite()),
             between_channels: dependence.between_channels.as_ref().map(|both| {

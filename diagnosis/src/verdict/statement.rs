@@ -93,7 +93,7 @@ fn nothing((gap, noise): (&Gap, &NoiseOut), hidden: &[Hidden]) -> String {
     );
     let begin = if noise.source == NOT_REPEATED {
         format!(
-            "Nothing stands out of a noise of {level} that is correlated along its traces, as these readings alone tell \
+            "No significant misfit at a noise of {level} that is correlated along its traces, as these readings alone tell \
              it: without repeats a smooth cause looks the same"
         )
     } else {

@@ -25,6 +25,11 @@ pub(crate) fn spikes(model: &AnyModel) -> Spikes {
     })
 }
 
+/// The same for draws of a law with heavy tails; nothing where it has none.
+pub(crate) fn spikes_of_draws(model: &AnyModel, law: &NoiseLaw) -> Option<Spikes> {
+    law.has_tails().then(|| spikes(model))
+}
+
 /// Readings with their spikes pulled in, and the law of heavy tails where they have them.
 pub(crate) fn calm(model: &AnyModel, spikes: &Spikes, readings: &DVector<f64>) -> Calmed {
     let calmed = spikes.calmed(model, readings);

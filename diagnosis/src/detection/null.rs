@@ -14,7 +14,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use crate::detection::calm::spikes;
+use crate::detection::calm::spikes_of_draws;
 use crate::detection::dictionary::{Dictionary, Family, inverse, surprise};
 use crate::detection::folding::Sums;
 use crate::detection::space::Space;
@@ -119,11 +119,20 @@ impl NullLaw {
         draws: usize,
         seed: u64,
     ) -> Self {
-        let spikes = spikes(model);
+        let spikes = spikes_of_draws(model, law);
         let batches = draws.div_ceil(BATCH);
         let all: Vec<Vec<Vec<f64>>> = (0..batches)
             .into_par_iter()
-            .map(|batch| greatest(model, dictionary, space, (law, &spikes), seed, batch))
+            .map(|batch| {
+                greatest(
+                    model,
+                    dictionary,
+                    space,
+                    (law, spikes.as_ref()),
+                    seed,
+                    batch,
+                )
+            })
             .collect();
         let rows: Vec<Vec<f64>> = all.into_iter().flatten().collect();
         // Tails judged by the draws that made them would look better than they are: each part of the
@@ -212,7 +221,7 @@ fn greatest(
     model: &AnyModel,
     dictionary: &Dictionary,
     space: &Space,
-    (law, spikes): (&NoiseLaw, &Spikes),
+    (law, spikes): (&NoiseLaw, Option<&Spikes>),
     seed: u64,
     batch: usize,
 ) -> Vec<Vec<f64>> {

@@ -170,20 +170,23 @@ impl NoiseLaw {
         draw_all(&self.parts, model, random)
     }
 
+    /// Whether single readings have heavy tails.
+    pub(crate) fn has_tails(&self) -> bool {
+        self.tails.is_some()
+    }
+
     /// Noise of all readings for a draw of the null law: by a law that the readings allow, with
-    /// the tails of the readings, its spikes pulled in.
+    /// the tails of the readings, its spikes (`spikes`: where they are looked for, of heavy tails) pulled in.
     pub(crate) fn draw_possible(
         &self,
         model: &AnyModel,
-        spikes: &Spikes,
+        spikes: Option<&Spikes>,
         draw: usize,
         random: &mut ChaCha8Rng,
     ) -> DVector<f64> {
         let law = self.possible(draw, random);
-        let Some((tails, student)) = self
-            .tails
-            .and_then(|t| Some((t, StudentT::new(t.freedom).ok()?)))
-        else {
+        let student = |t: Tails| Some((t, StudentT::new(t.freedom).ok()?));
+        let Some(((tails, student), spikes)) = self.tails.and_then(student).zip(spikes) else {
             return draw_all(&law, model, random);
         };
         let scale = (law.white / tails.variance).sqrt();

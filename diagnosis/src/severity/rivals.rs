@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::attribution::context::Context;
-use crate::detection::calm::spikes;
+use crate::detection::calm::spikes_of_draws;
 use crate::detection::dictionary::{Entry, Meaning};
 use crate::detection::null::{BATCH, seen, statistics};
 use crate::levels::{INVISIBLE, SAME};
@@ -109,14 +109,15 @@ impl Drawn {
             Family::Effect(k) => effects(context, name, k, most, &mut random),
             family => of_no_effect(grounds, context, name, family, most, &mut random),
         };
-        let spikes = spikes(context.model);
+        let spikes = spikes_of_draws(context.model, &context.law);
         let mut readings = DMatrix::zeros(context.space.readings(), BATCH);
         for (k, gap) in gaps.iter().enumerate() {
             let draw = batch * BATCH + k;
-            let noise = context
-                .law
-                .draw_possible(context.model, &spikes, draw, &mut random)
-                + draw_scatter(context.model, &mut random);
+            let noise =
+                context
+                    .law
+                    .draw_possible(context.model, spikes.as_ref(), draw, &mut random)
+                    + draw_scatter(context.model, &mut random);
             readings.column_mut(k).copy_from(&(gap + noise));
         }
         let family = match family {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::attribution::context::{Cause, Context};
-use crate::detection::calm::spikes;
+use crate::detection::calm::spikes_of_draws;
 use crate::detection::null::{BATCH, Tail};
 use crate::levels::{ADEQUATE, CONFIRMED, LAW_LEFT, LAW_ODDS};
 use crate::noise::dependence::Dependence;
@@ -139,8 +139,10 @@ impl<'a> Bench<'a> {
 
     /// Noise of all readings.
     pub fn noise(&self, draw: usize, random: &mut ChaCha8Rng) -> DVector<f64> {
-        let spikes = spikes(self.model);
-        self.law.draw_possible(self.model, &spikes, draw, random) + draw_scatter(self.model, random)
+        let spikes = spikes_of_draws(self.model, &self.law);
+        self.law
+            .draw_possible(self.model, spikes.as_ref(), draw, random)
+            + draw_scatter(self.model, random)
     }
 
     /// The law of the greatest surprise over the grammar with nothing there.

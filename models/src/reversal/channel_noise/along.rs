@@ -102,10 +102,10 @@ impl AlongTraces {
         survey: &Survey,
         residuals: &[Vec<f64>],
     ) -> Result<Option<Self>, NoValue> {
-        let weighted = times(residuals, fit.weights);
-        let Some((groups, posterior)) = between::correlated(survey, &weighted, fit.weights) else {
+        let Some((groups, posterior)) = between::correlated(survey, residuals, fit.weights) else {
             return Ok(None);
         };
+        let weighted = times(residuals, fit.weights);
         let gathered = Gathered::new(&fit.row, survey, &groups, fit.weights)?;
         let mut along = Self::with(gathered, posterior, None);
         along.missed = along.missed(fit, survey, &groups, &weighted);

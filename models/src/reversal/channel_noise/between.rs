@@ -10,6 +10,8 @@
 //! combinations, with the covariance of one trace beside a line (offsets, tilts). What a model misses is in them too; only where
 //! it is as smooth, and no greater, than noise may be does it pass for that.
 
+use rayon::prelude::*;
+
 use super::survey::Survey;
 use super::traces::{self, Group};
 use super::{Seat, rms};
@@ -29,13 +31,19 @@ struct Passes {
 }
 
 impl Passes {
-    fn of(survey: &Survey, weighted: &[Vec<f64>]) -> Self {
-        let groups = traces::grouped(&survey.x, &survey.traces);
-        let left = |group: &Group| survey.cell_means(group, 0, weighted);
-        Self {
-            left: groups.iter().map(left).collect(),
-            groups,
-        }
+    fn of(survey: &Survey, residuals: &[Vec<f64>], weights: &[f64]) -> Self {
+        let of_channel = |c: usize| {
+            let groups = traces::of_directions(c, survey.x[c], &survey.traces[c]);
+            let each = groups.into_iter().map(|group| {
+                let means = survey.cell_means(&group, 0, residuals);
+                let left = means.into_iter().map(|mean| weights[c] * mean);
+                (group, left.collect())
+            });
+            each.collect::<Vec<(Group, Vec<f64>)>>()
+        };
+        let channels = (0..survey.channels()).into_par_iter();
+        let (groups, left) = channels.flat_map_iter(of_channel).unzip();
+        Self { groups, left }
     }
 
     /// The pass of a channel in one direction.
@@ -97,13 +105,13 @@ fn closures(seats: &[Seat]) -> Vec<[(usize, f64); 4]> {
 /// correlated along a trace than not and no greater than noise may be.
 pub(super) fn correlated(
     survey: &Survey,
-    weighted: &[Vec<f64>],
+    residuals: &[Vec<f64>],
     weights: &[f64],
 ) -> Option<(Vec<Group>, Posterior)> {
     if survey.traces.iter().any(|own| own.len() > 2) || !survey.repeats.is_empty() {
         return None;
     }
-    let passes = Passes::of(survey, weighted);
+    let passes = Passes::of(survey, residuals, weights);
     let mut values = WithoutLines::default();
     let mut add = |terms: &[(usize, f64)]| {
         if let Some((positions, row)) = passes.combined(terms) {

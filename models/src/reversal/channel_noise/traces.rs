@@ -112,18 +112,21 @@ impl Group {
 /// Groups of repeats, on cells: a position each where repeats share their positions, so that nothing is
 /// averaged; otherwise stretches of about two readings or more, so that differing positions meet.
 pub fn grouped(x: &[&[f64]], traces: &[Vec<Trace>]) -> Vec<Group> {
-    let mut groups = Vec::new();
-    for (c, (x, traces)) in x.iter().zip(traces).enumerate() {
-        for backward in [false, true] {
-            let own: Vec<usize> = (0..traces.len())
-                .filter(|t| traces[*t].backward == backward && traces[*t].len() > 0)
-                .collect();
-            if !own.is_empty() {
-                groups.push(group(c, x, traces, own));
-            }
-        }
-    }
-    groups
+    let channels = x.iter().zip(traces).enumerate();
+    channels
+        .flat_map(|(c, (x, traces))| of_directions(c, x, traces))
+        .collect()
+}
+
+/// The groups of one channel: of either direction in which it was read.
+pub fn of_directions(channel: usize, x: &[f64], traces: &[Trace]) -> Vec<Group> {
+    let groups = [false, true].into_iter().filter_map(|backward| {
+        let own: Vec<usize> = (0..traces.len())
+            .filter(|t| traces[*t].backward == backward && traces[*t].len() > 0)
+            .collect();
+        (!own.is_empty()).then(|| group(channel, x, traces, own))
+    });
+    groups.collect()
 }
 
 /// All traces of a channel, in whatever direction, on common cells.

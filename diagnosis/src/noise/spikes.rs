@@ -24,6 +24,8 @@ use crate::noise::piles::{Heights, Pile, SIGMA, alone, edge, groups, stands_out}
 const FREEDOMS: [f64; 10] = [2.1, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0];
 /// Readings of noise with which tails are compared, at least.
 const DRAWN: usize = 3000;
+/// Readings that are gathered in one, at most, where a fit tells which are off: means of more have no tails of their own.
+const MOST_IN_A_MEAN: f64 = 4.0;
 /// Seed of the noise with which tails are compared.
 const SEED: u64 = 0x7461_696c;
 
@@ -112,7 +114,8 @@ impl Spikes {
             .into_values()
             .partition(|p| p.traces.len() >= SPIKE_REPEATS);
         piles.extend(enough);
-        let by_fit = (!few.is_empty()).then(|| ByFit::new(model, few, residual()));
+        let are_single = model.readings_in_each() <= MOST_IN_A_MEAN;
+        let by_fit = (are_single && !few.is_empty()).then(|| ByFit::new(model, few, residual()));
         Self { piles, by_fit }
     }
 

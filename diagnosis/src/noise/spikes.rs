@@ -25,7 +25,7 @@ const FREEDOMS: [f64; 10] = [2.1, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0]
 /// Readings of noise with which tails are compared, at least.
 const DRAWN: usize = 3000;
 /// Readings that are gathered in one, at most, where a fit tells which are off: means of more have no tails of their own.
-const MOST_IN_A_MEAN: f64 = 2.0;
+const MOST_IN_A_MEAN: f64 = 1.5;
 /// Seed of the noise with which tails are compared.
 const SEED: u64 = 0x7461_696c;
 

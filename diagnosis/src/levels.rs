@@ -29,13 +29,14 @@ pub(crate) fn chi_squared_quantile(probability: f64, freedom: usize) -> f64 {
 /// *Reckoned.* Contrasts of repeats from which noise can be estimated: with eight a variance is known to
 /// half of itself.
 pub(crate) const FEWEST_CONTRASTS: usize = 8;
-/// *Reckoned.* A trace of this many readings can show what is correlated along it.
-pub(crate) const LONG_TRACE: usize = 20;
 /// *Quantile*, 6 · 10⁻⁵ of normal readings: standard deviations to which a single reading is pulled in.
 pub(crate) const SPIKE: f64 = 4.0;
 /// *Tuned*, between normal noise (0.003) and Student's with three degrees of freedom (0.042): part of the
 /// readings beyond three standard deviations, as their median tells it, that makes tails heavy.
 pub(crate) const HEAVY_TAILS: f64 = 0.01;
+/// *Quantile.* Probability that as many readings of normal noise are beyond three standard deviations, at which tails are
+/// heavy: of few readings one is a fiftieth.
+pub(crate) const HEAVY_BY_CHANCE: f64 = 0.025;
 /// *Reckoned.* Repeats without which a spike cannot be told from a form.
 pub(crate) const SPIKE_REPEATS: usize = 3;
 /// *Reckoned.* Readings of a trace without which a spike has no neighbours to stand out of.

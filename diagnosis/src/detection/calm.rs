@@ -17,7 +17,7 @@ const SETS: usize = 8;
 pub(crate) fn spikes(model: &AnyModel) -> Spikes {
     Spikes::new(model, || {
         let white = NoiseLaw::white(1.0, f64::INFINITY, NoiseSource::Stated);
-        let space = Space::new(model, &white);
+        let space = Space::beside_free_profiles(model, &white);
         Residual {
             freedom: space.degrees_of_freedom(),
             of: Box::new(move |readings| space.forward_vector(readings)),

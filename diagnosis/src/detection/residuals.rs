@@ -6,13 +6,13 @@
 //! trace are as probable beforehand; the second on a grid of equal probabilities.
 
 use errsep_models::model::{AnyModel, FittedModel};
-use errsep_models::noise::Law;
+use errsep_models::noise::{Law, spacing_and_length};
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::detection::space::Space;
-use crate::levels::{LONG_TRACE, MOST_CORRELATED};
+use crate::levels::MOST_CORRELATED;
 use crate::noise::law::{NoiseLaw, SEED};
 use crate::noise::posterior::{Allowed, Proposal, resampled};
 
@@ -35,7 +35,13 @@ pub(crate) fn by_residuals(
     readings: &[&DVector<f64>],
     white: f64,
 ) -> Option<Vec<ByResiduals>> {
-    let (spacing, travel) = reach(model).filter(|_| model.correlated_noise() && white > 0.0)?;
+    let traces = model.traces().iter().filter(|t| !t.is_empty());
+    let ends = traces.map(|t| {
+        let x = |row: usize| model.places()[row].x;
+        (t.len(), x(t.start), x(t.end - 1))
+    });
+    let (spacing, travel) =
+        spacing_and_length(ends).filter(|_| model.correlated_noise() && white > 0.0)?;
     let mut laws = vec![Law::of_white(1.0)];
     let lengths = (spacing.ln(), travel.max(2.0 * spacing).ln());
     for size in 0..SIZES {
@@ -78,18 +84,6 @@ pub(crate) fn by_residuals(
         Some(ByResiduals { any, white })
     });
     each.collect()
-}
-
-/// Mean spacing and length of the traces, where any is long enough to show more than white noise.
-fn reach(model: &AnyModel) -> Option<(f64, f64)> {
-    let long = model.traces().iter().filter(|t| t.len() >= LONG_TRACE);
-    let each = long.map(|t| {
-        let places = &model.places()[t.clone()];
-        let length = (places[places.len() - 1].x - places[0].x).abs();
-        (length / (places.len() - 1) as f64, length)
-    });
-    each.filter(|(spacing, _)| *spacing > 0.0 && spacing.is_finite())
-        .reduce(|(a, b), (spacing, length)| (a.min(spacing), b.max(length)))
 }
 
 #[cfg(test)]

@@ -55,6 +55,17 @@ impl Space {
         Self::of_traces(model, law, &all)
     }
 
+    /// The same beside profiles that are free altogether, whatever the model withholds of them: a line that a profile
+    /// must not have is the line of all positions that were read, which single positions may carry.
+    pub fn beside_free_profiles(model: &AnyModel, law: &NoiseLaw) -> Self {
+        let all: Vec<usize> = (0..model.traces().len()).collect();
+        let mut freedom = model.freedom();
+        if let Some(profiles) = &mut freedom.profiles {
+            profiles.withheld.clear();
+        }
+        Self::made(model.record(), &freedom, law, &all, &[])
+    }
+
     /// The space of all readings, in units of the noise and of the scatter that the model expects.
     /// (Beside profiles that are free at every position that scatter is common to traces.)
     pub fn expecting(model: &AnyModel, law: &NoiseLaw) -> Self {

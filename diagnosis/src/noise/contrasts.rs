@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use errsep_models::model::{AnyModel, FittedModel, Place};
-use errsep_models::noise::{Law, Likelihood, Likelihoods, OfWhole};
+use errsep_models::noise::{Law, Likelihood, Likelihoods, OfWhole, spacing_and_length};
 use nalgebra::DVector;
 
-use crate::levels::LONG_TRACE;
 use crate::noise::law::NoiseLaw;
 use crate::noise::whitening::Whitening;
 
@@ -99,20 +98,11 @@ impl Contrasts {
 
     /// Mean spacing and length of the traces, where any is long enough to show more than white noise.
     pub fn reach(&self) -> Option<(f64, f64)> {
-        let long = self
+        let rows = self
             .groups
             .iter()
-            .filter(|g| g.positions.len() >= LONG_TRACE);
-        let reach = long
-            .map(|g| {
-                let n = g.positions.len();
-                let length = (g.positions[n - 1] - g.positions[0]).abs();
-                (length / (n - 1) as f64, length)
-            })
-            .fold((f64::INFINITY, 0.0f64), |(a, b), (spacing, length)| {
-                (a.min(spacing), b.max(length))
-            });
-        (reach.0 > 0.0 && reach.0.is_finite()).then_some(reach)
+            .flat_map(|g| g.rows.iter().map(move |_| &g.positions));
+        spacing_and_length(rows.filter_map(|x| Some((x.len(), *x.first()?, *x.last()?))))
     }
 
     fn rows(&self) -> impl Iterator<Item = &DVector<f64>> {

@@ -9,6 +9,8 @@ use crate::levels::{KEPT, SPIKE};
 
 /// Neighbours on one side.
 const SIDE: usize = 7;
+/// Those over whose median a height is taken. At an end of a trace they lie on one side, and a slope makes heights.
+pub(crate) const NEAR: usize = 2;
 
 /// Traces of one channel on the same cells: of one direction, or of both where one alone has too few.
 pub(crate) struct Pile {
@@ -47,7 +49,7 @@ pub(crate) fn groups(model: &AnyModel) -> impl Iterator<Item = Group> {
 /// Deviations along a trace with their heights over the median of four neighbours.
 pub(crate) fn over_neighbours(away: Vec<f64>) -> Heights {
     let near = (0..away.len())
-        .map(|k| away[k] - around(&away, k, 2))
+        .map(|k| away[k] - around(&away, k, NEAR))
         .collect();
     (away, near)
 }

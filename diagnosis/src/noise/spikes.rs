@@ -14,18 +14,19 @@ use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StudentT};
+use statrs::distribution::{Binomial, DiscreteCDF};
 
-use crate::levels::{FEWEST_CONTRASTS, HEAVY_TAILS, SPIKE_REPEATS, SPIKE_TRACE};
+use crate::levels::{FEWEST_CONTRASTS, HEAVY_BY_CHANCE, HEAVY_TAILS, SPIKE_REPEATS, SPIKE_TRACE};
 use crate::noise::by_fit::ByFit;
 use crate::noise::contrasts::Contrasts;
-use crate::noise::piles::{Heights, Pile, SIGMA, alone, edge, groups, stands_out};
+use crate::noise::piles::{Heights, NEAR, Pile, SIGMA, alone, edge, groups, stands_out};
 
 /// Degrees of freedom among which the tails are sought.
 const FREEDOMS: [f64; 10] = [2.1, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0];
 /// Readings of noise with which tails are compared, at least.
 const DRAWN: usize = 3000;
-/// Readings that are gathered in one, at most, where a fit tells which are off: means of more have no tails of their own.
-const MOST_IN_A_MEAN: f64 = 1.5;
+/// Part of normal noise that is beyond three standard deviations.
+const BEYOND: f64 = 0.0027;
 /// Seed of the noise with which tails are compared.
 const SEED: u64 = 0x7461_696c;
 
@@ -80,6 +81,18 @@ pub(crate) struct Calmed {
 struct Weight {
     beyond: f64,
     ratio: f64,
+    /// Heights that are independent of each other, about.
+    independent: usize,
+}
+
+impl Weight {
+    /// Whether normal noise hardly has such tails.
+    fn is_heavy(&self) -> bool {
+        let beyond = (self.beyond * self.independent as f64).round() as u64;
+        let by_chance = Binomial::new(BEYOND, self.independent as u64);
+        let by_chance = by_chance.map_or(1.0, |law| law.sf(beyond.saturating_sub(1)));
+        self.beyond > HEAVY_TAILS && beyond > 0 && by_chance < HEAVY_BY_CHANCE
+    }
 }
 
 impl Spikes {
@@ -114,8 +127,7 @@ impl Spikes {
             .into_values()
             .partition(|p| p.traces.len() >= SPIKE_REPEATS);
         piles.extend(enough);
-        let are_single = model.readings_in_each() <= MOST_IN_A_MEAN;
-        let by_fit = (are_single && !few.is_empty()).then(|| ByFit::new(model, few, residual()));
+        let by_fit = (!few.is_empty()).then(|| ByFit::new(model, few, residual()));
         Self { piles, by_fit }
     }
 
@@ -125,7 +137,7 @@ impl Spikes {
         let count = self.pull_in(&mut calmed);
         let tails = self
             .weight(readings)
-            .filter(|w| w.beyond > HEAVY_TAILS)
+            .filter(Weight::is_heavy)
             .and_then(|weight| {
                 FREEDOMS
                     .iter()
@@ -168,7 +180,8 @@ impl Spikes {
     fn weight(&self, readings: &DVector<f64>) -> Option<Weight> {
         let mut heights: Vec<(f64, bool)> = Vec::new();
         let mut add = |away: &[f64], near: &[f64]| {
-            let own = near.iter().enumerate();
+            let within = NEAR..near.len() - NEAR;
+            let own = near.iter().enumerate().filter(|(k, _)| within.contains(k));
             heights.extend(own.map(|(k, h)| (h.abs(), alone(away, k, *h))));
         };
         for pile in &self.piles {
@@ -187,6 +200,8 @@ impl Spikes {
         if heights.is_empty() {
             return None;
         }
+        let by_fit = self.by_fit.as_ref().filter(|_| self.piles.is_empty());
+        let independent = by_fit.map_or(heights.len(), |by_fit| by_fit.residual.freedom);
         heights.sort_by(|a, b| a.0.total_cmp(&b.0));
         let middle = heights[heights.len() / 2].0;
         // Steps and bumps are no tails.
@@ -201,6 +216,7 @@ impl Spikes {
         Some(Weight {
             beyond: (n - far) as f64 / n as f64,
             ratio: sizes[n * 99 / 100] / middle.max(f64::MIN_POSITIVE),
+            independent: independent.min(n),
         })
     }
 

@@ -1,8 +1,8 @@
 //! Differences between repeats of a trace, and how likely a law of noise makes them.
 
-use super::LONG;
 use super::likelihood::{Likelihood, Likelihoods, OfWhole};
 use super::posterior::NoiseValues;
+use super::{ends, spacing_and_length};
 
 /// Contrasts of repeats: orthonormal combinations over the repeats of a trace, orthogonal to what all
 /// repeats have in common. Each has the covariance of one trace.
@@ -66,22 +66,12 @@ impl NoiseValues for Contrasts {
         self.groups.iter().map(of).sum()
     }
 
-    /// Least mean spacing and greatest length of the traces that are long enough to show more than
-    /// white noise.
     fn reach(&self) -> Option<(f64, f64)> {
-        let (spacing, length) = self
+        let rows = self
             .groups
             .iter()
-            .filter(|g| g.positions.len() >= LONG)
-            .map(|g| {
-                let n = g.positions.len();
-                let length = g.positions[n - 1] - g.positions[0];
-                (length / (n - 1) as f64, length)
-            })
-            .fold((f64::INFINITY, 0.0_f64), |(a, b), (spacing, length)| {
-                (a.min(spacing), b.max(length))
-            });
-        (spacing > 0.0 && spacing.is_finite()).then_some((spacing, length))
+            .flat_map(|g| g.rows.iter().map(move |_| g));
+        spacing_and_length(rows.filter_map(|g| ends(&g.positions)))
     }
 
     fn has_shifts(&self) -> bool {

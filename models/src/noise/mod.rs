@@ -22,3 +22,31 @@ pub use without_lines::WithoutLines;
 
 /// A trace of this many readings can show what is correlated along it.
 const LONG: usize = 20;
+
+/// Shorter traces of so many readings can show it together, if they have so many readings in all.
+const TOGETHER: (usize, usize) = (8, 100);
+
+/// Least mean spacing and greatest length of the traces that are long enough to show more than white noise: 20 readings, or 8
+/// where such traces have a hundred readings together; none where no trace is.
+///
+/// `traces`: number of readings of each with the positions of the first and the last.
+pub fn spacing_and_length(
+    traces: impl Iterator<Item = (usize, f64, f64)> + Clone,
+) -> Option<(f64, f64)> {
+    let (short, enough) = TOGETHER;
+    let counts = traces.clone().map(|(count, _, _)| count);
+    let together: usize = counts.filter(|count| *count >= short).sum();
+    let least = if together >= enough { short } else { LONG };
+    let long = traces.filter(|(count, _, _)| *count >= least);
+    let each = long.map(|(count, first, last)| {
+        let length = (last - first).abs();
+        (length / (count - 1) as f64, length)
+    });
+    each.filter(|(spacing, _)| *spacing > 0.0 && spacing.is_finite())
+        .reduce(|(a, b), (spacing, length)| (a.min(spacing), b.max(length)))
+}
+
+/// Number of positions with the first and the last.
+fn ends(positions: &[f64]) -> Option<(usize, f64, f64)> {
+    Some((positions.len(), *positions.first()?, *positions.last()?))
+}

@@ -2,7 +2,7 @@
 
 use super::likelihood::{Likelihood, Likelihoods, OfWhole};
 use super::posterior::NoiseValues;
-use super::{LONG, about_middle};
+use super::{about_middle, ends, spacing_and_length};
 
 /// Variance of height and slope (at the ends) of the lines, in that of the noise: so great that it tells nothing of them.
 const ANY: f64 = 1e8;
@@ -31,13 +31,8 @@ impl NoiseValues for WithoutLines {
     }
 
     fn reach(&self) -> Option<(f64, f64)> {
-        let long = self.rows.iter().filter(|(x, _)| x.len() >= LONG);
-        let each = long.map(|(x, _)| {
-            let length = x[x.len() - 1] - x[0];
-            (length / (x.len() - 1) as f64, length)
-        });
-        let (spacing, length) = each.reduce(|(a, b), (s, l)| (a.min(s), b.max(l)))?;
-        (spacing > 0.0 && spacing.is_finite()).then_some((spacing, length))
+        let positions = self.rows.iter().map(|(positions, _)| positions.as_slice());
+        spacing_and_length(positions.filter_map(ends))
     }
 
     /// They are in the lines.

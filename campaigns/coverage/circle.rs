@@ -120,6 +120,8 @@ fn count(what: &CircleSimulation, stated: bool, seed: u64) -> Option<Counts> {
     let share = chi.cdf(freedom * (fit.noise_um / NOISE_UM).powi(2));
     let inside = |nominal: f64| (share - 0.5).abs() <= nominal / 2.0;
     tallies[3].add_inside(inside(ONE_SIGMA), inside(0.95));
-    let alike = fit.neighbours_alike(&points).is_some_and(|p| p < ALIKE);
+    let alike = fit
+        .neighbours_alike(&points, &vec![0; points.len()])
+        .is_some_and(|p| p < ALIKE);
     Some((tallies, alike))
 }

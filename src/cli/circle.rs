@@ -4,15 +4,15 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use errsep_models::circle::{
-    AlgebraicFit, Circle, CircleError, CircleFit, Circularity, Point, algebraic, circularity,
-    nistir_fit, orthogonal_fit,
+    AlgebraicFit, Circle, CircleError, CircleFit, Circularity, PassScatter, Point, algebraic,
+    circularity, nistir_fit, orthogonal_fit,
 };
 use serde_json::{Value, json};
 
 use super::diagnose::joined::{self, Given};
 use super::quantity::{measured_words, quantity_json, unexpandable};
 use super::{Answer, ColumnArgs, CommonArgs, disagreement};
-use crate::io::circle::{not_converged, read_points};
+use crate::io::circle::{MeasuredCircle, not_converged, read_points};
 use crate::io::{CsvTable, Message, Status};
 use crate::report::circle::{CircleView, page, zones};
 use crate::report::number;
@@ -25,6 +25,9 @@ The file has the columns x and y, mm:
     x,y
     50.0012,0.0003
     49.2391,8.6829
+
+Where the circle was passed over several times, a column repeat tells the passes: what these differ by is
+in the uncertainties.
 
 Example: errsep circle points.csv --out circle")]
 pub struct Args {
@@ -58,19 +61,22 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
                 .remedy("give a number greater than zero, in µm"),
         );
     }
-    let points = read_points(&args.points, &args.columns.map())?;
+    let MeasuredCircle { points, passes } = read_points(&args.points, &args.columns.map())?;
     let refused = |e: CircleError| refused(&e, args);
-    let fit = orthogonal_fit(&points, args.noise).map_err(refused)?;
+    let mut fit = orthogonal_fit(&points, args.noise).map_err(refused)?;
+    fit.count_passes(&passes);
     let zones_found = circularity(&points, fit.circle).map_err(refused)?;
-    let alike = fit.neighbours_alike(&points);
+    let alike = fit.neighbours_alike(&points, &passes);
     let arc = fit.covered_arc(&points);
-    let form = form_in_words(alike, arc, points.len());
+    let form = form_in_words(alike, arc, points.len(), fit.scatter.is_some());
     let refuted = fit
         .disagreement()
         .map(|d| disagreement::in_words(d, "The points deviate", "--noise states", fit.noise_um));
     let on_any = (fit.degrees_of_freedom == 0)
         .then(|| "Three points always lie on a circle: this says nothing of the form.".to_owned());
-    let remarks: Vec<String> = refuted.into_iter().chain(on_any).collect();
+    let by_passes = fit.scatter.map(|s| passes_in_words(&s));
+    let remarks = refuted.into_iter().chain(on_any).chain(by_passes);
+    let remarks: Vec<String> = remarks.collect();
     let mut others: Vec<(String, Circle)> = AlgebraicFit::ALL
         .into_iter()
         .filter_map(|kind| Some((kind.name().to_owned(), algebraic(&points, kind).ok()?)))
@@ -184,17 +190,17 @@ const GAP: f64 = std::f64::consts::FRAC_PI_3;
 
 /// What the answer says of form: that neighbours are alike, and that on part of a circle a form of few
 /// undulations passes for centre and radius.
-fn form_in_words(alike: Option<f64>, arc: f64, points: usize) -> Option<String> {
+fn form_in_words(alike: Option<f64>, arc: f64, points: usize, by_passes: bool) -> Option<String> {
     let seen = alike.filter(|p| *p < ALIKE).map(|p| {
-        let chance = if p < 1e-4 {
-            "less than 0.0001".to_owned()
+        let taken = if by_passes {
+            ", or noise that the passes tell"
         } else {
-            number::plain(p, 1)
+            ", which the uncertainties take for independent noise"
         };
         format!(
-            "Neighbouring deviations are alike (probability by chance {chance}): they hold form, which the \
-             uncertainties take for independent noise. `errsep diagnose --model circle` looks for what makes it: lobes of \
-             the part, errors of the axes, a radius or a centre that drifts from point to point."
+            "Neighbouring deviations are alike (probability by chance {}): they hold form{taken}. `errsep diagnose --model circle` looks for what makes it: lobes of \
+             the part, errors of the axes, a radius or a centre that drifts from point to point.",
+            chance_in_words(p)
         )
     });
     let even = std::f64::consts::TAU / points.max(1) as f64;
@@ -210,6 +216,25 @@ fn form_in_words(alike: Option<f64>, arc: f64, points: usize) -> Option<String> 
         (Some(seen), Some(part)) => Some(format!("{seen} {part}")),
         (seen, part) => seen.or(part),
     }
+}
+
+fn chance_in_words(p: f64) -> String {
+    if p < 1e-4 {
+        "less than 0.0001".to_owned()
+    } else {
+        number::plain(p, 1)
+    }
+}
+
+/// What passes add to the uncertainties.
+fn passes_in_words(scatter: &PassScatter) -> String {
+    format!(
+        "The circles of the {} passes differ by {} times what the scatter of their points allows (probability by chance {}): the \
+         uncertainties count it.",
+        scatter.passes,
+        number::plain(scatter.factor, 2),
+        chance_in_words(scatter.p_value)
+    )
 }
 
 fn in_words(
@@ -290,6 +315,12 @@ fn as_json(
             "noise": {"value": fit.noise_um, "unit": "um", "given": fit.noise_given},
             "degrees_of_freedom": fit.degrees_of_freedom,
             "neighbours_alike": {"p_value": alike, "form": alike.is_some_and(|p| p < ALIKE)},
+            "passes": fit.scatter.map(|s| json!({
+                "count": s.passes,
+                "factor": s.factor,
+                "degrees_of_freedom": s.degrees.as_f64(),
+                "p_value": s.p_value,
+            })),
             "arc": {"value": arc, "unit": "rad"},
         },
         "algebraic": others.iter().filter(|o| !o.0.starts_with("nistir")).map(|(name, o)| json!({

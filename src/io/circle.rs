@@ -25,16 +25,25 @@ pub fn not_converged(why: &CircleError, reason: &str, reached: Option<&ReachedCi
     }))
 }
 
-/// Reads the columns `x` and `y`, mm; a column `repeat` may stand beside them.
+/// Points with the pass of each.
+pub struct MeasuredCircle {
+    /// The points, mm.
+    pub points: Vec<Point>,
+    /// The pass of each point; one for all where no column tells.
+    pub passes: Vec<usize>,
+}
+
+/// Reads the columns `x` and `y`, mm; a column `repeat`, whole numbers, may stand beside them.
 ///
 /// # Errors
 /// The table lacks a column, has an unknown one, holds something that is no number, a number beyond
 /// [`LARGEST`], or no row.
-pub fn read_points(path: &Path, map: &ColumnMap) -> Result<Vec<Point>, Message> {
+pub fn read_points(path: &Path, map: &ColumnMap) -> Result<MeasuredCircle, Message> {
     let mut table = TableReader::open_as(path, map)?;
     table.only(&["x", "y", "repeat"])?;
     let (x, y) = (table.column("x")?.in_mm(), table.column("y")?.in_mm());
-    let mut points = Vec::new();
+    let repeat = table.optional("repeat");
+    let (mut points, mut passes) = (Vec::new(), Vec::new());
     while let Some(row) = table.next_row()? {
         let coordinate = |column| {
             let value = row.number(column)?;
@@ -51,11 +60,13 @@ pub fn read_points(path: &Path, map: &ColumnMap) -> Result<Vec<Point>, Message> 
             Ok(value)
         };
         points.push(Point::new(coordinate(&x)?, coordinate(&y)?));
+        let pass = repeat.as_ref().map_or(Ok(1), |column| row.count(column))?;
+        passes.push(pass as usize);
     }
     if points.is_empty() {
         return Err(table.no_rows());
     }
-    Ok(points)
+    Ok(MeasuredCircle { points, passes })
 }
 
 #[cfg(test)]

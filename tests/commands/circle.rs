@@ -110,6 +110,42 @@ fn form_is_told_and_so_is_what_an_arc_cannot_show() {
     }
 }
 
+/// Three passes whose centres differ by 1 µm, read to some tenths: known no better than they agree.
+#[test]
+fn passes_that_differ_are_counted() {
+    let mut table = "x,y,repeat\n".to_owned();
+    for (pass, off) in [(1, 1e-3), (2, -1e-3), (3, 0.0)] {
+        for k in 0..36 {
+            let angle = f64::from(k).to_radians() * 10.0;
+            let radius = 50.0 + 2e-4 * f64::from(37 * k * k + 11 * pass * k).sin();
+            let (x, y) = (radius * angle.cos() + off, radius * angle.sin());
+            table += &format!("{x:.9},{y:.9},{pass}\n");
+        }
+    }
+    let without: Vec<&str> = table.lines().map(|l| &l[..l.rfind(',').unwrap()]).collect();
+    let folder = Folder::with(&[("three.csv", &table), ("one.csv", &without.join("\n"))]);
+    let answer = json(&folder, &["circle", "three.csv", "--format", "json"]);
+    assert_eq!(answer["fit"]["passes"]["count"], 3);
+    assert_eq!(answer["fit"]["passes"]["degrees_of_freedom"], 6.0);
+    crate::command::documented(&answer, "docs/json/circle.md");
+    let text = run(&folder, &["circle", "three.csv"]).stdout;
+    assert!(
+        text.contains("The circles of the 3 passes differ by"),
+        "{text}"
+    );
+    let one = json(&folder, &["circle", "one.csv", "--format", "json"]);
+    assert!(one["fit"]["passes"].is_null());
+    // Three centres 1 µm apart: 0.6 µm of their mean, by six degrees of freedom of centre and radius; without the passes, of 108
+    // points that scatter by 0.7 µm, a sixth.
+    let std = |answer| number(answer, "/fit/centre_x/std");
+    assert!(
+        std(&answer) > 2.0 * std(&one),
+        "{} {}",
+        std(&answer),
+        std(&one)
+    );
+}
+
 #[test]
 fn every_key_is_documented() {
     let folder = Folder::with(&[("six.csv", SIX)]);

@@ -1,9 +1,12 @@
 //! What part of a circle the points cover, and whether neighbouring deviations are alike, as form is and
 //! noise is not.
 
+use std::collections::BTreeMap;
+
 use super::orthogonal::CircleFit;
+use super::passes::rows_of;
 use super::points::Point;
-use nalgebra::Matrix3;
+use nalgebra::{DMatrix, Matrix3};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 impl CircleFit {
@@ -15,50 +18,49 @@ impl CircleFit {
 
     /// The probability that independent deviations of the fitted `points` would have neighbours as much
     /// alike as these: von Neumann's ratio of squared successive differences to squares, in the order of
-    /// the angle from the widest gap on, against its mean and variance for the residuals of this fit
+    /// the angle from the widest gap on in each of the `passes` (that of each point), against its mean and variance for the residuals of this fit
     /// (their ratio is independent of the sum of squares, E. J. G. Pitman 1937), taken as normal.
     ///
     /// Nothing where the deviations are rounding, or fewer than four degrees of freedom are left.
-    pub fn neighbours_alike(&self, points: &[Point]) -> Option<f64> {
+    pub fn neighbours_alike(&self, points: &[Point], passes: &[usize]) -> Option<f64> {
         let n = points.len();
         let c = self.circle;
         let magnitude = c.radius + c.centre.x.abs().max(c.centre.y.abs());
         let rms_um = (self.residuals_um.iter().map(|d| d * d).sum::<f64>() / n as f64).sqrt();
         let rounding = rms_um <= 1e3 * 64.0 * f64::EPSILON * magnitude;
-        if n != self.residuals_um.len() || self.degrees_of_freedom < 4 || rounding {
+        let of_all = n == self.residuals_um.len() && n == passes.len();
+        if !of_all || self.degrees_of_freedom < 4 || rounding {
             return None;
         }
+        let mut last = BTreeMap::new();
         let (order, _) = around(points, c.centre);
-        let d: Vec<f64> = order
+        let pair = |row: usize| Some([last.insert(passes[row], row)?, row]);
+        let pairs: Vec<[usize; 2]> = order.into_iter().filter_map(pair).collect();
+        let d = |row: usize| self.residuals_um[row] / rms_um;
+        let ratio = pairs
             .iter()
-            .map(|&i| self.residuals_um[i] / rms_um)
-            .collect();
-        let squares: f64 = d.iter().map(|v| v * v).sum();
-        let ratio = d.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / squares;
+            .map(|[a, b]| (d(*b) - d(*a)).powi(2))
+            .sum::<f64>()
+            / n as f64;
         // With A the matrix of squared differences, Q an orthonormal basis of the fit's columns and
         // R = 1 − QQᵀ: E = tr(AR)/ν, Var = 2 (ν tr(ARAR) − tr²(AR)) / (ν²(ν + 2)).
-        let q = self.jacobian.select_rows(&order).qr().q();
-        let mut aq = q.clone();
-        for i in 0..n {
+        let q = self.jacobian.clone().qr().q();
+        let mut aq = DMatrix::zeros(n, 3);
+        for [a, b] in &pairs {
             for k in 0..3 {
-                let left = if i > 0 {
-                    q[(i, k)] - q[(i - 1, k)]
-                } else {
-                    0.0
-                };
-                let right = if i + 1 < n {
-                    q[(i, k)] - q[(i + 1, k)]
-                } else {
-                    0.0
-                };
-                aq[(i, k)] = left + right;
+                let step = q[(*b, k)] - q[(*a, k)];
+                aq[(*b, k)] += step;
+                aq[(*a, k)] -= step;
             }
         }
         let within: Matrix3<f64> = Matrix3::from_fn(|i, j| q.column(i).dot(&aq.column(j)));
         let nu = self.degrees_of_freedom as f64;
-        let trace = 2.0 * (n as f64 - 1.0) - within.trace();
-        let trace_of_square =
-            6.0 * n as f64 - 8.0 - 2.0 * aq.norm_squared() + within.norm_squared();
+        let trace = 2.0 * pairs.len() as f64 - within.trace();
+        // tr(A²) of a chain of m points is 6m − 8, of one point none.
+        let chains = rows_of(passes).into_iter().map(|own| own.len());
+        let chains = chains.filter(|m| *m > 1);
+        let squares: f64 = chains.map(|m| 6.0 * m as f64 - 8.0).sum();
+        let trace_of_square = squares - 2.0 * aq.norm_squared() + within.norm_squared();
         let variance = 2.0 * (nu * trace_of_square - trace * trace) / (nu * nu * (nu + 2.0));
         let z = (ratio - trace / nu) / variance.sqrt();
         z.is_finite().then(|| Normal::standard().cdf(z))

@@ -1,6 +1,7 @@
 //! The circle of least squared orthogonal distances.
 
 use super::algebraic::{AlgebraicFit, algebraic};
+use super::passes::PassScatter;
 use super::points::{Circle, CircleError, FLAT, Frame, Point, ReachedCircle, check_points};
 use crate::uncertainty::{DegreesOfFreedom, Disagreement, Quantity, UncertaintyError};
 use errsep_solvers::{Fit, NoValue, Options, Problem};
@@ -75,6 +76,8 @@ pub struct CircleFit {
     pub residuals_um: Vec<f64>,
     /// ∂(deviation)/∂(centre x, centre y, radius), points × 3, mm per mm.
     pub jacobian: DMatrix<f64>,
+    /// By how much passes differ beyond the scatter of their points, where that was [counted](Self::count_passes).
+    pub scatter: Option<PassScatter>,
     /// The circle from which the iteration started.
     pub seed: Circle,
     /// How the iteration ended, in words.
@@ -98,12 +101,14 @@ impl CircleFit {
     }
 
     /// Radius, centre x and centre y, mm. Degrees of freedom are those of the residuals, infinite for
-    /// a given noise.
+    /// a given noise, and those of the passes where these were [counted](Self::count_passes).
     ///
     /// # Errors
     /// A value or an uncertainty that is not finite.
     pub fn quantities(&self) -> Result<[Quantity; 3], UncertaintyError> {
-        let degrees = if self.noise_given {
+        let degrees = if let Some(scatter) = self.scatter {
+            scatter.degrees
+        } else if self.noise_given {
             DegreesOfFreedom::Infinite
         } else {
             DegreesOfFreedom::new(self.degrees_of_freedom as f64)?
@@ -202,6 +207,7 @@ fn assemble(
         degrees_of_freedom,
         residuals_um: fit.residuals.iter().map(|r| um * r).collect(),
         jacobian: fit.jacobian.clone(),
+        scatter: None,
         seed,
         ending: fit.ending.to_string(),
         iterations: fit.iterations,

@@ -34,8 +34,8 @@ pub(crate) const SPIKE: f64 = 4.0;
 /// *Tuned*, between normal noise (0.003) and Student's with three degrees of freedom (0.042): part of the
 /// readings beyond three standard deviations, as their median tells it, that makes tails heavy.
 pub(crate) const HEAVY_TAILS: f64 = 0.01;
-/// *Quantile.* Probability that as many readings of normal noise are beyond three standard deviations, at which tails are
-/// heavy: of few readings one is a fiftieth.
+/// *Quantile.* Tails are heavy only where normal noise has as many readings beyond three standard deviations with less than this
+/// probability: [`HEAVY_TAILS`] of few readings are one or two, which chance makes.
 pub(crate) const HEAVY_BY_CHANCE: f64 = 0.025;
 /// *Reckoned.* Repeats without which a spike cannot be told from a form.
 pub(crate) const SPIKE_REPEATS: usize = 3;

@@ -16,20 +16,32 @@ impl CircleFit {
         std::f64::consts::TAU - around(points, self.circle.centre).1
     }
 
+    /// Root mean square of the deviations, µm.
+    fn rms_um(&self) -> f64 {
+        let squares: f64 = self.residuals_um.iter().map(|d| d * d).sum();
+        (squares / self.residuals_um.len() as f64).sqrt()
+    }
+
+    /// Whether the deviations are no more than the rounding of the coordinates.
+    pub(super) fn is_rounding(&self) -> bool {
+        let c = self.circle;
+        let magnitude = c.radius + c.centre.x.abs().max(c.centre.y.abs());
+        self.rms_um() <= 1e3 * 64.0 * f64::EPSILON * magnitude
+    }
+
     /// The probability that independent deviations of the fitted `points` would have neighbours as much
-    /// alike as these: von Neumann's ratio of squared successive differences to squares, in the order of
-    /// the angle from the widest gap on in each of the `passes` (that of each point), against its mean and variance for the residuals of this fit
-    /// (their ratio is independent of the sum of squares, E. J. G. Pitman 1937), taken as normal.
+    /// alike as these: von Neumann's ratio of squared successive differences to squares, in each pass in the
+    /// order of the angle from the widest gap on, against its mean and variance for the residuals of this fit
+    /// (their ratio is independent of the sum of squares, E. J. G. Pitman 1937), taken as normal. `passes`: the
+    /// pass of each point.
     ///
     /// Nothing where the deviations are rounding, or fewer than four degrees of freedom are left.
     pub fn neighbours_alike(&self, points: &[Point], passes: &[usize]) -> Option<f64> {
         let n = points.len();
         let c = self.circle;
-        let magnitude = c.radius + c.centre.x.abs().max(c.centre.y.abs());
-        let rms_um = (self.residuals_um.iter().map(|d| d * d).sum::<f64>() / n as f64).sqrt();
-        let rounding = rms_um <= 1e3 * 64.0 * f64::EPSILON * magnitude;
+        let rms_um = self.rms_um();
         let of_all = n == self.residuals_um.len() && n == passes.len();
-        if !of_all || self.degrees_of_freedom < 4 || rounding {
+        if !of_all || self.degrees_of_freedom < 4 || self.is_rounding() {
             return None;
         }
         let mut last = BTreeMap::new();

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use errsep_models::four_sensor::simulate::{Disturbances, Example, Truth, simulate};
 use errsep_models::four_sensor::{
-    Choice, Geometry, Line, Outputs, Penalised, Separation, Separator, Settings,
+    Along, Choice, Geometry, Line, Outputs, Penalised, Separation, Separator, Settings,
 };
 use errsep_models::straightness::{ReferenceLine, straightness};
 use errsep_models::uncertainty::DegreesOfFreedom;
@@ -27,6 +27,8 @@ struct Case {
     power: Option<f64>,
     penalised: Penalised,
     noise: f64,
+    /// Share of its variance that goes on along the slide, and over how many steps.
+    goes_on: Option<(f64, f64)>,
     stated: bool,
     repeats: u64,
     slide: Slide,
@@ -49,6 +51,7 @@ const USUAL: Case = Case {
     power: None,
     penalised: Penalised::Profile,
     noise: 0.1,
+    goes_on: None,
     stated: false,
     repeats: 1,
     slide: Slide::Paper,
@@ -117,6 +120,23 @@ const CASES: &[Case] = &[
         spacing: [5, 5, 5],
         ..USUAL
     },
+    Case {
+        name: "paper's surface, 0.1 µm, half of the variance over 4 readings",
+        goes_on: Some((0.5, 4.0)),
+        ..USUAL
+    },
+    Case {
+        name: "paper's surface, 0.1 µm, four fifths over 8 readings",
+        goes_on: Some((0.8, 8.0)),
+        ..USUAL
+    },
+    Case {
+        name: "waves ∝ 1/order, 0.1 µm, penalty on the curvature, half of the variance over 4 readings",
+        power: Some(1.0),
+        penalised: Penalised::Curvature,
+        goes_on: Some((0.5, 4.0)),
+        ..USUAL
+    },
 ];
 
 pub fn rows(seeds: u64) -> Vec<Row> {
@@ -171,6 +191,16 @@ const ZONE_CASES: &[Case] = &[
         spacing: [5, 5, 5],
         ..USUAL
     },
+    Case {
+        name: "paper's surface, 0.1 µm, half of the variance over 4 readings",
+        goes_on: Some((0.5, 4.0)),
+        ..USUAL
+    },
+    Case {
+        name: "paper's surface, 0.1 µm, four fifths over 8 readings",
+        goes_on: Some((0.8, 8.0)),
+        ..USUAL
+    },
 ];
 
 /// The minimum zone of slides from straight to tens of µm.
@@ -215,6 +245,7 @@ struct Measured {
     settings: Settings,
     separator: Separator,
     found: Separation,
+    along: Option<Along>,
     degrees: DegreesOfFreedom,
 }
 
@@ -226,14 +257,16 @@ impl Measured {
         let mut mean = vec![[0.0; 4]; geometry.output_count()];
         for repeat in 0..case.repeats {
             let of_repeat = seed * case.repeats + repeat;
-            let noise = Disturbances::noise(case.noise);
+            let (share, length) = case.goes_on.unwrap_or((0.0, 1.0));
+            let noise = Disturbances::noise(case.noise * (1.0 - share).sqrt());
             let outputs = simulate(&geometry, &truth, &noise, of_repeat).ok()?;
+            let mut going_on = going_on(case.noise * share.sqrt(), length, of_repeat);
             for (sum, reading) in mean
                 .as_flattened_mut()
                 .iter_mut()
                 .zip(outputs.readings().as_flattened())
             {
-                *sum += reading / case.repeats as f64;
+                *sum += (reading + going_on()) / case.repeats as f64;
             }
         }
         let outputs = Outputs::new(geometry, 0.0, mean).ok()?;
@@ -244,9 +277,16 @@ impl Measured {
             ..Settings::default()
         };
         let separator = Separator::new(&geometry, case.penalised, Line::EndPoints).ok()?;
-        let found = separator.separate(&outputs, &settings).ok()?;
-        let degrees = found
-            .degrees_of_freedom
+        let mut found = separator.separate(&outputs, &settings).ok()?;
+        let along = if case.stated || case.repeats > 1 {
+            None
+        } else {
+            let found = &mut found;
+            (separator.count_correlation(&outputs, &settings, found)).ok()?
+        };
+        let of_excess = found.excess.map(|excess| excess.degrees);
+        let degrees = of_excess
+            .or(found.degrees_of_freedom)
             .unwrap_or(DegreesOfFreedom::Infinite);
         Some(Self {
             truth,
@@ -254,8 +294,23 @@ impl Measured {
             settings,
             separator,
             found,
+            along,
             degrees,
         })
+    }
+}
+
+/// Noise of four sensors in turn, each of which keeps a part of its own from step to step.
+fn going_on(size: f64, length: f64, seed: u64) -> impl FnMut() -> f64 {
+    let mut random = ChaCha8Rng::seed_from_u64(0x676f_6573 + seed);
+    let kept = (-1.0 / length).exp();
+    let (mut state, mut next) = ([None::<f64>; 4], 0);
+    move || {
+        let new: f64 = StandardNormal.sample(&mut random);
+        let own = state[next].map_or(new, |last| kept * last + (1.0 - kept * kept).sqrt() * new);
+        state[next] = Some(own);
+        next = (next + 1) % 4;
+        size * own
     }
 }
 
@@ -299,6 +354,7 @@ fn zone(measured: &Measured) -> Option<Tally> {
             &measured.settings,
             &measured.found,
             measured.degrees,
+            measured.along.as_ref(),
         )
         .ok()?;
     let positions = measured.outputs.slide_positions();

@@ -69,8 +69,8 @@ pub(crate) const LIKELIER_BY_DRIFTS: f64 = 12.0;
 /// may be correlated along its trace than under white noise, for it to be, and causes beside white noise than such noise, for
 /// them to be named.
 pub(crate) const LIKELIER_BY_CORRELATION: f64 = 3.0;
-/// *Limit.* Standard deviation of the part of noise that is correlated over that of the white part, where there are no
-/// repeats: what is more is no noise.
+/// *Limit.* Standard deviation of the part of noise that is correlated over that of the white part of a reading, where there
+/// are no repeats: what is more is no noise.
 pub(crate) const MOST_CORRELATED: f64 = 2.0;
 /// *Limit.* Jumps of so little height that are taken out of all readings; of more none is.
 pub(crate) const MOST_JUMPS: usize = 3;

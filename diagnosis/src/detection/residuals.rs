@@ -42,12 +42,14 @@ pub(crate) fn by_residuals(
     });
     let (spacing, travel) =
         spacing_and_length(ends).filter(|_| model.correlated_noise() && white > 0.0)?;
+    // The mean of many readings has less white noise than each.
+    let most = MOST_CORRELATED * model.readings_in_each().max(1.0).sqrt();
     let mut laws = vec![Law::of_white(1.0)];
     let lengths = (spacing.ln(), travel.max(2.0 * spacing).ln());
     for size in 0..SIZES {
         // Half-Cauchy's law of scale one below the greatest size.
         let part = (size as f64 + 0.5) / SIZES as f64;
-        let sd = (part * MOST_CORRELATED.atan()).tan();
+        let sd = (part * most.atan()).tan();
         for length in 0..LENGTHS {
             let part = (length as f64 + 0.5) / LENGTHS as f64;
             laws.push(Law {

@@ -24,9 +24,10 @@ pub(super) struct Settled {
 }
 
 impl Settled {
-    /// f, S and γ.
-    pub(super) fn profiles(self) -> [DVector<f64>; 3] {
-        [self.surface, self.straightness, self.tilt]
+    /// f, S, γ and e.
+    pub(super) fn profiles(self) -> [DVector<f64>; 4] {
+        let zero = DVector::from_column_slice(self.zero_adjustment.as_slice());
+        [self.surface, self.straightness, self.tilt, zero]
     }
 }
 

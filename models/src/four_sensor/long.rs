@@ -11,8 +11,8 @@ use super::gauge::conditions;
 use super::separation::{degrees_of_freedom, normal};
 use super::zone::minimum_zone;
 use super::{
-    FourSensorError, Geometry, Line, MinimumZone, Outputs, Parabola, Penalised, Profile,
-    Separation, Settings, choice, direct, repeats, scatter,
+    Along, FourSensorError, Geometry, Line, MinimumZone, Outputs, Parabola, Penalised, Profile,
+    Separation, Settings, choice, direct, excess, scatter,
 };
 use crate::uncertainty::DegreesOfFreedom;
 use crate::units::UM_PER_MM;
@@ -173,23 +173,48 @@ impl<'a> LongSeparator<'a> {
         })
     }
 
-    /// Errors of f, S and γ that white noise gives, with the λ that was chosen.
+    /// Errors of f, S, γ and e that white noise gives, with the λ that was chosen.
     ///
     /// # Errors
     /// As [`separate`](Self::separate).
-    pub fn noise_errors(&self, found: &Separation) -> Result<Vec<repeats::Found>, FourSensorError> {
-        let geometry = self.outputs.geometry();
+    pub fn noise_errors(&self, found: &Separation) -> Result<Vec<excess::Found>, FourSensorError> {
+        let of = self.error_of_draw(found, None)?;
+        (0..excess::DRAWS).map(of).collect()
+    }
+
+    /// Counts noise that is correlated along the slide in the uncertainties of what was found of outputs that were read once,
+    /// where these show it, and gives it.
+    ///
+    /// # Errors
+    /// As [`separate`](Self::separate).
+    pub fn count_correlation(
+        &self,
+        found: &mut Separation,
+    ) -> Result<Option<Along>, FourSensorError> {
+        let Some(along) = Along::of(self.outputs) else {
+            return Ok(None);
+        };
+        let of = |along| excess::mean_squares(self.error_of_draw(found, along)?);
+        let (correlated, white) = (of(Some(&along))?, of(None)?);
+        found.count_correlation(&along, &correlated, &white);
+        Ok(Some(along))
+    }
+
+    fn error_of_draw<'b>(
+        &'b self,
+        found: &'b Separation,
+        along: Option<&'b Along>,
+    ) -> Result<impl Fn(u64) -> Result<excess::Found, FourSensorError> + 'b, FourSensorError> {
         let factored = self.system.factor(found.chosen.point.lambda)?;
         let frame = Frame::new(self.outputs, self.line, self.settings.parabola);
         let truth = vec![0.0; self.system.penalty_rows()];
-        (0..repeats::DRAWS)
-            .map(|draw| {
-                let noise = self.outputs.random(&mut repeats::random(draw), found.noise);
-                let seen = direct::slide_free_part(geometry, &noise);
-                let error = DVector::from_vec(factored.change(seen.as_slice(), &truth)?);
-                Ok(frame.error(&error, &noise).profiles())
-            })
-            .collect()
+        Ok(move |draw| {
+            let random = &mut excess::random(draw);
+            let noise = found.random_noise(self.outputs, along, random, 1.0);
+            let seen = direct::slide_free_part(self.outputs.geometry(), &noise);
+            let error = DVector::from_vec(factored.change(seen.as_slice(), &truth)?);
+            Ok(frame.error(&error, &noise).profiles())
+        })
     }
 
     /// The minimum-zone straightness of S that was found, the noise known to `degrees` of freedom
@@ -201,13 +226,14 @@ impl<'a> LongSeparator<'a> {
         &self,
         found: &Separation,
         degrees: DegreesOfFreedom,
+        along: Option<&Along>,
     ) -> Result<MinimumZone, FourSensorError> {
         let geometry = self.outputs.geometry();
         let factored = self.system.factor(found.chosen.point.lambda)?;
         let frame = Frame::new(self.outputs, self.line, self.settings.parabola);
         let positions = self.outputs.slide_positions();
         minimum_zone(&positions, &found.straightness.values, degrees, |random| {
-            let noise = self.outputs.random(random, found.noise_of_straightness());
+            let noise = found.noise_of_straightness(self.outputs, along, random);
             let truth: Vec<f64> = (0..self.system.penalty_rows())
                 .map(|_| found.scatter.held_back * normal(random))
                 .collect();

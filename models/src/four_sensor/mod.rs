@@ -12,6 +12,7 @@
 //! fits all of them to the outputs at once; [`PublishedSeparator`] is the paper's own way. Neither
 //! can find the parabola of f: see [`Parabola`].
 
+mod along;
 mod choice;
 mod curves;
 mod diagnosable;
@@ -19,6 +20,7 @@ pub mod direct;
 mod effects;
 mod ends;
 mod error;
+mod excess;
 mod frame;
 mod gauge;
 mod geometry;
@@ -27,25 +29,26 @@ mod long;
 mod outputs;
 mod published;
 mod quantities;
-mod repeats;
+
 mod scatter;
 mod separation;
 pub mod simulate;
 pub mod triples;
 mod zone;
 
+pub use along::Along;
 pub use choice::{Choice, Chosen, Penalised};
 pub use diagnosable::FourSensors;
 pub use effects::amplitude;
 pub use ends::Ends;
 pub use error::FourSensorError;
+pub use excess::{Excess, Found, ToldBy};
 pub use gauge::{Line, Parabola};
 pub use geometry::Geometry;
 pub use likeliest::Likeliest;
 pub use long::{LongSeparator, banded_system, separate_long};
 pub use outputs::Outputs;
 pub use published::{PublishedSeparation, PublishedSeparator};
-pub use repeats::{Excess, Found};
 pub use scatter::Scatter;
 pub use separation::{Profile, Separation, Separator, Settings};
 pub use zone::MinimumZone;

@@ -9,8 +9,8 @@ use super::frame::Frame;
 use super::gauge::section;
 use super::zone::minimum_zone;
 use super::{
-    Choice, Chosen, Excess, FourSensorError, Geometry, Line, MinimumZone, Outputs, Parabola,
-    Penalised, Scatter, choice, direct, repeats, scatter,
+    Along, Choice, Chosen, Excess, FourSensorError, Geometry, Line, MinimumZone, Outputs, Parabola,
+    Penalised, Scatter, choice, direct, excess, scatter,
 };
 use crate::uncertainty::DegreesOfFreedom;
 
@@ -77,14 +77,34 @@ pub struct Separation {
     pub chosen: Chosen,
     /// Coefficient of x² that was given to the surface, µm/mm².
     pub curvature: f64,
-    /// What repeats scatter by beyond the noise, where they were compared and do.
+    /// By how much the errors are greater than white noise gives, where that is told.
     pub excess: Option<Excess>,
 }
 
 impl Separation {
-    /// Standard deviation of white noise that would let S err as the noise does, µm.
-    pub(super) fn noise_of_straightness(&self) -> f64 {
-        self.noise * self.excess.map_or(1.0, |excess| excess.factors[1])
+    /// A draw of the noise of outputs, µm: white, `factor` times as large as it is, or correlated along the slide.
+    pub(super) fn random_noise(
+        &self,
+        outputs: &Outputs,
+        along: Option<&Along>,
+        random: &mut impl Rng,
+        factor: f64,
+    ) -> Vec<[f64; 4]> {
+        match along {
+            Some(along) => along.drawn(outputs, random),
+            None => outputs.random(random, factor * self.noise),
+        }
+    }
+
+    /// A draw of such noise of outputs, µm, as lets S err as it does.
+    pub(super) fn noise_of_straightness(
+        &self,
+        outputs: &Outputs,
+        along: Option<&Along>,
+        random: &mut impl Rng,
+    ) -> Vec<[f64; 4]> {
+        let factor = self.excess.map_or(1.0, |excess| excess.factors[1]);
+        self.random_noise(outputs, along, random, factor)
     }
 }
 
@@ -189,7 +209,7 @@ impl Separator {
         })
     }
 
-    /// Errors of f, S and γ that white noise gives, with the λ that was chosen.
+    /// Errors of f, S, γ and e that white noise gives, with the λ that was chosen.
     ///
     /// # Errors
     /// As [`separate`](Self::separate).
@@ -198,18 +218,47 @@ impl Separator {
         outputs: &Outputs,
         settings: &Settings,
         found: &Separation,
-    ) -> Result<Vec<repeats::Found>, FourSensorError> {
+    ) -> Result<Vec<excess::Found>, FourSensorError> {
+        let of = self.error_of_draw(outputs, settings, found, None)?;
+        (0..excess::DRAWS).map(of).collect()
+    }
+
+    /// Counts noise that is correlated along the slide in the uncertainties of what was found of outputs that were read once,
+    /// where these show it, and gives it.
+    ///
+    /// # Errors
+    /// As [`separate`](Self::separate).
+    pub fn count_correlation(
+        &self,
+        outputs: &Outputs,
+        settings: &Settings,
+        found: &mut Separation,
+    ) -> Result<Option<Along>, FourSensorError> {
+        let Some(along) = Along::of(outputs) else {
+            return Ok(None);
+        };
+        let of = |along| excess::mean_squares(self.error_of_draw(outputs, settings, found, along)?);
+        let (correlated, white) = (of(Some(&along))?, of(None)?);
+        found.count_correlation(&along, &correlated, &white);
+        Ok(Some(along))
+    }
+
+    fn error_of_draw<'a>(
+        &'a self,
+        outputs: &'a Outputs,
+        settings: &Settings,
+        found: &'a Separation,
+        along: Option<&'a Along>,
+    ) -> Result<impl Fn(u64) -> Result<excess::Found, FourSensorError> + 'a, FourSensorError> {
         self.check(outputs)?;
         let lambda = found.chosen.point.lambda;
         let frame = Frame::new(outputs, self.line, settings.parabola);
-        (0..repeats::DRAWS)
-            .map(|draw| {
-                let noise = outputs.random(&mut repeats::random(draw), found.noise);
-                let seen = direct::slide_free_part(&self.geometry, &noise);
-                let error = self.decomposition.with_data(&seen)?.solution(lambda)?;
-                Ok(frame.error(&(&self.section * error), &noise).profiles())
-            })
-            .collect()
+        Ok(move |draw| {
+            let noise = found.random_noise(outputs, along, &mut excess::random(draw), 1.0);
+            let seen = direct::slide_free_part(&self.geometry, &noise);
+            let error = self.decomposition.with_data(&seen)?.solution(lambda)?;
+            Ok(frame.error(&(&self.section * error), &noise).profiles())
+        })
     }
 
     /// The minimum-zone straightness of S that was found of these outputs, the noise known to `degrees`
@@ -223,6 +272,7 @@ impl Separator {
         settings: &Settings,
         found: &Separation,
         degrees: DegreesOfFreedom,
+        along: Option<&Along>,
     ) -> Result<MinimumZone, FourSensorError> {
         self.check(outputs)?;
         let lambda = found.chosen.point.lambda;
@@ -231,7 +281,7 @@ impl Separator {
         let frame = Frame::new(outputs, self.line, settings.parabola);
         let positions = outputs.slide_positions();
         minimum_zone(&positions, &found.straightness.values, degrees, |random| {
-            let noise = outputs.random(random, found.noise_of_straightness());
+            let noise = found.noise_of_straightness(outputs, along, random);
             let seen = self
                 .decomposition
                 .with_data(&direct::slide_free_part(&self.geometry, &noise))?;

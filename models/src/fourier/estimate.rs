@@ -1,5 +1,6 @@
 //! Coefficients of all orders with their covariance, from joined scans and the steps at their joints.
 
+use super::along::Along;
 use super::group::{Group, group, information};
 use super::joint::{Joint, ShiftTerm, join, sum_of};
 use super::result::{Combination, JointStep, OrderResult};
@@ -96,6 +97,18 @@ impl<'a> Joined<'a> {
             all.insert(place, &fit(std::slice::from_ref(g))?);
         }
         Some(all)
+    }
+
+    /// Variance of the steps over that of white noise.
+    pub fn steps_under(&self, along: Option<&Along>, taken: &Taken) -> f64 {
+        match (along, taken) {
+            (None, _) => 1.0,
+            (Some(along), Taken::Readings(_)) => along.of_reading(),
+            (Some(along), Taken::Fitted(_)) => {
+                let each = self.groups.iter().filter(|g| g.has_step());
+                each.map(|g| along.of_step(g)).fold(1.0, f64::max)
+            }
+        }
     }
 
     /// Fitted steps of the spacings that have a third probe, for unit noise.

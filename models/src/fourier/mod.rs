@@ -7,6 +7,7 @@
 //!
 //! Positions and spacings are in mm, readings and profiles in µm.
 
+mod along;
 mod beyond;
 mod diagnosable;
 mod effects;

@@ -43,6 +43,16 @@ pub struct OrderResult {
     pub lost: bool,
 }
 
+impl Separation {
+    /// White and correlated standard deviation of a reading, µm, and the length, mm, where repeats tell noise that is
+    /// correlated along the scans.
+    #[must_use]
+    pub fn correlated_noise(&self) -> Option<(f64, f64, f64)> {
+        let (white, correlated, length) = self.errors.along.as_ref()?.parts();
+        Some((self.noise.0 * white, self.noise.0 * correlated, length))
+    }
+}
+
 impl OrderResult {
     /// Root mean square of the standard uncertainties of both parts, µm.
     #[must_use]

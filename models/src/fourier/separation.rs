@@ -1,6 +1,7 @@
 //! The profile from the difference signals: one spacing, the best spacing of each order, or all
 //! spacings by least squares.
 
+use super::along::Along;
 use super::beyond::beyond_orders;
 use super::estimate::{Joined, Taken};
 use super::joint::{Compensation, Joint, ShiftTerm, step_terms};
@@ -65,7 +66,19 @@ pub fn separate(
         })?),
         _ => Taken::Readings(terms(scans, section, used)?),
     };
-    let profiled = joined.profile(section, combination, &taken);
+    let mut profiled = joined.profile(section, combination, &taken);
+    let along = Along::of(&joined.groups, &joined.joints, section.length)
+        .filter(|_| source == NoiseSource::Repeats);
+    let of_step = joined.steps_under(along.as_ref(), &taken);
+    if let Some(along) = &along {
+        profiled.spread.under(along, of_step);
+    }
+    let degrees_of_freedom = match &along {
+        Some(along) if along.freedom < degrees_of_freedom.as_f64() => {
+            DegreesOfFreedom::Finite(along.freedom)
+        }
+        _ => degrees_of_freedom,
+    };
     let mut orders = profiled.orders;
     for (place, order) in orders.iter_mut().enumerate() {
         let parts = profiled.spread.order(place);
@@ -90,6 +103,7 @@ pub fn separate(
         scans: same_length(&joined.joints, samples).count(),
         weights: weights(&joined.joints, samples),
         first: first_scatter(&joined.joints, samples).map_or(1.0, |s| s / sigma),
+        along,
     };
     let straightness_std = scaled(straightness_std);
     let rise = mean(joined.joints.iter().filter_map(|j| j.rise));
@@ -112,7 +126,7 @@ pub fn separate(
         steps: steps
             .into_iter()
             .map(|step| JointStep {
-                std: sigma * step.std,
+                std: sigma * of_step.sqrt() * step.std,
                 ..step
             })
             .collect(),

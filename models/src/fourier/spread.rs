@@ -1,5 +1,6 @@
 //! Uncertainty of orders, profile and straightness from the noise of the readings.
 
+use super::along::Along;
 use super::group::Group;
 use super::joint::ShiftTerm;
 use super::spectrum::{coefficients, profile};
@@ -32,6 +33,17 @@ impl Spread {
         Self {
             own,
             shared: Vec::new(),
+        }
+    }
+
+    /// The same under noise that is correlated along the scans: `of_shared` is how many times as great it makes what acts on all
+    /// orders together.
+    pub fn under(&mut self, along: &Along, of_shared: f64) {
+        for (place, own) in self.own.iter_mut().enumerate() {
+            *own *= along.of_order(place + 1);
+        }
+        for (weight, _) in &mut self.shared {
+            *weight *= of_shared;
         }
     }
 
@@ -79,7 +91,7 @@ impl Spread {
     }
 
     /// An error of the coefficients for unit noise of a reading, given that of P1: `first` has the
-    /// coefficients of the mean noise of P1, orders 0, 1, …, each part of variance `variance`, and
+    /// coefficients of the mean noise of P1, orders 0, 1, …, each part of the variance `variance` of its order, and
     /// `through` what of it passes into each order of the profile.
     ///
     /// What readings at a joint do to several orders at once is drawn apart from P1, and what they add
@@ -88,13 +100,16 @@ impl Spread {
         &self,
         random: &mut impl Rng,
         first: &[Complex64],
-        variance: f64,
+        variance: impl Fn(usize) -> f64,
         through: &[Complex64],
     ) -> Vec<Complex64> {
         let mut normal = || -> f64 { StandardNormal.sample(random) };
         let mut series = vec![Complex64::default()];
-        for ((own, of_first), passed) in self.own.iter().zip(first.iter().skip(1)).zip(through) {
-            let rest = (own - passed.norm_sqr() * variance).max(0.0).sqrt();
+        let parts = self.own.iter().zip(first.iter().skip(1)).zip(through);
+        for (place, ((own, of_first), passed)) in parts.enumerate() {
+            let rest = (own - passed.norm_sqr() * variance(place + 1))
+                .max(0.0)
+                .sqrt();
             series.push(passed * of_first + rest * Complex64::new(normal(), normal()));
         }
         for (weight, response) in self.shared.iter().filter(|(weight, _)| *weight > 0.0) {

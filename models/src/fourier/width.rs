@@ -12,6 +12,7 @@ use rand_distr::{Distribution, StandardNormal};
 use realfft::num_complex::Complex64;
 use std::convert::Infallible;
 
+use super::along::Along;
 use super::result::Separation;
 use super::separation::straightness;
 use super::spectrum::{coefficients, profile};
@@ -35,6 +36,8 @@ pub(super) struct Errors {
     /// By how much P1 scatters from scan to scan, over the noise of a reading; 1 with one scan, which does
     /// not tell it.
     pub first: f64,
+    /// Noise that is correlated along the scans.
+    pub along: Option<Along>,
 }
 
 /// Variance of what P1 passes into the workpiece at most: the difference of two probes whose variances are
@@ -48,21 +51,30 @@ impl Errors {
         let (passed, own) = self.of_first();
         let mut white = |variance: f64| -> Vec<f64> {
             let scale = (variance / scans).sqrt();
-            let weights = self.weights.iter().take(samples);
-            weights.map(|w| w.sqrt() * scale * normal(random)).collect()
+            let noise = match &self.along {
+                Some(along) => along.draw(random, samples),
+                None => (0..samples).map(|_| normal(random)).collect(),
+            };
+            let weights = noise.iter().zip(&self.weights);
+            weights.map(|(e, w)| w.sqrt() * scale * e).collect()
         };
         let (first, alone) = (white(passed), white(own));
         let series = self.spread.draw(
             random,
             &coefficients(&first, self.through_first.len()),
             // Of a part of an order of the mean of n scans of N readings.
-            0.5 * passed / (scans * samples as f64),
+            |order| 0.5 * passed * self.of_order(order) / (scans * samples as f64),
             &self.through_first,
         );
         let workpiece = profile(&series, samples);
         let first = first.iter().zip(&alone).map(|(first, own)| first + own);
         let slide = first.zip(&workpiece).map(|(f, w)| f - w).collect();
         [workpiece, slide]
+    }
+
+    fn of_order(&self, order: usize) -> f64 {
+        let along = self.along.as_ref();
+        along.map_or(1.0, |along| along.of_order(order))
     }
 
     /// Variance of P1 that passes into the workpiece, and the rest: what makes P1 scatter more than the

@@ -11,6 +11,7 @@ mod law;
 mod likelihood;
 mod moments;
 mod posterior;
+mod within_cells;
 mod without_lines;
 
 pub use contrasts::Contrasts;
@@ -18,6 +19,7 @@ pub use law::{Law, about_middle, decays, drift_form, markov_form};
 pub use likelihood::{Likelihood, Likelihoods, OfWhole};
 pub use moments::Moments;
 pub use posterior::{NoiseValues, Possible, Posterior};
+pub use within_cells::WithinCells;
 pub use without_lines::WithoutLines;
 
 /// A trace of this many readings can show what is correlated along it.

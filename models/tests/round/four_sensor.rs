@@ -300,11 +300,12 @@ fn the_long_way_is_the_same_fit() {
             let separator = Separator::new(&paper(), penalised, line).expect("well posed");
             let short = separator.separate(&outputs, &settings).expect("separates");
             let degrees = DegreesOfFreedom::new(20.0).expect("positive");
-            let short_zone = separator.straightness_error(&outputs, &settings, &short, degrees);
+            let short_zone =
+                separator.straightness_error(&outputs, &settings, &short, degrees, None);
             let long = LongSeparator::new(&outputs, penalised, line, &settings).expect("builds");
             let zone = long
                 .separate()
-                .and_then(|found| long.straightness_error(&found, degrees));
+                .and_then(|found| long.straightness_error(&found, degrees, None));
             let long = long.separate().expect("separates");
             for (a, b) in [
                 (&short.surface, &long.surface),

@@ -1,6 +1,6 @@
 //! The answer as JSON, schema `errsep.four-sensor/1` (docs/json/four-sensor.md).
 
-use errsep_models::four_sensor::{Parabola, Penalised, Profile};
+use errsep_models::four_sensor::{Excess, Parabola, Penalised, Profile, ToldBy};
 use serde_json::{Value, json};
 
 use super::Found;
@@ -108,10 +108,22 @@ pub(super) fn json(found: &Found) -> Result<Value, Message> {
             "degrees_of_freedom": s.chosen.point.residual_degrees_of_freedom(rows),
         },
         "disagreement": disagreement::as_json(found.disagreement()),
-        "repeats": s.excess.map(|excess| json!({
-            "factors": {"f": excess.factors[0], "S": excess.factors[1], "gamma": excess.factors[2]},
-            "p_value": excess.p_value,
-        })),
+        "repeats": s.excess.and_then(|excess| match excess.told_by {
+            ToldBy::Repeats { p_value } => Some(json!({
+                "factors": factors(&excess),
+                "p_value": p_value,
+            })),
+            ToldBy::Outputs { .. } => None,
+        }),
+        "correlated_noise": s.excess.and_then(|excess| match excess.told_by {
+            ToldBy::Repeats { .. } => None,
+            ToldBy::Outputs { law } => Some(json!({
+                "white": law.white.sqrt(),
+                "correlated": law.correlated.sqrt(),
+                "length": law.length,
+                "factors": factors(&excess),
+            })),
+        }),
         "remarks": excess(found).into_iter().chain(refuted(found)).collect::<Vec<_>>(),
         "uncertainty": coverage_json(found.degrees_of_freedom())?,
         "published": found.published.as_ref().map(|way| json!({
@@ -152,4 +164,8 @@ const fn parabola_key(parabola: Parabola) -> &'static str {
 pub(super) fn residual_rms(residuals: &[[f64; 4]]) -> f64 {
     let squares: f64 = residuals.iter().flatten().map(|r| r * r).sum();
     (squares / (4 * residuals.len()) as f64).sqrt()
+}
+
+fn factors(excess: &Excess) -> Value {
+    json!({"f": excess.factors[0], "S": excess.factors[1], "gamma": excess.factors[2]})
 }

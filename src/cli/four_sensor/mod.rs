@@ -179,6 +179,8 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let degrees = |found: &Separation| {
         how_well_known(found, noise_stated, &measured).unwrap_or(DegreesOfFreedom::Infinite)
     };
+    // A noise that is stated is stated of independent readings.
+    let once = |found: &Separation| found.noise_estimated && measured.repeats == 1;
     let (separation, straightness_error) = if dense {
         let separator = Separator::new(geometry, setup.penalised, setup.line).map_err(unsolved)?;
         let way = PublishedSeparator::new(geometry).map_err(unsolved)?;
@@ -204,9 +206,19 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
                     let draws = separator.noise_errors(outputs, &setup.settings, &found)?;
                     found.count_repeats(&each, &draws, degrees(&found), setup.settings.parabola);
                 }
+                let along = match once(&found) {
+                    true => separator.count_correlation(outputs, &setup.settings, &mut found)?,
+                    false => None,
+                };
                 let degrees = degrees(&found);
-                let error =
-                    separator.straightness_error(outputs, &setup.settings, &found, degrees)?;
+                let along = along.as_ref();
+                let error = separator.straightness_error(
+                    outputs,
+                    &setup.settings,
+                    &found,
+                    degrees,
+                    along,
+                )?;
                 Ok((found, error))
             })
     } else {
@@ -223,7 +235,12 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
                     let draws = separator.noise_errors(&found)?;
                     found.count_repeats(&each, &draws, degrees(&found), setup.settings.parabola);
                 }
-                let error = separator.straightness_error(&found, degrees(&found))?;
+                let along = match once(&found) {
+                    true => separator.count_correlation(&mut found)?,
+                    false => None,
+                };
+                let degrees = degrees(&found);
+                let error = separator.straightness_error(&found, degrees, along.as_ref())?;
                 Ok((found, error))
             },
         )

@@ -182,7 +182,7 @@ fn regularization(found: &Found) -> Section {
         section = section.warning(format!("About this penalty: {note}."));
     }
     if let Some(warning) = excess(found) {
-        section = section.warning(format!("Repeats: {warning}."));
+        section = section.warning(format!("Noise: {warning}."));
     }
     if let Some(warning) = uneven(found) {
         section = section.warning(warning);

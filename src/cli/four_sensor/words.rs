@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use errsep_models::four_sensor::{Parabola, Penalised};
+use errsep_models::four_sensor::{Parabola, Penalised, ToldBy};
 use errsep_models::uncertainty::coverage_factor;
 use errsep_solvers::regularization::{CornerStatus, Discrepancy};
 use nalgebra::DVector;
@@ -204,15 +204,26 @@ pub(super) fn uneven(found: &Found) -> Option<String> {
     })
 }
 
-/// Repeats that scatter by more than the noise of their readings, once each is separated by itself.
+/// Repeats that scatter by more than the noise of their readings, once each is separated by itself, or noise that is
+/// correlated along the slide.
 pub(super) fn excess(found: &Found) -> Option<String> {
     let excess = found.separation.excess?;
-    Some(format!(
-        "separated one by one, the repeats scatter {} times as much in S as the noise of their readings gives: a \
-         sensor drifts within a repeat, is noisier than the others, or the positions do not repeat; the \
-         uncertainties count it",
-        number::plain(excess.factors[1], 2)
-    ))
+    let factor = number::plain(excess.factors[1], 2);
+    Some(match excess.told_by {
+        ToldBy::Repeats { .. } => format!(
+            "separated one by one, the repeats scatter {factor} times as much in S as the noise of their readings gives: a \
+             sensor drifts within a repeat, is noisier than the others, or the positions do not repeat; the \
+             uncertainties count it"
+        ),
+        ToldBy::Outputs { law } => format!(
+            "the outputs disagree with each other as if their noise were correlated along the slide: {} µm of each reading \
+             alone and {} µm over {} mm; the uncertainties count it, that of S {factor} times as large as independent \
+             readings would have it; what the model misses would look the same, and repeats would tell",
+            number::plain(law.white.sqrt(), 2),
+            number::plain(law.correlated.sqrt(), 2),
+            number::plain(law.length, 2)
+        ),
+    })
 }
 
 /// Outputs that the noise does not explain.

@@ -314,13 +314,21 @@ fn counted(scans: usize) -> String {
     format!("{scans} scan{}", if scans == 1 { "" } else { "s" })
 }
 
-fn noise_words(s: &Separation) -> &'static str {
-    match s.noise.1 {
+fn noise_words(s: &Separation) -> String {
+    if let Some((_, correlated, length)) = s.correlated_noise() {
+        return format!(
+            "from the repeats; {} µm of it goes on along a scan, over {} mm, which the uncertainties count",
+            number::plain(correlated, 2),
+            number::plain(length, 2)
+        );
+    }
+    let source = match s.noise.1 {
         NoiseSource::Given => "given",
         NoiseSource::Repeats => "from the repeats",
         NoiseSource::Spacings => "from the disagreement of the spacings, whatever the form",
         NoiseSource::BeyondOrders => "from the finest orders: holds form of that fineness too",
-    }
+    };
+    source.to_owned()
 }
 
 fn as_json(
@@ -342,7 +350,9 @@ fn as_json(
             "filled": scan.filled.iter().filter_map(|f| Some(scan.readings.get(f.index)?.x)).collect::<Vec<_>>(),
             "probes": if scan.has_third_probe() { 3 } else { 2 },
         })).collect::<Vec<_>>(),
-        "noise": {"value": s.noise.0, "unit": "um", "source": s.noise.1, "first_probe": s.first_scatter},
+        "noise": {"value": s.noise.0, "unit": "um", "source": s.noise.1, "first_probe": s.first_scatter,
+            "correlated": s.correlated_noise().map(|(white, correlated, length)| json!({
+                "white": white, "correlated": correlated, "length": length}))},
         "uncertainty": coverage_json(Some(s.degrees_of_freedom))?,
         "steps": s.steps.iter().map(|j| json!({
             "spacing": j.spacing,

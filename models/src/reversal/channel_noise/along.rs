@@ -17,7 +17,7 @@ use super::pairs::{Pair, Pairs};
 use super::sum_of_squares;
 use super::survey::Survey;
 use super::traces::Group;
-use crate::noise::{Contrasts, Law, Moments, Posterior, about_middle, decays};
+use crate::noise::{Contrasts, Law, Moments, Posterior, WithinCells, about_middle, decays};
 use crate::reversal::simultaneous::SharedNoise;
 
 /// Draws behind the share of the noise that the fit takes up.
@@ -55,8 +55,8 @@ pub struct AlongTraces {
     /// Variance, in weighted units, of what the model misses at a place in all repeats alike, and its
     /// degrees of freedom.
     missed: (f64, f64),
-    /// Readings of a trace in a cell, on average.
-    readings_a_cell: f64,
+    /// The law of a reading.
+    of_a_reading: Law,
 }
 
 /// Opposite indicators that may share what they read in one pass.
@@ -91,7 +91,8 @@ impl AlongTraces {
         let gathered = Gathered::new(&fit.row, survey, &survey.repeats, fit.weights)?;
         let together = Pairs::of(survey, &gathered, fit.weights)
             .and_then(|pairs| Together::new(pairs, survey, &weighted, &ones));
-        let mut along = Self::with(gathered, apart, together);
+        let within = survey.within_cells(&survey.repeats, &weighted);
+        let mut along = Self::with(gathered, apart, within, together);
         along.missed = along.missed(fit, survey, &survey.repeats, &weighted);
         Ok(Some(along))
     }
@@ -102,23 +103,26 @@ impl AlongTraces {
         survey: &Survey,
         residuals: &[Vec<f64>],
     ) -> Result<Option<Self>, NoValue> {
-        let Some((groups, posterior)) = between::correlated(survey, residuals, fit.weights) else {
+        let weighted = times(residuals, fit.weights);
+        let within = |groups: &[Group]| survey.within_cells(groups, &weighted);
+        let found = between::correlated(survey, residuals, fit.weights, within);
+        let Some((groups, posterior, within)) = found else {
             return Ok(None);
         };
-        let weighted = times(residuals, fit.weights);
         let gathered = Gathered::new(&fit.row, survey, &groups, fit.weights)?;
-        let mut along = Self::with(gathered, posterior, None);
+        let mut along = Self::with(gathered, posterior, within, None);
         along.missed = along.missed(fit, survey, &groups, &weighted);
         Ok(Some(along))
     }
 
     /// Nothing missed as yet.
-    fn with(gathered: Gathered, apart: Posterior, together: Option<Together>) -> Self {
-        let (cells, readings) = gathered
-            .traces
-            .iter()
-            .flat_map(|t| &t.rows)
-            .fold((0.0, 0.0), |(c, r), row| (c + 1.0, r + row.count));
+    fn with(
+        gathered: Gathered,
+        apart: Posterior,
+        within: WithinCells,
+        together: Option<Together>,
+    ) -> Self {
+        let of_a_reading = within.law(&apart);
         let positions = gathered.traces.iter().map(|t| &t.positions[..]);
         let apart = Laws::new(apart, positions);
         Self {
@@ -126,7 +130,7 @@ impl AlongTraces {
             apart,
             together,
             missed: (0.0, 1.0),
-            readings_a_cell: readings / f64::max(cells, 1.0),
+            of_a_reading,
         }
     }
 
@@ -158,19 +162,17 @@ impl AlongTraces {
 
     /// The law of one reading of the mean weight in weighted units: the mean of what the repeats allow.
     pub fn law(&self) -> Law {
-        let law = self.apart.mean();
-        Law {
-            white: law.white * self.readings_a_cell,
-            ..law
-        }
+        self.of_a_reading
     }
 
     /// What opposite indicators share in one reading, where that is likelier than that they share nothing; `unit` is the
     /// variance of a weighted unit, µm².
     pub fn shared(&self, unit: f64) -> Option<SharedNoise> {
         let shared = self.likelier()?;
+        let means = self.apart.mean();
+        let of_a_reading = (self.of_a_reading.of_readings() - means.correlated) / means.white;
         let [together, against] = shared.means().map(|law| Law {
-            white: law.white * self.readings_a_cell,
+            white: law.white * of_a_reading,
             ..law
         });
         let [both, one] = [&together, &against].map(|law| shared.variance_of_a_reading(law));

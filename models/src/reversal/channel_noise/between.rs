@@ -15,14 +15,7 @@ use rayon::prelude::*;
 use super::survey::Survey;
 use super::traces::{self, Group};
 use super::{Seat, rms};
-use crate::noise::{Posterior, WithoutLines};
-
-/// Variance of the correlated part of noise in that of its white part, at most; what is more is no noise.
-const MOST_CORRELATED: f64 = 9.0;
-/// Probability from which on noise is taken as correlated. Of 200 closures of 61 positions with white noise 22 reach 0.5, 8
-/// this and 2 reach 0.8, of as many with half of the variance correlated over a twentieth of the travel 169, 148 and 113; with both directions
-/// 12, 5, 0 and 200, 199, 199.
-const PROBABLE: f64 = 0.65;
+use crate::noise::{Posterior, WithinCells, WithoutLines};
 
 /// A trace of each channel and direction on its cells, and what is left of its readings there, in weighted units.
 struct Passes {
@@ -102,12 +95,13 @@ fn closures(seats: &[Seat]) -> Vec<[(usize, f64); 4]> {
 }
 
 /// The laws of noise that channels allow against each other, with their passes, where a part of it is likelier to be
-/// correlated along a trace than not and no greater than noise may be.
+/// correlated along a trace than not and no greater than noise may be. `within`: their readings beside the means of the cells.
 pub(super) fn correlated(
     survey: &Survey,
     residuals: &[Vec<f64>],
     weights: &[f64],
-) -> Option<(Vec<Group>, Posterior)> {
+    within: impl FnOnce(&[Group]) -> WithinCells,
+) -> Option<(Vec<Group>, Posterior, WithinCells)> {
     if survey.traces.iter().any(|own| own.len() > 2) || !survey.repeats.is_empty() {
         return None;
     }
@@ -150,14 +144,9 @@ pub(super) fn correlated(
             add(&found);
         }
     }
-    let posterior = Posterior::of(&values).filter(may_be_noise)?;
-    Some((passes.groups, posterior))
-}
-
-/// Whether a part is probably correlated along a trace, and no greater than noise may be.
-pub fn may_be_noise(posterior: &Posterior) -> bool {
-    let law = posterior.mean();
-    posterior.correlated() > PROBABLE && law.correlated <= MOST_CORRELATED * law.white
+    let posterior = Posterior::of(&values)?;
+    let within = within(&passes.groups);
+    (posterior.may_be_noise(&within)).then_some((passes.groups, posterior, within))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use super::levels::Levels;
 use super::passes::{self, BothWays};
 use super::traces::{self, Group, Trace};
 use super::{Seat, SortedReadings};
+use crate::noise::WithinCells;
 use crate::reversal::Direction;
 use crate::reversal::simultaneous::Noise;
 use crate::reversal::straight_line;
@@ -126,6 +127,27 @@ impl<'a> Survey<'a> {
             means[*cell] = sum / range.len() as f64;
         }
         means
+    }
+
+    /// The values of groups beside the means of their cells.
+    pub fn within_cells(&self, groups: &[Group], values: &[Vec<f64>]) -> WithinCells {
+        let of_trace = |group: &Group, trace: usize| {
+            let rows = &self.traces[group.channel][group.traces[trace]];
+            let (x, own) = (self.x[group.channel], &values[group.channel]);
+            let mut within = WithinCells::default();
+            for (_, range) in &group.on_cells[trace].cells {
+                let ends = [range.start, range.end - 1].map(|k| x[rows.row(k)]);
+                within.add(ends[1] - ends[0], range.clone().map(|k| own[rows.row(k)]));
+            }
+            within
+        };
+        let mut all = WithinCells::default();
+        for group in groups {
+            for trace in 0..group.traces.len() {
+                all.extend(&of_trace(group, trace));
+            }
+        }
+        all
     }
 
     /// The repeats of a group on the cells in which all have readings.

@@ -7,7 +7,7 @@ use super::SortedReadings;
 use crate::reversal::Direction;
 
 /// Cells along a trace; more would tell no more of what is correlated along it.
-const MOST_CELLS: usize = 400;
+pub const MOST_CELLS: usize = 400;
 /// Positions of repeats that differ by no more than this share of them count as the same, with
 /// readings left out.
 const LEFT_OUT: f64 = 0.1;

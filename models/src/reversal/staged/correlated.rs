@@ -5,8 +5,8 @@
 
 use super::drift::Drifts;
 use super::trace::Trace;
-use crate::noise::{Law, Posterior, WithoutLines, decays, markov_form};
-use crate::reversal::channel_noise::between::may_be_noise;
+use crate::noise::{Law, Posterior, WithinCells, WithoutLines, decays, markov_form};
+use crate::reversal::channel_noise::traces::MOST_CELLS;
 
 /// Adds to the covariance of the channels' slopes what correlated noise adds to that of white noise, `slopes` (variances,
 /// (µm/mm)²), and of drifts, and gives its law for the mean of a channel's traces; nothing where it is likelier to be white. `closure`: the profile
@@ -21,15 +21,25 @@ pub(super) fn add(
     if !traces.iter().all(|t| t.x == x && as_often(t)) {
         return None;
     }
+    let each = x.len().div_ceil(MOST_CELLS);
+    let (mut within, mut places, mut means) = (WithinCells::default(), Vec::new(), Vec::new());
+    for (x, closure) in x.chunks(each).zip(closure.chunks(each)) {
+        let values = closure.iter().map(|c| 2.0 * c);
+        let count = x.len() as f64;
+        places.push(x.iter().sum::<f64>() / count);
+        means.push(values.clone().sum::<f64>() / count);
+        within.add(x[x.len() - 1] - x[0], values);
+    }
     let mut values = WithoutLines::default();
-    values.add(x, closure.iter().map(|c| 2.0 * c).collect());
-    let posterior = Posterior::of(&values).filter(may_be_noise)?;
+    values.add(&places, means);
+    let posterior = Posterior::of(&values).filter(|p| p.may_be_noise(&within))?;
+    let x = places;
     let middle = x.iter().sum::<f64>() / x.len() as f64;
     let spread: f64 = x.iter().map(|x| (x - middle).powi(2)).sum();
     let weights: Vec<f64> = x.iter().map(|x| (x - middle) / spread).collect();
     let white = 1.0 / spread;
     let of = posterior.possible().iter().map(|p| {
-        let along = markov_form(&decays(x, p.law.length), &weights, &weights);
+        let along = markov_form(&decays(&x, p.law.length), &weights, &weights);
         p.law.white * white + p.law.correlated * along
     });
     let (variance, freedom) = posterior.variance(&of.collect::<Vec<f64>>());
@@ -38,5 +48,5 @@ pub(super) fn add(
         drifts.covariance[(c, c)] = own.max(variance - white);
     }
     drifts.freedom = drifts.freedom.min(freedom);
-    Some(posterior.mean())
+    Some(within.law(&posterior))
 }

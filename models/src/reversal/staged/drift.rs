@@ -46,15 +46,18 @@ pub(super) struct Drifts {
 /// Takes the lines by which repeats differ out of the scatter where they stand out of it, and gives what they add
 /// to the slopes of the channels; zeros where they do not.
 pub(super) fn take_out(observations: &Observations, traces: &mut [Trace]) -> Drifts {
-    let all: Vec<Slopes> = traces.iter().map(|t| slopes(observations, t)).collect();
-    let freedom: usize = all.iter().map(|s| s.freedom).sum();
-    let scatter: f64 = traces.iter().map(|t| t.scatter).sum();
-    let whole: usize = traces.iter().map(|t| t.scatter_freedom).sum();
-    let of_readings: f64 = all.iter().map(|s| s.of_readings).sum();
     let mut added = Drifts {
         covariance: DMatrix::zeros(traces.len(), traces.len()),
         freedom: f64::INFINITY,
     };
+    let whole: usize = traces.iter().map(|t| t.scatter_freedom).sum();
+    if whole == 0 {
+        return added;
+    }
+    let all: Vec<Slopes> = traces.iter().map(|t| slopes(observations, t)).collect();
+    let freedom: usize = all.iter().map(|s| s.freedom).sum();
+    let scatter: f64 = traces.iter().map(|t| t.scatter).sum();
+    let of_readings: f64 = all.iter().map(|s| s.of_readings).sum();
     if freedom == 0 || whole <= freedom || scatter <= of_readings {
         return added;
     }
@@ -101,6 +104,9 @@ pub(super) fn take_out(observations: &Observations, traces: &mut [Trace]) -> Dri
 /// Correlation between opposite indicators of what the readings of one pass lie beside the mean of the repeats and the line of
 /// the trace; zero where it is none clearly.
 pub(super) fn shared(observations: &Observations, traces: &[Trace]) -> f64 {
+    if traces.iter().all(|t| t.scatter_freedom == 0) {
+        return 0.0;
+    }
     let pairs = opposite(traces);
     let left: Vec<BTreeMap<(Key, u64), f64>> = (traces.iter())
         .map(|t| {

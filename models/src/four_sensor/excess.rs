@@ -1,4 +1,5 @@
-//! What repeats scatter by once each is separated by itself.
+//! What errs by more than white noise lets it: repeats once each is separated by itself, outputs whose noise is correlated along
+//! the slide.
 //!
 //! The scatter of their readings tells the noise as if it were white and alike in all sensors. A drift of a
 //! sensor within a repeat is neither, nor is a sensor noisier than the others; the separation adds such errors
@@ -9,7 +10,8 @@ use nalgebra::DVector;
 use rand_chacha::ChaCha8Rng;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::{Parabola, Separation};
+use super::{Along, FourSensorError, Parabola, Separation};
+use crate::noise::Law;
 use crate::uncertainty::DegreesOfFreedom;
 
 /// Below this probability the repeats scatter by more than the noise of their readings gives.
@@ -18,24 +20,44 @@ const LEVEL: f64 = 0.01;
 /// Draws of the errors that white noise gives.
 pub(super) const DRAWS: u64 = 200;
 
-/// f, S and γ of one separation, or errors of them.
-pub type Found = [DVector<f64>; 3];
+/// f, S, γ and e of one separation, or errors of them.
+pub type Found = [DVector<f64>; 4];
 
-/// By how much the separated repeats scatter beyond the noise of their readings.
+/// By how much errors are greater than white noise of the readings gives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Excess {
     /// Standard deviations over those of white noise: of f, S and γ, 1 at least.
     pub factors: [f64; 3],
     /// Degrees of freedom of the least known of them.
     pub degrees: DegreesOfFreedom,
-    /// Probability that white noise shows as much.
-    pub p_value: f64,
+    /// What tells it.
+    pub told_by: ToldBy,
+}
+
+/// What tells that errors are greater than white noise gives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ToldBy {
+    /// Repeats, each separated by itself.
+    Repeats {
+        /// Probability that white noise shows as much.
+        p_value: f64,
+    },
+    /// The outputs against each other.
+    Outputs {
+        /// The law of the noise of one reading, µm².
+        law: Law,
+    },
 }
 
 impl Separation {
-    /// f, S and γ.
+    /// f, S, γ and e.
     pub fn found(&self) -> Found {
-        [&self.surface, &self.straightness, &self.tilt].map(|profile| profile.values.clone())
+        [
+            self.surface.values.clone(),
+            self.straightness.values.clone(),
+            self.tilt.values.clone(),
+            DVector::from_column_slice(&self.zero_adjustment),
+        ]
     }
 
     /// Compares repeats, each separated by itself, with `draws` of the errors that white noise gives to their
@@ -67,30 +89,62 @@ impl Separation {
         };
         let factor = |at: usize| compared.get(at).map_or(1.0, |c| c.ratio.max(1.0).sqrt());
         let factors = [factor(0), factor(1), factor(2)];
-        let held_back = self.scatter.held_back;
-        let seminorm = self.chosen.point.seminorm;
-        for (profile, factor) in [&mut self.surface, &mut self.straightness, &mut self.tilt]
-            .into_iter()
-            .zip(factors)
-        {
-            for (std, bound) in profile.std.iter_mut().zip(profile.bias_bound.iter()) {
-                let pull = if seminorm > 0.0 {
-                    held_back * bound / seminorm
-                } else {
-                    0.0
-                };
-                let noise = (*std * *std - pull * pull).max(0.0);
-                *std = (factor * factor * noise + pull * pull).sqrt();
-            }
-        }
+        self.beyond_noise(|which, _| factors[which].powi(2));
         for std in &mut self.zero_adjustment_std {
             *std *= factors[0];
         }
         self.excess = Some(Excess {
             factors,
             degrees,
-            p_value: least,
+            told_by: ToldBy::Repeats { p_value: least },
         });
+    }
+
+    /// Counts noise that is correlated along the slide: by the mean squares of the errors that it gives to f, S, γ and e, `correlated`,
+    /// against those of white noise, `white`.
+    pub(super) fn count_correlation(&mut self, along: &Along, correlated: &Found, white: &Found) {
+        let Ok(degrees) = DegreesOfFreedom::new(along.freedom()) else {
+            return;
+        };
+        // The line that is taken away leaves no noise where it is held.
+        let ratio = |correlated: f64, white: f64| {
+            if white > 0.0 {
+                (correlated / white).max(1.0)
+            } else {
+                1.0
+            }
+        };
+        self.beyond_noise(|which, n| ratio(correlated[which][n], white[which][n]));
+        let factors =
+            [0, 1, 2].map(|which| ratio(correlated[which].sum(), white[which].sum()).sqrt());
+        let zero = correlated[3].iter().zip(white[3].iter());
+        for (std, (correlated, white)) in self.zero_adjustment_std.iter_mut().zip(zero) {
+            *std *= ratio(*correlated, *white).sqrt();
+        }
+        self.excess = Some(Excess {
+            factors,
+            degrees,
+            told_by: ToldBy::Outputs { law: along.law() },
+        });
+    }
+
+    /// Multiplies the variances that the noise of readings gives to f, S, γ at each place.
+    fn beyond_noise(&mut self, by: impl Fn(usize, usize) -> f64) {
+        let held_back = self.scatter.held_back;
+        let seminorm = self.chosen.point.seminorm;
+        let profiles = [&mut self.surface, &mut self.straightness, &mut self.tilt];
+        for (which, profile) in profiles.into_iter().enumerate() {
+            let both = profile.std.iter_mut().zip(profile.bias_bound.iter());
+            for (n, (std, bound)) in both.enumerate() {
+                let pull = if seminorm > 0.0 {
+                    held_back * bound / seminorm
+                } else {
+                    0.0
+                };
+                let noise = (*std * *std - pull * pull).max(0.0);
+                *std = (by(which, n) * noise + pull * pull).sqrt();
+            }
+        }
     }
 }
 
@@ -139,6 +193,19 @@ impl Compared {
             p_value: law.sf(ratio),
         })
     }
+}
+
+/// Mean squares of [`DRAWS`] errors of f, S, γ and e.
+pub(super) fn mean_squares(
+    draw: impl Fn(u64) -> Result<Found, FourSensorError>,
+) -> Result<Found, FourSensorError> {
+    let mut mean = draw(0)?.map(|error| error * 0.0);
+    for one in 0..DRAWS {
+        for (mean, error) in mean.iter_mut().zip(draw(one)?) {
+            *mean += error.map(|error| error * error / DRAWS as f64);
+        }
+    }
+    Ok(mean)
 }
 
 /// The generator of a draw.

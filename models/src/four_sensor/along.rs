@@ -162,6 +162,7 @@ fn predicted(autocovariance: &[f64], rows: &[Vec<f64>]) -> (f64, f64) {
 pub struct Along {
     laws: Posterior,
     step: f64,
+    positions: usize,
 }
 
 impl Along {
@@ -172,6 +173,7 @@ impl Along {
         laws.may_be_noise(&WithinCells::default()).then_some(Self {
             laws,
             step: values.step,
+            positions: outputs.readings().len(),
         })
     }
 
@@ -180,14 +182,11 @@ impl Along {
         self.laws.mean()
     }
 
-    /// Degrees of freedom of the variance of long means.
+    /// Degrees of freedom of the variance of the longest wave over the slide.
     pub(super) fn freedom(&self) -> f64 {
-        let of_long_means = |law: &Law| {
-            let decay = (-self.step / law.length).exp();
-            law.white + law.correlated * (1.0 + decay) / (1.0 - decay)
-        };
-        let each = self.laws.possible().iter().map(|p| of_long_means(&p.law));
-        self.laws.variance(&each.collect::<Vec<_>>()).1
+        let each = self.laws.possible().iter();
+        let longest = each.map(|p| p.law.of_wave(self.step, 1, self.positions));
+        self.laws.variance(&longest.collect::<Vec<_>>()).1
     }
 
     /// Noise of outputs, µm, of the scale that goes with [`Self::freedom`].

@@ -10,8 +10,6 @@
 //!
 //! times the variance that its parts have on average over the orders.
 
-use std::f64::consts::TAU;
-
 use rand::Rng;
 
 use super::group::Group;
@@ -48,11 +46,11 @@ impl Along {
         let samples = groups.first()?.samples;
         let step = length / samples as f64;
         let longest = laws.possible().iter();
-        let longest = longest.map(|p| of_order(&p.law, step, 1, samples));
+        let longest = longest.map(|p| p.law.of_wave(step, 1, samples));
         let (_, freedom) = laws.variance(&longest.collect::<Vec<_>>());
         let law = laws.mean();
         let highest = (samples.saturating_sub(1) / 2).max(1);
-        let orders = (1..=highest).map(|order| of_order(&law, step, order, samples));
+        let orders = (1..=highest).map(|order| law.of_wave(step, order, samples));
         let mean = orders.sum::<f64>() / highest as f64;
         let law = Law {
             shift: 0.0,
@@ -69,7 +67,7 @@ impl Along {
 
     /// Variance of an order over that of all orders on average.
     pub fn of_order(&self, order: usize) -> f64 {
-        of_order(&self.law, self.step, order, self.samples)
+        self.law.of_wave(self.step, order, self.samples)
     }
 
     /// Variance of a reading over that.
@@ -105,17 +103,12 @@ impl Along {
     }
 }
 
-fn of_order(law: &Law, step: f64, order: usize, samples: usize) -> f64 {
-    let kept = (-step / law.length).exp();
-    let turn = (TAU * order as f64 / samples as f64).cos();
-    law.white + law.correlated * (1.0 - kept * kept) / (1.0 - 2.0 * kept * turn + kept * kept)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
+    use std::f64::consts::TAU;
 
     /// *Simulated truth*: orders of drawn noise scatter as is said, 400 draws of 200 readings.
     #[test]

@@ -65,6 +65,15 @@ impl Law {
         self.white + self.correlated
     }
 
+    /// Variance of a wave that goes around so often in so many readings, of white noise and of the correlated part at even steps,
+    /// over that of white noise of variance one.
+    pub fn of_wave(&self, step: f64, turns: usize, readings: usize) -> f64 {
+        let kept = (-step / self.length).exp();
+        let turn = (std::f64::consts::TAU * turns as f64 / readings.max(1) as f64).cos();
+        let spectrum = (1.0 - kept * kept) / (1.0 - 2.0 * kept * turn + kept * kept);
+        self.white + self.correlated * spectrum
+    }
+
     /// Draws the noise of one trace, readings in the order in which they were taken.
     pub fn draw(&self, positions: &[f64], random: &mut impl Rng, noise: &mut [f64]) {
         let mut normal = || -> f64 { StandardNormal.sample(random) };

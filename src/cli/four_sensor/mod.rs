@@ -4,14 +4,15 @@ mod gather;
 mod json;
 mod page;
 pub(super) mod read;
+mod separate;
 pub(super) mod setup;
 mod words;
 
 use std::path::PathBuf;
 
 use errsep_models::four_sensor::{
-    Choice, Ends, FourSensorError, Likeliest, LongSeparator, MinimumZone, Parabola, Penalised,
-    PublishedSeparation, PublishedSeparator, Separation, Separator, Settings,
+    Choice, Ends, FourSensorError, Likeliest, MinimumZone, Parabola, PublishedSeparation,
+    Separation,
 };
 use errsep_models::uncertainty::{DegreesOfFreedom, Disagreement};
 
@@ -19,6 +20,7 @@ use super::diagnose::joined::{self, Given};
 use super::{Answer, ColumnArgs, CommonArgs};
 use crate::io::{CsvTable, Message, SetupFile, Status};
 use read::Measured;
+use separate::{Separated, Task};
 use setup::Setup;
 
 /// Straightness and tilt of a slide from four displacement sensors on one surface.
@@ -114,16 +116,6 @@ impl Found {
     }
 }
 
-/// The settings with the λ that was chosen, for one repeat.
-fn fixed(setup: &Setup, found: &Separation) -> Settings {
-    Settings {
-        choice: Choice::Fixed(found.chosen.point.lambda),
-        // Of one output of the average; a repeat by itself states nothing of its uncertainty.
-        noise: Some(found.noise),
-        ..setup.settings
-    }
-}
-
 /// Degrees of freedom of the noise: of what the repeats scatter by beyond it, of the scatter of the repeats where it was taken from there.
 fn how_well_known(
     found: &Separation,
@@ -164,88 +156,26 @@ pub fn run(args: &Args) -> Result<Answer, Message> {
     let dense = measured.outputs.geometry().point_count() <= LONGEST_DENSE;
     let unsolved =
         |error: FourSensorError| Message::not_determined(error.to_string()).in_file(&args.data);
-    let geometry = measured.outputs.geometry();
-    let outputs = &measured.outputs;
     let likeliest = match setup.penalty_stated {
         true => None,
-        false => Likeliest::of(outputs, dense).map_err(unsolved)?,
+        false => Likeliest::of(&measured.outputs, dense).map_err(unsolved)?,
     };
     if let Some(likeliest) = &likeliest {
         setup.penalised = likeliest.penalised;
     }
-    let mut published = None;
-    let mut condition_number = None;
-    let mut ends = None;
-    let degrees = |found: &Separation| {
-        how_well_known(found, noise_stated, &measured).unwrap_or(DegreesOfFreedom::Infinite)
+    let task = Task {
+        setup: &setup,
+        measured: &measured,
+        noise_stated,
     };
-    // A noise that is stated is stated of independent readings.
-    let once = |found: &Separation| found.noise_estimated && measured.repeats == 1;
-    let (separation, straightness_error) = if dense {
-        let separator = Separator::new(geometry, setup.penalised, setup.line).map_err(unsolved)?;
-        let way = PublishedSeparator::new(geometry).map_err(unsolved)?;
-        published = Some(way.separate(outputs, Choice::LCurve).map_err(unsolved)?);
-        condition_number = Some(separator.decomposition().condition_number());
-        let of_profile = [Penalised::Profile, Penalised::ProfileFromEnds];
-        if of_profile.contains(&setup.penalised) {
-            // Where the general penalty finds no λ there is nothing to tell of the ends.
-            ends = Ends::of(outputs, &setup.settings).ok();
-        }
-        separator
-            .separate(outputs, &setup.settings)
-            .and_then(|mut found| {
-                if measured.each.len() > 1 {
-                    let settings = fixed(&setup, &found);
-                    let each = measured
-                        .each
-                        .iter()
-                        .map(|one| separator.separate(one, &settings));
-                    let each = each
-                        .map(|one| Ok(one?.found()))
-                        .collect::<Result<Vec<_>, FourSensorError>>()?;
-                    let draws = separator.noise_errors(outputs, &setup.settings, &found)?;
-                    found.count_repeats(&each, &draws, degrees(&found), setup.settings.parabola);
-                }
-                let along = match once(&found) {
-                    true => separator.count_correlation(outputs, &setup.settings, &mut found)?,
-                    false => None,
-                };
-                let degrees = degrees(&found);
-                let along = along.as_ref();
-                let error = separator.straightness_error(
-                    outputs,
-                    &setup.settings,
-                    &found,
-                    degrees,
-                    along,
-                )?;
-                Ok((found, error))
-            })
-    } else {
-        LongSeparator::new(outputs, setup.penalised, setup.line, &setup.settings).and_then(
-            |separator| {
-                let mut found = separator.separate()?;
-                if measured.each.len() > 1 {
-                    let settings = fixed(&setup, &found);
-                    let each = measured.each.iter().map(|one| {
-                        let one = LongSeparator::new(one, setup.penalised, setup.line, &settings)?;
-                        Ok(one.separate()?.found())
-                    });
-                    let each = each.collect::<Result<Vec<_>, FourSensorError>>()?;
-                    let draws = separator.noise_errors(&found)?;
-                    found.count_repeats(&each, &draws, degrees(&found), setup.settings.parabola);
-                }
-                let along = match once(&found) {
-                    true => separator.count_correlation(&mut found)?,
-                    false => None,
-                };
-                let degrees = degrees(&found);
-                let error = separator.straightness_error(&found, degrees, along.as_ref())?;
-                Ok((found, error))
-            },
-        )
-    }
-    .map_err(unsolved)?;
+    let separated = if dense { task.whole() } else { task.long() };
+    let Separated {
+        separation,
+        straightness_error,
+        published,
+        condition_number,
+        ends,
+    } = separated.map_err(unsolved)?;
     let found = Found {
         published,
         condition_number,

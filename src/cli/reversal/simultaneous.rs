@@ -303,7 +303,7 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
     let verdict = match fit.knots.verdict {
         KnotVerdict::Enough => "neighbouring residuals are not correlated",
         KnotVerdict::TooFew => {
-            "too few: neighbouring residuals go together, the forms have detail that the knots cannot follow"
+            "too few, or the noise is not independent: neighbouring residuals go together"
         }
     };
     report::reversal::Knots {
@@ -344,10 +344,15 @@ fn warnings(fit: &Simultaneous, closure: Option<&Closure>, setup: &ReversalSetup
         warnings.push(noise::disagreement(fit.agreement.missed));
     }
     if fit.knots.verdict == KnotVerdict::TooFew {
-        let counted = if fit.agreement.disagree == Some(true) {
-            ""
-        } else {
-            "; the uncertainties are too small then"
+        let counts_correlation = match fit.noise_origin {
+            NoiseOrigin::BetweenChannels { .. } => true,
+            NoiseOrigin::Repeats { law, .. } => law.correlated > 0.1 * law.white,
+            NoiseOrigin::Declared | NoiseOrigin::Residuals => false,
+        };
+        let counted = match (fit.agreement.disagree, counts_correlation) {
+            (Some(true), _) => "",
+            (_, true) => "; the uncertainties count such noise",
+            (_, false) => "; the uncertainties are too small then",
         };
         warnings.push(format!(
             "residuals of neighbouring readings go together (correlation {}, {} standard deviations): \

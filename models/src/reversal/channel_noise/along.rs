@@ -57,6 +57,8 @@ pub struct AlongTraces {
     missed: (f64, f64),
     /// The law of a reading.
     of_a_reading: Law,
+    /// Variance of a reading, if the means of cells were those of independent ones.
+    white_of_a_reading: f64,
 }
 
 /// Opposite indicators that may share what they read in one pass.
@@ -123,6 +125,7 @@ impl AlongTraces {
         together: Option<Together>,
     ) -> Self {
         let of_a_reading = within.law(&apart);
+        let white_of_a_reading = within.readings_a_cell() * apart.mean().white;
         let positions = gathered.traces.iter().map(|t| &t.positions[..]);
         let apart = Laws::new(apart, positions);
         Self {
@@ -131,24 +134,35 @@ impl AlongTraces {
             together,
             missed: (0.0, 1.0),
             of_a_reading,
+            white_of_a_reading,
         }
     }
 
     /// The variance of a combination in weighted units, and its degrees of freedom.
+    ///
+    /// Of a form on knots finer than the cells a part of what readings count for, w, changes within a cell: the cells miss
+    /// Σ w² − Σ (Σ w)²/n of n readings a cell, in which the noise is taken to be as great as between cells.
     pub fn variance(
         &self,
         covariance: &BorderedCovariance,
         band: &[(usize, f64)],
         border: &[(usize, f64)],
     ) -> (f64, f64) {
-        let counting = self.gathered.counting(&covariance.times(band, border));
+        let times = covariance.times(band, border);
+        let counting = self.gathered.counting(&times);
+        let of = |terms: &[(usize, f64)], times: &[f64]| -> f64 {
+            terms.iter().map(|(j, v)| v * times[*j]).sum()
+        };
+        let all = of(band, &times.0) + of(border, &times.1);
+        let within = (all - self.gathered.squares_of_cells(&counting)).max(0.0);
         let traces = self.gathered.traces.iter().map(Cells::whole);
         let apart = self.apart.moments(traces, &counting);
         let moments = match &self.together {
             None => apart,
             Some(together) => apart.or(together.moments(&counting), together.probability),
         };
-        let (noise, freedom) = moments.student();
+        let (between, freedom) = moments.student();
+        let noise = between + within * self.white_of_a_reading;
         let (missed, missed_freedom) = self.missed;
         if missed <= 0.0 {
             return (noise, freedom);

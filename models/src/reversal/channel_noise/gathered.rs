@@ -123,6 +123,13 @@ impl Gathered {
             .collect()
     }
 
+    /// Σ (Σ w)²/n over the cells, w what their n readings count for.
+    pub(super) fn squares_of_cells(&self, counting: &[Vec<f64>]) -> f64 {
+        let cells = self.traces.iter().zip(counting);
+        let each = cells.flat_map(|(trace, own)| trace.rows.iter().zip(own));
+        each.map(|(row, w)| w * w / row.count).sum()
+    }
+
     /// Σ of squares of what repeats of one place count for together.
     pub(super) fn shared_squares(&self, counting: &[Vec<f64>]) -> f64 {
         let mut sums = vec![0.0; self.places];

@@ -1,13 +1,14 @@
 //! Channels that are read once each: noise that is correlated along traces.
 
+use errsep_models::basis::bspline::CubicBSpline;
 use errsep_models::noise::Law;
-use errsep_models::reversal::simulate::simulate;
-use errsep_models::reversal::simultaneous::{NoiseOrigin, fit};
+use errsep_models::reversal::simulate::{even_grid, simulate};
+use errsep_models::reversal::simultaneous::{Noise, NoiseOrigin, fit};
 use errsep_models::reversal::staged;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::noise::{plain, with_noise};
-use super::plan::{spline_plan, truths};
+use super::plan::{LENGTH, options, spline_plan, truths};
 
 const SEEDS: u64 = 24;
 
@@ -98,4 +99,37 @@ fn many_independent_readings_stay_so() {
     assert!(inside.iter().all(|n| *n >= 61), "{inside:?} of 72");
     assert!(correlated < 12, "{correlated}");
     assert_eq!(disagree, 0);
+}
+
+/// *Simulated truth*, 6 seeds: forms on 800 cells, twice as many as those into which 8000 readings a channel are gathered, four of which are alike:
+/// 1800 places, of which every other is free of its neighbour's noise; 95 % have a standard deviation of 0.7 %. With what gathered readings alone say,
+/// 0.80 of them lay within their 95 % intervals.
+#[test]
+fn bands_hold_forms_on_finer_knots_than_readings_are_gathered_on() {
+    let law = Law {
+        length: 0.15,
+        ..LAW
+    };
+    let basis = CubicBSpline::uniform(0.0, LENGTH, 800).unwrap();
+    let (mut inside, mut count) = (0, 0);
+    for seed in 0..6 {
+        let (plan, _) = spline_plan(10, 8000, 0.0, seed);
+        let (exact, truth) = simulate(&plan, &[]).unwrap();
+        let options = options(&basis, 42.0, Noise::Equal);
+        let found = fit(&with_noise(exact, &law, seed), &options).unwrap();
+        let x = even_grid(0.0, LENGTH, 100);
+        for (profile, form) in found
+            .forms(&x)
+            .iter()
+            .zip([&truth.m, &truth.s_a, &truth.s_b])
+        {
+            for ((x, value), std) in x.iter().zip(&profile.values).zip(&profile.std) {
+                inside += u32::from((value - form.at(*x)).abs() < 1.96 * std);
+                count += 1;
+            }
+        }
+    }
+    let share = f64::from(inside) / f64::from(count);
+    println!("{inside} of {count}");
+    assert!(share > 0.92, "{share}");
 }

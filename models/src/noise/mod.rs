@@ -7,6 +7,7 @@
 //! readings × readings: every product with a covariance is one pass along the trace, at any spacing.
 
 mod contrasts;
+mod grid;
 mod law;
 mod likelihood;
 mod moments;

@@ -98,7 +98,7 @@ impl WithinCells {
             (more / (more + 2.0), white)
         };
         let length = self.travel / self.pairs.max(1.0) / -correlation.ln();
-        if means.correlated * means.length > correlated * length {
+        if posterior.is_correlated() && means.correlated * means.length > correlated * length {
             return Law { white, ..means };
         }
         Law {

@@ -215,7 +215,7 @@ fn outcome(fit: &Simultaneous, data: &Observations, setup: &ReversalSetup) -> Ou
         form_freedom: freedom(profiles.iter().map(|f| f.degrees_of_freedom)),
         disagree: match fit.knots.verdict {
             KnotVerdict::TooFew => Some(true),
-            _ => fit.agreement.disagree,
+            KnotVerdict::Enough | KnotVerdict::AsTheNoise => fit.agreement.disagree,
         },
         missed: fit.agreement.missed,
         method_errors: Vec::new(),
@@ -302,6 +302,7 @@ fn knots(fit: &Simultaneous, setup: &ReversalSetup) -> report::reversal::Knots {
     };
     let verdict = match fit.knots.verdict {
         KnotVerdict::Enough => "neighbouring residuals are not correlated",
+        KnotVerdict::AsTheNoise => "neighbouring residuals go together as the noise does",
         KnotVerdict::TooFew => {
             "too few, or the noise is not independent: neighbouring residuals go together"
         }
@@ -344,15 +345,9 @@ fn warnings(fit: &Simultaneous, closure: Option<&Closure>, setup: &ReversalSetup
         warnings.push(noise::disagreement(fit.agreement.missed));
     }
     if fit.knots.verdict == KnotVerdict::TooFew {
-        let counts_correlation = match fit.noise_origin {
-            NoiseOrigin::BetweenChannels { .. } => true,
-            NoiseOrigin::Repeats { law, .. } => law.correlated > 0.1 * law.white,
-            NoiseOrigin::Declared | NoiseOrigin::Residuals => false,
-        };
-        let counted = match (fit.agreement.disagree, counts_correlation) {
-            (Some(true), _) => "",
-            (_, true) => "; the uncertainties count such noise",
-            (_, false) => "; the uncertainties are too small then",
+        let counted = match fit.agreement.disagree {
+            Some(true) => "",
+            _ => "; the uncertainties are too small then",
         };
         warnings.push(format!(
             "residuals of neighbouring readings go together (correlation {}, {} standard deviations): \

@@ -55,8 +55,9 @@ pub struct AlongTraces {
     /// Variance, in weighted units, of what the model misses at a place in all repeats alike, and its
     /// degrees of freedom.
     missed: (f64, f64),
-    /// The law of a reading.
+    /// The law of a reading, and whether its noise is probably correlated.
     of_a_reading: Law,
+    is_correlated: bool,
     /// Variance of a reading, if the means of cells were those of independent ones.
     white_of_a_reading: f64,
 }
@@ -125,6 +126,7 @@ impl AlongTraces {
         together: Option<Together>,
     ) -> Self {
         let of_a_reading = within.law(&apart);
+        let is_correlated = apart.is_correlated() || within.are_correlated(&apart);
         let white_of_a_reading = within.readings_a_cell() * apart.mean().white;
         let positions = gathered.traces.iter().map(|t| &t.positions[..]);
         let apart = Laws::new(apart, positions);
@@ -134,6 +136,7 @@ impl AlongTraces {
             together,
             missed: (0.0, 1.0),
             of_a_reading,
+            is_correlated,
             white_of_a_reading,
         }
     }
@@ -177,6 +180,11 @@ impl AlongTraces {
     /// The law of one reading of the mean weight in weighted units: the mean of what the repeats allow.
     pub fn law(&self) -> Law {
         self.of_a_reading
+    }
+
+    /// Whether readings are probably correlated along their traces.
+    pub fn is_correlated(&self) -> bool {
+        self.is_correlated
     }
 
     /// What opposite indicators share in one reading, where that is likelier than that they share nothing; `unit` is the

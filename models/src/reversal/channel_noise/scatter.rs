@@ -5,6 +5,7 @@ use std::sync::Arc;
 use errsep_solvers::linear::bordered::BorderedCovariance;
 
 use super::along::AlongTraces;
+use crate::noise::Law;
 
 /// What makes a standard uncertainty of a quantity's weights on the readings.
 #[derive(Debug, Clone)]
@@ -35,6 +36,14 @@ impl Scatter {
         match self {
             Self::White { variance, freedom } => Some((*variance, *freedom)),
             Self::Along(_) => None,
+        }
+    }
+
+    /// The law of a reading in weighted units, where noise is probably correlated along traces.
+    pub fn correlated(&self) -> Option<Law> {
+        match self {
+            Self::White { .. } => None,
+            Self::Along(along) => along.is_correlated().then(|| along.law()),
         }
     }
 

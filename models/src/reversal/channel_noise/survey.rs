@@ -92,6 +92,20 @@ impl<'a> Survey<'a> {
         self.x.len()
     }
 
+    /// The mean step of a trace, mm, and its readings on average; `None` where no trace has two.
+    pub fn pass(&self) -> Option<(f64, usize)> {
+        let (mut travel, mut steps, mut count) = (0.0, 0, 0);
+        for (x, traces) in self.x.iter().zip(&self.traces) {
+            for trace in traces.iter().filter(|t| t.len() > 1) {
+                travel += (x[trace.row(trace.len() - 1)] - x[trace.row(0)]).abs();
+                steps += trace.len() - 1;
+                count += 1;
+            }
+        }
+        let step = travel / steps as f64;
+        (step > 0.0).then(|| (step, 1 + steps / count))
+    }
+
     /// Over how much the first positions of the traces spread, and the last, mm.
     pub fn spread_of_ends(&self) -> [f64; 2] {
         let traces = self.x.iter().zip(&self.traces);

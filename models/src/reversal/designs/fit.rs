@@ -19,8 +19,9 @@ use crate::reversal::channel_noise::settle::{Asked, Settled, settle};
 use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::channel_noise::white::Told;
 use crate::reversal::channel_noise::{freedom_left, weights_of};
+use crate::reversal::finer_forms::FinerForms;
 use crate::reversal::simultaneous::fitted_knots::FittedKnots;
-use crate::reversal::simultaneous::knots::{FEWEST_POSITIONS, Finest};
+use crate::reversal::simultaneous::knots::{FEWEST_POSITIONS, Finest, MOST_CHOICES, NoiseOfWaves};
 use crate::reversal::simultaneous::{self, Knots};
 
 /// Fewest readings beyond the unknowns from which the noise is told.
@@ -72,37 +73,30 @@ fn fit_on(
             (traces, Survey::new(traces, of))
         }
     };
-    let mut sigmas = survey.first_noise(options.noise);
+    let sigmas = survey.first_noise(options.noise);
     let weights = weights_of(&sigmas);
     let mut ground = Ground::new(&observations.design, &determined, traces, weights, options)?;
     ground.finest = finest;
-    let chosen = breaks(&ground, &survey)?;
-    let unknowns = ground.layout.on(&chosen.breaks).free_count();
-    enough(&ground, unknowns)?;
-    let (mut problem, mut start) = ground.problem(chosen.breaks)?;
-    if let Some(index) = problem.layout.thickness_index() {
-        start = start_of_thickness(&mut problem, index, start, options)?;
+    let mut minimum = minimum_on(breaks(&ground, &survey, None)?, &ground, &survey, &sigmas)?;
+    for _ in 0..MOST_CHOICES {
+        let Some(better) = minimum.chosen_again(&ground, &survey, &sigmas)? else {
+            break;
+        };
+        minimum = better;
     }
-    let asked = Asked {
-        noise: options.noise,
-        loss: Loss::Quadratic,
-        minimisation: &options.minimisation,
-    };
-    let settled = settle(&mut problem, start, asked, &survey, &mut sigmas)?;
-    let Some(covariance) = settled.fit.covariance() else {
-        return Err(not_converged(&problem, &settled.fit));
-    };
-    let told = told(&problem, &settled, &covariance, &survey, &sigmas, options)?;
-    let knots = FittedKnots::new(chosen.common, chosen.table, &settled.residuals);
+    let beside = minimum
+        .problem
+        .at(&minimum.settled.fit.parameters)?
+        .beside();
     let reached = Reached {
-        beside: problem.at(&settled.fit.parameters)?.beside(),
-        problem: &problem,
-        settled,
-        covariance,
-        told,
-        sigmas,
-        knots,
-        finer: chosen.forms,
+        beside,
+        problem: &minimum.problem,
+        settled: minimum.settled,
+        covariance: minimum.covariance,
+        told: minimum.told,
+        sigmas: minimum.sigmas,
+        knots: minimum.knots,
+        finer: minimum.forms,
     };
     let mut solution = DesignFit::new(observations, determined.clone(), reached);
     if let Some((level, greatest)) = &level {
@@ -113,13 +107,93 @@ fn fit_on(
     Ok(solution)
 }
 
+/// The minimum on some break points, with its noise.
+struct Minimum<'g> {
+    problem: DesignProblem<'g>,
+    settled: Settled,
+    covariance: BorderedCovariance,
+    told: Told,
+    sigmas: Vec<f64>,
+    knots: FittedKnots,
+    forms: Option<FinerForms>,
+    /// By form, mm.
+    breaks: Vec<Vec<f64>>,
+}
+
+fn minimum_on<'g>(
+    chosen: Chosen,
+    ground: &'g Ground,
+    survey: &Survey,
+    sigmas: &[f64],
+) -> Result<Minimum<'g>, DesignFitError> {
+    let options = ground.options;
+    let mut sigmas = sigmas.to_vec();
+    let unknowns = ground.layout.on(&chosen.breaks).free_count();
+    enough(ground, unknowns)?;
+    let breaks = chosen.breaks.clone();
+    let (mut problem, mut start) = ground.problem(chosen.breaks)?;
+    if let Some(index) = problem.layout.thickness_index() {
+        start = start_of_thickness(&mut problem, index, start, options)?;
+    }
+    let asked = Asked {
+        noise: options.noise,
+        loss: Loss::Quadratic,
+        minimisation: &options.minimisation,
+    };
+    let settled = settle(&mut problem, start, asked, survey, &mut sigmas)?;
+    let Some(covariance) = settled.fit.covariance() else {
+        return Err(not_converged(&problem, &settled.fit));
+    };
+    let told = told(&problem, &settled, &covariance, survey, &sigmas, options)?;
+    let knots = FittedKnots::new(chosen.common, chosen.table, &settled.residuals).under(&told);
+    Ok(Minimum {
+        problem,
+        settled,
+        covariance,
+        told,
+        sigmas,
+        knots,
+        forms: chosen.forms,
+        breaks,
+    })
+}
+
+impl Minimum<'_> {
+    /// The minimum on the knots that are best under the noise that this one tells, where these are others; `None` too where that
+    /// fit has no answer.
+    fn chosen_again<'g>(
+        &self,
+        ground: &'g Ground,
+        survey: &Survey,
+        sigmas: &[f64],
+    ) -> Result<Option<Minimum<'g>>, DesignFitError> {
+        let chosen = matches!(ground.options.knots, Knots::Chosen);
+        let law = self.told.scatter.correlated();
+        let (true, None, Some(law), Some((step, readings))) =
+            (chosen, self.knots.refuted(), law, survey.pass())
+        else {
+            return Ok(None);
+        };
+        let waves = NoiseOfWaves::new(law, step, readings);
+        let chosen = breaks(ground, survey, Some(waves))?;
+        if chosen.breaks == self.breaks {
+            return Ok(None);
+        }
+        Ok(minimum_on(chosen, ground, survey, sigmas).ok())
+    }
+}
+
 /// The break points; where they are chosen, lines by which traces of a channel differ are no detail of a form.
-fn breaks(ground: &Ground, survey: &Survey) -> Result<Chosen, DesignFitError> {
+fn breaks(
+    ground: &Ground,
+    survey: &Survey,
+    waves: Option<NoiseOfWaves>,
+) -> Result<Chosen, DesignFitError> {
     let chosen = matches!(ground.options.knots, Knots::Chosen);
     let Some(values) = chosen.then(|| survey.alike()).flatten() else {
-        return knots::breaks(ground);
+        return knots::breaks(ground, waves);
     };
-    knots::breaks(&ground.of(&with_values(ground.traces, values)))
+    knots::breaks(&ground.of(&with_values(ground.traces, values)), waves)
 }
 
 /// Puts the heights that were taken out back into the residuals, which are those of the readings.
@@ -202,7 +276,7 @@ pub fn central_differences(
     let survey = Survey::new(&traces, |i| observations.taken(i));
     let weights = weights_of(&survey.first_noise(options.noise));
     let ground = Ground::new(&observations.design, &determined, &traces, weights, options)?;
-    let (problem, start) = ground.problem(knots::breaks(&ground)?.breaks)?;
+    let (problem, start) = ground.problem(knots::breaks(&ground, None)?.breaks)?;
     let at = fit_structured(&problem, start, &options.minimisation)?.parameters;
     let analytic = problem.jacobian(&at)?;
     let n = at.band.len();

@@ -23,7 +23,7 @@ use crate::reversal::finer_forms::{Curves, FinerForms};
 use crate::reversal::simultaneous::Knots;
 use crate::reversal::simultaneous::knots::breaks::breaks as breaks_of;
 use crate::reversal::simultaneous::knots::{
-    Carried, KnotTrial, PATIENCE, REFUSED, ladder, sparse, trial,
+    Carried, KnotTrial, NoiseOfWaves, PATIENCE, REFUSED, ladder, sparse, trial,
 };
 
 /// The break points of a fit.
@@ -49,11 +49,14 @@ const BEYOND: usize = 2;
 /// unknowns of the finest lie side by side, and the cost grows with the square of their number.
 const FINEST: usize = 8;
 
-/// The break points that the options ask for, or that the data choose.
+/// The break points that the options ask for, or that the data choose: by the waves of the noise, where they are known.
 ///
 /// # Errors
 /// [`DesignFitError`] where the readings do not carry them.
-pub(super) fn breaks(ground: &Ground) -> Result<Chosen, DesignFitError> {
+pub(super) fn breaks(
+    ground: &Ground,
+    waves: Option<NoiseOfWaves>,
+) -> Result<Chosen, DesignFitError> {
     let alike = |breaks: Vec<f64>, table| Chosen {
         breaks: vec![breaks.clone(); ground.layout.forms.len()],
         common: breaks,
@@ -70,7 +73,7 @@ pub(super) fn breaks(ground: &Ground) -> Result<Chosen, DesignFitError> {
             _ => Ok(alike(on_cells(ground, *asked), Vec::new())),
         },
         Knots::Chosen => {
-            let mut rungs = Rungs::new(ground);
+            let mut rungs = Rungs::new(ground, waves);
             let (best, mut table) = rungs.together()?;
             let refuting = rungs.refuting(best, &mut table)?;
             let forms = ground.layout.forms.len();
@@ -115,6 +118,7 @@ fn positions<'g>(ground: &'g Ground) -> Vec<&'g [f64]> {
 /// The ladder of cells.
 struct Rungs<'g, 'a> {
     ground: &'g Ground<'a>,
+    waves: Option<NoiseOfWaves>,
     carried: Carried<'g>,
     /// Place in the ladder of the next rung.
     next: usize,
@@ -127,9 +131,10 @@ struct Rungs<'g, 'a> {
 }
 
 impl<'g, 'a> Rungs<'g, 'a> {
-    fn new(ground: &'g Ground<'a>) -> Self {
+    fn new(ground: &'g Ground<'a>, waves: Option<NoiseOfWaves>) -> Self {
         let mut rungs = Self {
             ground,
+            waves,
             carried: Carried::by(positions(ground), ground.finest),
             next: 0,
             breaks: Vec::new(),
@@ -190,7 +195,8 @@ impl<'g, 'a> Rungs<'g, 'a> {
     /// The trial of some breaks for each form, and the forms; `None` where the readings do not carry them.
     fn fitted(&self, breaks: Vec<Vec<f64>>) -> Result<Option<(KnotTrial, Curves)>, DesignFitError> {
         let readings = self.ground.readings();
-        let most = breaks.iter().map(|b| b.len() - 1).max().unwrap_or(0);
+        let cells: Vec<usize> = breaks.iter().map(|b| b.len() - 1).collect();
+        let most = cells.iter().copied().max().unwrap_or(0);
         let (problem, start) = self.ground.problem(breaks)?;
         let count = problem.layout.free_count();
         if readings < count + FEWEST_FREE {
@@ -204,7 +210,13 @@ impl<'g, 'a> Rungs<'g, 'a> {
                 cubics: problem.cubics(&there),
                 bases: problem.splines.bases.clone(),
             };
-            (trial(most, readings, count, squares), curves)
+            let own = trial(most, readings, count, squares);
+            let more = |w: NoiseOfWaves| cells.iter().map(|c| w.more(*c)).sum();
+            let own = match self.waves.map(more) {
+                Some(more) => own.taking_up(readings, more),
+                None => own,
+            };
+            (own, curves)
         }))
     }
 

@@ -14,8 +14,7 @@ use super::effects::{CATALOGUE, HEIGHTS, Heights, Setting, times};
 use super::error::ReversalError;
 use super::fitted_knots::FittedKnots;
 use super::ground::{Begun, Breaks, Ground};
-use super::knots::Finest;
-use super::knots::{self, FEWEST_POSITIONS};
+use super::knots::{self, Climbed, FEWEST_POSITIONS, Finest, MOST_CHOICES, NoiseOfWaves};
 use super::levelled::{Level, with_values};
 use super::options::{Knots, Noise, Options, Thickness};
 use super::problem::Reversal;
@@ -113,16 +112,41 @@ fn asks_for_time(options: &Options) -> bool {
 fn solve(
     ground: &Ground,
     survey: &Survey,
+    sigmas: Vec<f64>,
+    effects: Option<&Begun>,
+) -> Result<Simultaneous, ReversalError> {
+    let mut breaks = ground.breaks(effects)?;
+    let mut solution = solve_on(&mut breaks, ground, survey, sigmas.clone(), effects)?;
+    // Knots are chosen as if noise were white, of which fine ones take up less; and what they take up is not seen as noise.
+    for _ in 0..MOST_CHOICES {
+        let Some(law) = solution.scatter.correlated() else {
+            break;
+        };
+        let moved = (survey.pass())
+            .map(|(step, readings)| NoiseOfWaves::new(law, step, readings))
+            .is_some_and(|waves| ground.choose_under(&mut breaks, effects, &waves));
+        if !moved {
+            break;
+        }
+        match solve_on(&mut breaks, ground, survey, sigmas.clone(), effects) {
+            Ok(better) => solution = better,
+            Err(_) => break,
+        }
+    }
+    Ok(solution)
+}
+
+/// The fit on these breaks.
+fn solve_on(
+    on: &mut Breaks,
+    ground: &Ground,
+    survey: &Survey,
     mut sigmas: Vec<f64>,
     effects: Option<&Begun>,
 ) -> Result<Simultaneous, ReversalError> {
     let (options, channels) = (ground.options, ground.channels);
-    let Breaks {
-        points: breaks,
-        table,
-        linear,
-        forms,
-    } = ground.breaks(effects)?;
+    let breaks = on.points.clone();
+    let linear = on.climbed.as_mut().and_then(Climbed::linear);
     let readings = ground.observations.readings.len();
     let unknowns = ground.unknowns(breaks.len() + 2, effects);
     enough(
@@ -145,9 +169,10 @@ fn solve(
         minimisation: &options.minimisation,
     };
     let settled = settle(&mut problem, start, asked, survey, &mut sigmas)?;
-    let knots = FittedKnots::new(breaks, table, &settled.residuals);
+    let knots = FittedKnots::new(breaks, on.table(), &settled.residuals);
     let mut solution = assemble(ground, &problem, &settled, &sigmas, knots)?;
-    solution.finer = forms;
+    let forms = |climbed: &Climbed| climbed.forms(knots::most_read(ground.alike));
+    solution.finer = on.climbed.as_ref().and_then(forms);
     is_determined(&solution, &solution.covariance, channels, &problem.weights)?;
     let declared = matches!(options.noise, Noise::Declared(_));
     if !declared && options.loss == Loss::Quadratic {
@@ -266,6 +291,7 @@ fn learn_law(
     solution.noise = channel_noise(problem.channels, sigmas, residuals, &told, freedom);
     solution.noise_origin = told.origin;
     solution.agreement = told.agreement;
+    solution.knots = solution.knots.clone().under(&told);
     solution.scatter = told.scatter;
     Ok(())
 }

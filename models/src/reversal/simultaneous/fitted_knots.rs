@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::knots::KnotTrial;
+use crate::reversal::channel_noise::white::Told;
 
 /// Whether there are enough knots.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -12,6 +13,8 @@ pub enum KnotVerdict {
     /// Neighbouring residuals go together: forms have detail that the knots cannot follow (or the
     /// noise itself is correlated).
     TooFew,
+    /// Neighbouring residuals go together as the noise does, of which readings tell more than the model misses.
+    AsTheNoise,
 }
 
 /// The knots of the fit.
@@ -71,6 +74,15 @@ impl FittedKnots {
             neighbour_z: z,
             verdict,
         }
+    }
+
+    /// The same under noise that is told apart from the model.
+    pub(in crate::reversal) fn under(mut self, told: &Told) -> Self {
+        let as_noise = told.scatter.correlated().is_some() && told.agreement.missed <= 0.0;
+        if self.verdict == KnotVerdict::TooFew && as_noise {
+            self.verdict = KnotVerdict::AsTheNoise;
+        }
+        self
     }
 
     /// The number of cells that the criterion alone would have, where it was refuted: of few readings it counts forms as noise.

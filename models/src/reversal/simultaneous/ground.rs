@@ -6,7 +6,9 @@ use super::effects::JoinedEffect;
 use super::error::{FEWEST_FREE, ReversalError};
 use super::gauge::Axis;
 use super::joined::Joined;
-use super::knots::{self, Choice, FEWEST_POSITIONS, Finest, KnotTrial, LinearStep};
+use super::knots::{
+    self, Choice, Climbed, FEWEST_POSITIONS, Finest, KnotTrial, LinearStep, NoiseOfWaves,
+};
 use super::options::{Knots, Noise, Options, Thickness};
 use super::problem::Reversal;
 use super::readings::ChannelReadings;
@@ -15,7 +17,6 @@ use super::seed;
 use super::unknowns::Unknowns;
 use crate::basis::bspline::CubicBSpline;
 use crate::reversal::Observations;
-use crate::reversal::finer_forms::FinerForms;
 
 /// Up to this tilt (rad) a probe wanders by so little that the first step is nearly the last.
 const SMALL_TILT: f64 = 0.1;
@@ -42,11 +43,16 @@ pub struct Ground<'a> {
 pub struct Breaks {
     /// The break points, mm.
     pub points: Vec<f64>,
-    /// The ladder, where they were chosen, and what it found on them.
-    pub table: Vec<KnotTrial>,
-    pub linear: Option<LinearStep>,
-    /// The forms on them and on finer ones, where they were chosen.
-    pub forms: Option<FinerForms>,
+    /// The ladder, where they were chosen.
+    pub climbed: Option<Climbed>,
+}
+
+impl Breaks {
+    /// The rungs that were tried.
+    pub fn table(&self) -> Vec<KnotTrial> {
+        let table = self.climbed.as_ref().map(|c| c.table.clone());
+        table.unwrap_or_default()
+    }
 }
 
 /// Effects with the values from which the fit begins.
@@ -166,21 +172,38 @@ impl<'a> Ground<'a> {
             Knots::Cells(_) if most == 0 => choice.breaks(&of(4), 1),
             Knots::Cells(cells) => choice.breaks(&of(cells + 3), *cells),
             Knots::Chosen => {
-                let chosen = choice.choose(of)?;
+                let climbed = choice.choose(of)?;
                 return Ok(Breaks {
-                    points: choice.breaks(&of(chosen.cells + 3), chosen.cells),
-                    table: chosen.table,
-                    linear: chosen.linear,
-                    forms: chosen.forms,
+                    points: choice.breaks(&of(climbed.cells() + 3), climbed.cells()),
+                    climbed: Some(climbed),
                 });
             }
         };
         Ok(Breaks {
             points,
-            table: Vec::new(),
-            linear: None,
-            forms: None,
+            climbed: None,
         })
+    }
+
+    /// Moves the breaks to where they are best under noise of this law, where they were chosen for white noise; says whether
+    /// that is elsewhere.
+    pub fn choose_under(
+        &self,
+        breaks: &mut Breaks,
+        effects: Option<&Begun<'a>>,
+        waves: &NoiseOfWaves,
+    ) -> bool {
+        let unknowns = |cells: usize| self.unknowns(cells + 3, effects);
+        let forms = unknowns(1).forms.len();
+        let Some(climbed) = &mut breaks.climbed else {
+            return false;
+        };
+        let moved = climbed.choose_under(forms, waves);
+        if moved {
+            let cells = climbed.cells();
+            breaks.points = self.choice(effects).breaks(&unknowns(cells), cells);
+        }
+        moved
     }
 
     /// So many cells.

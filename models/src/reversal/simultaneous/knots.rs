@@ -11,6 +11,7 @@ pub mod breaks;
 mod carried;
 mod climbed;
 pub mod sparse;
+mod waves;
 
 use errsep_solvers::linear::bordered::{Bordered, BorderedCovariance, Solved};
 use errsep_solvers::problem::NoValue;
@@ -29,11 +30,15 @@ use crate::reversal::finer_forms::{Curves, TIMES};
 use crate::reversal::forward::Attitude;
 
 pub use carried::{Carried, Finest, REFUSED};
-pub use climbed::{Chosen, KnotTrial, LinearStep, trial};
-use climbed::{Climbed, RungFit};
+use climbed::RungFit;
+pub use climbed::{Climbed, KnotTrial, LinearStep, trial};
+pub use waves::NoiseOfWaves;
 
 /// Rungs after the best one before the ladder is left.
 pub const PATIENCE: usize = 3;
+
+/// How often knots are chosen again under the law of the noise that the fit on those before has told.
+pub const MOST_CHOICES: usize = 3;
 
 /// Cell counts of the ladder, from one: a factor of about √2 apart.
 pub fn ladder() -> impl Iterator<Item = usize> {
@@ -54,7 +59,7 @@ pub fn positions(channels: &[ChannelReadings]) -> usize {
 }
 
 /// The positions of the channel that has most different ones, in ascending order.
-fn most_read(channels: &[ChannelReadings]) -> &[f64] {
+pub fn most_read(channels: &[ChannelReadings]) -> &[f64] {
     let all = channels.iter().map(|c| c.x.as_slice());
     all.max_by_key(|x| different(x)).unwrap_or_default()
 }
@@ -150,25 +155,27 @@ impl Choice<'_> {
 
     /// Goes up the ladder. Without effects the rungs come from normal equations, and from orthogonal
     /// factorisations where rounding could decide.
-    pub fn choose(&self, unknowns_of: impl Fn(usize) -> Unknowns) -> Result<Chosen, ReversalError> {
+    pub fn choose(
+        &self,
+        unknowns_of: impl Fn(usize) -> Unknowns,
+    ) -> Result<Climbed, ReversalError> {
         if let Some(chosen) = self.by_moments(&unknowns_of)? {
             return Ok(chosen);
         }
-        let climbed = self.climb(&unknowns_of, |unknowns, bases| {
+        self.climb(&unknowns_of, |unknowns, bases| {
             let fitted = self.by_factors(unknowns, bases)?;
             Ok(fitted.map(|(left, curves)| {
                 let (rounding, linear) = (0.0, None);
                 (Squares { left, rounding }, RungFit { curves, linear })
             }))
-        })?;
-        Ok(climbed.chosen(most_read(self.channels)))
+        })
     }
 
     /// The ladder by normal equations; `None` where they do not tell.
     fn by_moments(
         &self,
         unknowns_of: &impl Fn(usize) -> Unknowns,
-    ) -> Result<Option<Chosen>, ReversalError> {
+    ) -> Result<Option<Climbed>, ReversalError> {
         let Some(rungs) = self.rungs(unknowns_of) else {
             return Ok(None);
         };
@@ -185,10 +192,7 @@ impl Choice<'_> {
             }))
         };
         let climbed = self.climb(unknowns_of, squares)?;
-        if !(told && climbed.clear) {
-            return Ok(None);
-        }
-        Ok(Some(climbed.chosen(most_read(self.channels))))
+        Ok((told && climbed.clear).then_some(climbed))
     }
 
     /// The readings gathered for normal equations; `None` with effects, which know single readings.
@@ -218,7 +222,7 @@ impl Choice<'_> {
         let readings = self.readings();
         let carried = Carried::by(self.positions(), self.finest);
         let carries = |cells: usize| self.carries(unknowns_of, &carried, cells);
-        let mut climbed = Climbed::default();
+        let mut climbed = Climbed::of(readings);
         for cells in carried.rungs(ladder(), carries) {
             let (unknowns, bases) = self.rung(unknowns_of, cells)?;
             let count = unknowns.free_count();
@@ -233,7 +237,7 @@ impl Choice<'_> {
                 break;
             };
             let trial = trial(cells, readings, count, squares.left);
-            climbed.add(trial, readings, squares, found);
+            climbed.add(trial, squares, found);
             if climbed.table.len() > climbed.best + PATIENCE {
                 break;
             }

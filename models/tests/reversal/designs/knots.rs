@@ -5,6 +5,9 @@ use errsep_models::reversal::designs::{
     Design, DesignFit, DesignOptions, central_differences, fit,
 };
 use errsep_models::reversal::simultaneous::Noise;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 const EIGHT: &str = "0/0,180/0,90/0,270/0,0/180,180/180,90/180,270/180";
 const THIRDS: &str = "0/0,120/0,240/0,0/120,120/120,240/120,0/240,120/240,240/240";
@@ -149,4 +152,40 @@ fn a_zero_of_each_repeat_hides_no_detail() {
             "{x}: {error} ± {std}"
         );
     }
+}
+
+/// *Limit*: under noise that goes on over some ten readings forms take about as many knots as under white noise of the same size, and
+/// no more than twice as many. By a criterion that takes it for white they take eight times as many and more.
+#[test]
+fn noise_that_goes_on_takes_no_knots() {
+    let (mut white, mut correlated) = (0, 0);
+    for seed in 0..4 {
+        let made = DesignPlan {
+            positions: 600,
+            noise_um: 0.0,
+            ..plan(EIGHT, seed)
+        };
+        let (exact, _) = simulate(&made).unwrap();
+        for (sum, share) in [(&mut white, 0.0_f64), (&mut correlated, 0.7)] {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+            let mut readings = exact.clone();
+            let (mut before, mut channel) = (0.0, usize::MAX);
+            for reading in &mut readings.readings {
+                // A tenth of what is left of the reading before is forgotten.
+                let fresh = normal();
+                before = if reading.channel == channel {
+                    0.9 * before + 0.19_f64.sqrt() * fresh
+                } else {
+                    fresh
+                };
+                channel = reading.channel;
+                reading.value += 0.05 * (share.sqrt() * before + (1.0 - share).sqrt() * normal());
+            }
+            let found = fit(&readings, &options(false)).unwrap();
+            *sum += cells(&found, "").iter().sum::<usize>();
+        }
+    }
+    println!("{white} {correlated}");
+    assert!(correlated <= 2 * white, "{correlated} {white}");
 }

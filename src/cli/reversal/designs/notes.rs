@@ -3,7 +3,7 @@
 use errsep_models::reversal::designs::{
     DesignFit, DesignObservations, DesignOptions, angle_name, fit,
 };
-use errsep_models::reversal::simultaneous::{KnotVerdict, NoiseOrigin};
+use errsep_models::reversal::simultaneous::KnotVerdict;
 
 use super::noise;
 use crate::io::reversal::{DesignData, ReversalSetup};
@@ -172,12 +172,8 @@ pub(super) fn warnings(
         }
     }
     if fit.knots.verdict == KnotVerdict::TooFew {
-        let counted = match fit.noise_origin {
-            NoiseOrigin::Repeats { .. } => "; the uncertainties follow the law of the repeats",
-            NoiseOrigin::BetweenChannels { .. } => {
-                "; the uncertainties count it as correlated noise"
-            }
-            _ if fit.agreement.disagree == Some(true) => "",
+        let counted = match fit.agreement.disagree {
+            Some(true) => "",
             _ => "; the uncertainties are too small then",
         };
         warnings.push(format!(

@@ -1,6 +1,7 @@
 //! The rungs that were tried, and the best of them.
 
 use super::Squares;
+use super::waves::NoiseOfWaves;
 use crate::basis::bspline::CubicBSpline;
 use crate::reversal::finer_forms::{Curves, FinerForms, TIMES};
 
@@ -11,14 +12,16 @@ pub struct KnotTrial {
     pub cells: usize,
     /// Number of unknowns of the whole fit.
     pub unknowns: usize,
+    /// How much noise the fit takes up, in variances of a reading: of white noise one an unknown.
+    pub taken_up: f64,
     /// Root mean square of the weighted residuals over their degrees of freedom, relative to the
     /// first rung's guess of the noise.
     pub noise: f64,
     /// Corrected Akaike criterion.
     pub aicc: f64,
-    /// Schwarz's criterion.
+    /// Schwarz's criterion, for white noise.
     pub bic: f64,
-    /// Generalised cross-validation score.
+    /// Generalised cross-validation score, for white noise.
     pub gcv: f64,
 }
 
@@ -29,23 +32,38 @@ pub fn trial(cells: usize, readings: usize, unknowns: usize, squares: f64) -> Kn
     KnotTrial {
         cells,
         unknowns,
+        taken_up: p,
         noise: (squares / (m - p)).sqrt(),
-        aicc: m * log + 2.0 * p * m / (m - p - 1.0),
+        aicc: aicc(m, p, log),
         bic: m * log + p * m.ln(),
         gcv: m * squares / (m - p).powi(2),
     }
 }
 
-/// What the ladder says.
-pub struct Chosen {
-    /// The best number of cells.
-    pub cells: usize,
-    /// Its rungs.
-    pub table: Vec<KnotTrial>,
-    /// The linear fit of the best of them, where normal equations tell.
-    pub linear: Option<LinearStep>,
-    /// The forms there and on finer knots, where there are.
-    pub forms: Option<FinerForms>,
+impl KnotTrial {
+    /// The same of noise of which the forms take up so much more than one variance an unknown.
+    #[must_use]
+    pub fn taking_up(self, readings: usize, more: f64) -> Self {
+        let (m, p) = (readings as f64, self.unknowns as f64);
+        let squares = self.noise * self.noise * (m - p);
+        let log = (squares / m).max(f64::MIN_POSITIVE).ln();
+        let taken_up = p + more;
+        Self {
+            taken_up,
+            aicc: aicc(m, taken_up, log),
+            ..self
+        }
+    }
+}
+
+/// Of m readings of which a fit takes up so much noise; infinite where it takes up as much as there is.
+fn aicc(m: f64, taken_up: f64, log_mean_square: f64) -> f64 {
+    let left = m - taken_up - 1.0;
+    if left > 0.0 {
+        m * log_mean_square + 2.0 * taken_up * m / left
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// The steps of band and border from where a fit begins to the minimum of its linear model.
@@ -66,8 +84,10 @@ pub(super) struct RungFit {
 
 /// The rungs that were tried.
 #[derive(Debug)]
-pub(super) struct Climbed {
-    pub(super) table: Vec<KnotTrial>,
+pub struct Climbed {
+    readings: usize,
+    /// The rungs that were tried.
+    pub table: Vec<KnotTrial>,
     /// The place of the best.
     pub(super) best: usize,
     /// By rung.
@@ -80,9 +100,11 @@ pub(super) struct Climbed {
     pub(super) finer: Option<Curves>,
 }
 
-impl Default for Climbed {
-    fn default() -> Self {
+impl Climbed {
+    /// No rung as yet, of so many readings.
+    pub(super) fn of(readings: usize) -> Self {
         Self {
+            readings,
             table: Vec::new(),
             best: 0,
             fits: Vec::new(),
@@ -91,18 +113,10 @@ impl Default for Climbed {
             finer: None,
         }
     }
-}
 
-impl Climbed {
-    pub(super) fn add(
-        &mut self,
-        trial: KnotTrial,
-        readings: usize,
-        squares: Squares,
-        fit: RungFit,
-    ) {
+    pub(super) fn add(&mut self, trial: KnotTrial, squares: Squares, fit: RungFit) {
         // m ln RSS moves by m δ/RSS.
-        let doubt = readings as f64 * squares.rounding / squares.left;
+        let doubt = self.readings as f64 * squares.rounding / squares.left;
         let is_best = match self.table.get(self.best) {
             None => true,
             Some(best) => {
@@ -122,7 +136,8 @@ impl Climbed {
         self.fits.push(fit);
     }
 
-    pub(super) fn cells(&self) -> usize {
+    /// The best number of cells.
+    pub fn cells(&self) -> usize {
         self.table.get(self.best).map_or(1, |t| t.cells)
     }
 
@@ -132,29 +147,45 @@ impl Climbed {
         after.into_iter().any(|t| t.cells >= cells)
     }
 
-    /// The best rung and what stands beside it.
-    /// The choice; `x` are positions of a channel in ascending order, mm.
-    pub(super) fn chosen(self, x: &[f64]) -> Chosen {
+    /// Takes the best rung under noise of these waves, where the criterion chose for white noise; says whether it is another one.
+    pub fn choose_under(&mut self, forms: usize, waves: &NoiseOfWaves) -> bool {
+        let before = self.best;
+        if self.least() != Some(before) {
+            return false;
+        }
+        for trial in &mut self.table {
+            *trial = trial.taking_up(self.readings, forms as f64 * waves.more(trial.cells));
+        }
+        self.best = self.least().unwrap_or(before);
+        if self.best < before && self.on_cells(TIMES * self.cells()) {
+            self.finer = None;
+        }
+        self.best != before
+    }
+
+    /// The place of the least criterion.
+    fn least(&self) -> Option<usize> {
+        let places = 0..self.table.len();
+        places.min_by(|a, b| self.table[*a].aicc.total_cmp(&self.table[*b].aicc))
+    }
+
+    /// The step to the minimum of the linear fit on the best rung, where normal equations tell.
+    pub fn linear(&mut self) -> Option<LinearStep> {
+        self.fits.get_mut(self.best)?.linear.take()
+    }
+
+    /// The forms on the best rung, on finer and on coarser ones; `x` are positions of a channel in ascending order, mm.
+    pub fn forms(&self, x: &[f64]) -> Option<FinerForms> {
         let cells = self.cells();
-        let (mut taken, mut linear, mut finer) = (None, None, self.finer);
-        let mut ladder = Vec::new();
-        for (place, (rung, fit)) in self.table.iter().zip(self.fits).enumerate() {
-            if place < self.best {
-                ladder.push(fit.curves);
-            } else if place == self.best {
-                (taken, linear) = (Some(fit.curves), fit.linear);
-            } else if finer.is_none() && rung.cells >= TIMES * cells {
-                finer = Some(fit.curves);
+        let mut finer = self.finer.clone();
+        let after = self.table.iter().zip(&self.fits).skip(self.best + 1);
+        for (rung, fit) in after {
+            if finer.is_none() && rung.cells >= TIMES * cells {
+                finer = Some(fit.curves.clone());
             }
         }
-        let forms = taken
-            .zip(finer)
-            .map(|(taken, finer)| FinerForms::new(taken, finer, ladder, x));
-        Chosen {
-            cells,
-            table: self.table,
-            linear,
-            forms,
-        }
+        let ladder = self.fits[..self.best].iter().map(|fit| fit.curves.clone());
+        let taken = self.fits.get(self.best)?.curves.clone();
+        Some(FinerForms::new(taken, finer?, ladder.collect(), x))
     }
 }

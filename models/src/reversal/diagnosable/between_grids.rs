@@ -16,7 +16,7 @@ use crate::reversal::straight_line;
 
 /// Distance of a channel's positions from the centres of the cells, in parts of a cell, root mean square, up to
 /// which the channels are read at the same places.
-const ALIKE: f64 = 0.05;
+pub(super) const ALIKE: f64 = 0.05;
 /// What the line from all centres misses, of what lines from half of them miss: of forms that the centres follow it is a
 /// sixteenth (a cubic's error goes with the fourth power of the distance), of forms that they do not all.
 const OF_HALVES: f64 = 0.5;

@@ -122,6 +122,15 @@ impl Carrier<'_> {
         predicted.map_err(|why| NotDiagnosable::NoFit(why.to_string()))
     }
 
+    /// Whether the model clearly misses more than the noise.
+    pub fn disagrees(&self) -> bool {
+        let agreement = match self {
+            Self::Four(fit) => fit.agreement,
+            Self::Design(fit) => fit.agreement,
+        };
+        agreement.disagree == Some(true)
+    }
+
     /// Reading less model, µm.
     pub fn residuals(&self) -> &[f64] {
         match self {

@@ -18,6 +18,7 @@ use super::between_grids;
 use super::carrier::{Carrier, Route};
 use super::edges::{by_cell, drop_short, edges_of_all, edges_to_fill, spread_of_ends};
 use super::filling::{self, Lane};
+use super::missed::{Carrying, Missed, are_apart};
 use super::sorting::{TraceKey, trace_key};
 use super::{Assumptions, NotDiagnosable};
 use crate::reversal::Direction;
@@ -153,16 +154,41 @@ pub(super) fn gather(
     let names = observations.design.channels();
     let width = (edges[cells] - edges[0]) / cells as f64;
     let routes = routes(&members, readings, &centres, names);
-    let fit = fit.refined(observations, assumptions, most_cells(traces.len()), &routes);
+    let carrying = Carrying {
+        observations,
+        arrangement,
+        assumptions,
+        most: most_cells(traces.len()),
+        routes: &routes,
+        centres: &centres,
+    };
+    let fit = carrying.refined(fit);
+    let apart = between_grids::ALIKE * width;
+    let (fit, missed) = if !on_one_grid && are_apart(&members, readings, &centres, apart) {
+        carrying.beside_misfit(fit, &members)
+    } else {
+        (fit, Missed::default())
+    };
     let residuals = fit.residuals();
     let told = fit.told();
     let from = centres.partition_point(|x| *x < told[0]);
     let to = centres.partition_point(|x| *x <= told[1]).max(from);
     // Where forms are smooth the fit's cells are long. Readings of one grid are carried nowhere.
-    let (from, to) = if !on_one_grid && (to - from) as f64 >= KEPT * cells as f64 {
+    let enough = |from: usize, to: usize| to as f64 - from as f64 >= KEPT * cells as f64;
+    let (from, to) = if !on_one_grid && enough(from, to) {
         (from, to)
     } else {
         (0, cells)
+    };
+    let [first, last] = are_beyond(&members, readings, &centres, width);
+    let inner = (
+        from.max(usize::from(first)),
+        to.min(cells - usize::from(last)),
+    );
+    let (from, to) = if !on_one_grid && enough(inner.0, inner.1) {
+        inner
+    } else {
+        (from, to)
     };
     let (centres, sums, cells) = (&centres[from..to], &sums[from..to], to - from);
     for (_, inside) in &mut members {
@@ -181,7 +207,8 @@ pub(super) fn gather(
         let (channel, repeat, backward) = *key;
         let times = times_of(inside, readings);
         for (k, own) in inside.iter().enumerate() {
-            let there = fit.predict(channel, &names[channel].name, centres[k])?;
+            let there = fit.predict(channel, &names[channel].name, centres[k])?
+                + missed.at(channel, centres[k]);
             made.push(DesignReading {
                 channel,
                 repeat,
@@ -271,6 +298,30 @@ fn are_repeated(
     })
 }
 
+/// Whether the centre of the first cell, and of the last, lies beyond all readings of a channel. What the model misses
+/// goes into the forms there, as none of the others is against it.
+fn are_beyond(
+    members: &[(TraceKey, Vec<&[usize]>)],
+    readings: &[DesignReading],
+    centres: &[f64],
+    width: f64,
+) -> [bool; 2] {
+    let beyond = |cell: usize, sign: f64| {
+        let mut nearest: BTreeMap<usize, f64> = BTreeMap::new();
+        for ((channel, _, _), inside) in members {
+            for k in inside[cell] {
+                let inwards = sign * (readings[*k].x - centres[cell]);
+                let own = nearest.entry(*channel).or_insert(inwards);
+                *own = own.min(inwards);
+            }
+        }
+        nearest
+            .values()
+            .any(|inwards| *inwards > between_grids::ALIKE * width)
+    };
+    [beyond(0, 1.0), beyond(centres.len() - 1, -1.0)]
+}
+
 /// From where each channel's readings in a cell are carried.
 fn routes(
     members: &[(TraceKey, Vec<&[usize]>)],
@@ -300,7 +351,7 @@ fn routes(
 }
 
 /// The mean over rows, where there are any.
-fn mean(rows: &[usize], value: impl Fn(usize) -> f64) -> Option<f64> {
+pub(super) fn mean(rows: &[usize], value: impl Fn(usize) -> f64) -> Option<f64> {
     let sum: f64 = rows.iter().map(|k| value(*k)).sum();
     (!rows.is_empty()).then(|| sum / rows.len() as f64)
 }

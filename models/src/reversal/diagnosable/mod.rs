@@ -23,6 +23,7 @@ mod gathering;
 mod heights;
 mod laid;
 mod means;
+mod missed;
 mod sorting;
 mod state;
 

@@ -17,6 +17,9 @@ use super::traces::{self, Group};
 use super::{Seat, rms};
 use crate::noise::{Posterior, WithinCells, WithoutLines};
 
+/// Fewest cells on which passes at positions of their own are held against each other.
+const FEWEST_CELLS: usize = 8;
+
 /// A trace of each channel and direction on its cells, and what is left of its readings there, in weighted units.
 struct Passes {
     groups: Vec<Group>,
@@ -25,18 +28,25 @@ struct Passes {
 
 impl Passes {
     fn of(survey: &Survey, residuals: &[Vec<f64>], weights: &[f64]) -> Self {
-        let of_channel = |c: usize| {
-            let groups = traces::of_directions(c, survey.x[c], &survey.traces[c]);
-            let each = groups.into_iter().map(|group| {
-                let means = survey.cell_means(&group, 0, residuals);
-                let left = means.into_iter().map(|mean| weights[c] * mean);
-                (group, left.collect())
-            });
-            each.collect::<Vec<(Group, Vec<f64>)>>()
-        };
+        let of_channel =
+            |c: usize| traces::of_directions(c, survey.x[c], &survey.traces[c]).into_par_iter();
         let channels = (0..survey.channels()).into_par_iter();
-        let (groups, left) = channels.flat_map_iter(of_channel).unzip();
-        Self { groups, left }
+        let mut groups: Vec<Group> = channels.flat_map(of_channel).collect();
+        if groups.windows(2).any(|g| g[0].positions != g[1].positions) {
+            let shared = traces::on_shared_cells(&survey.x, &survey.traces, FEWEST_CELLS);
+            if !shared.is_empty() {
+                groups = shared;
+            }
+        }
+        let left = groups.par_iter().map(|group| {
+            let means = survey.cell_means(group, 0, residuals);
+            let left = means.into_iter().map(|mean| weights[group.channel] * mean);
+            left.collect()
+        });
+        Self {
+            left: left.collect(),
+            groups,
+        }
     }
 
     /// The pass of a channel in one direction.

@@ -120,13 +120,9 @@ pub fn grouped(x: &[&[f64]], traces: &[Vec<Trace>]) -> Vec<Group> {
 
 /// The groups of one channel: of either direction in which it was read.
 pub fn of_directions(channel: usize, x: &[f64], traces: &[Trace]) -> Vec<Group> {
-    let groups = [false, true].into_iter().filter_map(|backward| {
-        let own: Vec<usize> = (0..traces.len())
-            .filter(|t| traces[*t].backward == backward && traces[*t].len() > 0)
-            .collect();
-        (!own.is_empty()).then(|| group(channel, x, traces, own))
-    });
-    groups.collect()
+    let groups = [false, true]
+        .map(|backward| Some(group(channel, x, traces, in_direction(traces, backward)?)));
+    groups.into_iter().flatten().collect()
 }
 
 /// All traces of a channel, in whatever direction, on common cells.
@@ -142,11 +138,73 @@ pub fn groups_of_channels(x: &[&[f64]], traces: &[Vec<Trace>]) -> Vec<Group> {
     all.map(|c| of_channel(c, x[c], &traces[c])).collect()
 }
 
+/// The groups of all channels and directions on cells that all of them share, at positions that they have in common: as many as
+/// leave none empty; empty where not so many as `fewest` do.
+pub fn on_shared_cells(x: &[&[f64]], traces: &[Vec<Trace>], fewest: usize) -> Vec<Group> {
+    let ends = x.iter().filter_map(|x| Some((*x.first()?, *x.last()?)));
+    let (low, high) = ends.fold((f64::NEG_INFINITY, f64::INFINITY), |(l, h), (a, b)| {
+        (l.max(a), h.min(b))
+    });
+    let lengths = traces.iter().flatten().map(Trace::len);
+    let shortest = lengths.filter(|n| *n > 0).min().unwrap_or(0);
+    let mut count = (shortest / 2).min(MOST_CELLS);
+    while count >= fewest.max(1) && low < high {
+        let edges = even_edges([low, high], count);
+        let of_channel = |(c, (x, traces)): (usize, (&&[f64], &Vec<Trace>))| {
+            [false, true].map(|backward| {
+                let own = in_direction(traces, backward)?;
+                Some(on_edges(c, x, traces, own, &edges))
+            })
+        };
+        let channels = x.iter().zip(traces).enumerate();
+        let found = channels.flat_map(of_channel).flatten();
+        let mut groups: Vec<Group> = found.collect();
+        let filled = |group: &Group| group.on_cells.iter().all(|t| t.cells.len() == count);
+        if groups.iter().all(filled) {
+            let mean = |k: usize| {
+                let sum: f64 = groups.iter().map(|g| g.positions[k]).sum();
+                sum / groups.len() as f64
+            };
+            let positions: Vec<f64> = (0..count).map(mean).collect();
+            for group in &mut groups {
+                group.positions.clone_from(&positions);
+            }
+            return groups;
+        }
+        count = count * 3 / 4;
+    }
+    Vec::new()
+}
+
+/// The traces of a channel in one direction, if there are any.
+fn in_direction(traces: &[Trace], backward: bool) -> Option<Vec<usize>> {
+    let own: Vec<usize> = (0..traces.len())
+        .filter(|t| traces[*t].backward == backward && traces[*t].len() > 0)
+        .collect();
+    (!own.is_empty()).then_some(own)
+}
+
 fn group(c: usize, x: &[f64], traces: &[Trace], own: Vec<usize>) -> Group {
     let longest = own.iter().map(|t| traces[*t].len()).max().unwrap_or(0);
+    let positions = |t: &usize| {
+        let trace = &traces[*t];
+        (0..trace.len()).map(|k| x[trace.row(k)])
+    };
+    let edges =
+        shared_positions(longest, own.iter().flat_map(positions)).unwrap_or_else(|| {
+            match (x.first(), x.last()) {
+                (Some(first), Some(last)) => {
+                    even_edges([*first, *last], (longest / 2).clamp(1, MOST_CELLS))
+                }
+                _ => Vec::new(),
+            }
+        });
+    on_edges(c, x, traces, own, &edges)
+}
+
+/// Traces on cells with these left ends.
+fn on_edges(c: usize, x: &[f64], traces: &[Trace], own: Vec<usize>, edges: &[f64]) -> Group {
     let x_of = |t: usize| (0..traces[t].len()).map(move |k| x[traces[t].row(k)]);
-    let edges = shared_positions(longest, own.iter().flat_map(|t| x_of(*t)))
-        .unwrap_or_else(|| even_edges(x, longest));
     // The last edge at or below a position; positions grow along a trace.
     let cell_of = |x: f64, before: usize| {
         let beyond = edges[before..].iter().skip(1).position(|e| *e > x);
@@ -173,7 +231,7 @@ fn group(c: usize, x: &[f64], traces: &[Trace], own: Vec<usize>) -> Group {
         .collect();
     let positions = sums
         .iter()
-        .zip(&edges)
+        .zip(edges)
         .map(|((sum, count), edge)| if *count > 0.0 { sum / count } else { *edge })
         .collect();
     Group {
@@ -195,12 +253,8 @@ fn shared_positions(longest: usize, x: impl Iterator<Item = f64>) -> Option<Vec<
     (all.len() as f64 <= (1.0 + LEFT_OUT) * longest as f64).then_some(all)
 }
 
-/// Left ends of even cells of two readings or more of the longest trace.
-fn even_edges(x: &[f64], longest: usize) -> Vec<f64> {
-    let count = (longest / 2).clamp(1, MOST_CELLS);
-    let (Some(first), Some(last)) = (x.first(), x.last()) else {
-        return Vec::new();
-    };
+/// Left ends of so many even cells.
+fn even_edges([first, last]: [f64; 2], count: usize) -> Vec<f64> {
     let width = (last - first) / count as f64;
     (0..count).map(|k| first + k as f64 * width).collect()
 }

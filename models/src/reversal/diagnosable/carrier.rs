@@ -7,7 +7,7 @@ use super::{Assumptions, NotDiagnosable};
 use crate::reversal::designs::{
     self, DesignFit, DesignObservations, DesignOptions, DesignReading, Zero,
 };
-use crate::reversal::simultaneous::knots::trial;
+use crate::reversal::simultaneous::knots::{NoiseOfWaves, trial};
 use crate::reversal::simultaneous::{self, Knots, Noise, Options, Simultaneous, Thickness};
 use crate::reversal::{Channel, Observations, Reading};
 
@@ -68,18 +68,15 @@ impl Carrier<'_> {
             Self::Four(fit) if fit.effects.is_empty() => {
                 let coarsest = (positions_a_channel(observations) / POSITIONS_A_CELL).min(most);
                 let observations = as_four(observations);
+                let waves = fit.knots.waves;
                 let first = if cells_of(&fit) > coarsest.max(1) {
                     let coarser = fit_four(&observations, assumptions, Knots::Cells(coarsest));
                     coarser.map_or(*fit, Cow::Owned)
                 } else {
                     *fit
                 };
-                Self::Four(Box::new(finer(
-                    first,
-                    &observations,
-                    assumptions,
-                    (most, routes),
-                )))
+                let refined = finer(first, &observations, assumptions, (most, routes), waves);
+                Self::Four(Box::new(refined))
             }
             other => other,
         }
@@ -146,6 +143,7 @@ fn finer<'a>(
     observations: &Observations,
     assumptions: Assumptions,
     (most, routes): (usize, &[Route]),
+    waves: Option<NoiseOfWaves>,
 ) -> Cow<'a, Simultaneous> {
     let mut best = first;
     loop {
@@ -156,7 +154,7 @@ fn finer<'a>(
         let Ok(finer) = fit_four(observations, assumptions, Knots::Cells(cells)) else {
             return best;
         };
-        let better = criterion(&finer) < criterion(&best) && carries(&finer, routes);
+        let better = criterion(&finer, waves) < criterion(&best, waves) && carries(&finer, routes);
         if cells_of(&finer) <= cells_of(&best) || !better {
             return best;
         }
@@ -184,12 +182,14 @@ fn cells_of(fit: &Simultaneous) -> usize {
     fit.knots.breaks.len().saturating_sub(1).max(1)
 }
 
-/// The corrected Akaike criterion, as the number of knots is chosen by.
-fn criterion(fit: &Simultaneous) -> f64 {
+/// The corrected Akaike criterion, as the number of knots is chosen by: for white noise, or by its waves.
+fn criterion(fit: &Simultaneous, waves: Option<NoiseOfWaves>) -> f64 {
     let squares: f64 = fit.residuals.iter().map(|r| r * r).sum();
     let readings = fit.residuals.len();
     let unknowns = (readings as f64 - fit.degrees_of_freedom).round() as usize;
-    trial(cells_of(fit), readings, unknowns, squares).aicc
+    let own = trial(cells_of(fit), readings, unknowns, squares);
+    let more = waves.map(|w| fit.form_count() as f64 * w.more(own.cells));
+    more.map_or(own, |more| own.taking_up(readings, more)).aicc
 }
 
 /// Whether a fit carries what the traces of a channel have in common no less surely than these tell it.

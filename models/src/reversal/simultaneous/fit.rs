@@ -122,16 +122,19 @@ fn solve(
         let Some(law) = solution.scatter.correlated() else {
             break;
         };
-        let moved = (survey.pass())
-            .map(|(step, readings)| NoiseOfWaves::new(law, step, readings))
-            .is_some_and(|waves| ground.choose_under(&mut breaks, effects, &waves));
-        if !moved {
+        let Some((step, readings)) = survey.pass() else {
+            break;
+        };
+        let waves = NoiseOfWaves::new(law, step, readings);
+        solution.knots.waves = Some(waves);
+        if !ground.choose_under(&mut breaks, effects, &waves) {
             break;
         }
         match solve_on(&mut breaks, ground, survey, sigmas.clone(), effects) {
             Ok(better) => solution = better,
             Err(_) => break,
         }
+        solution.knots.waves = Some(waves);
     }
     Ok(solution)
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::knots::KnotTrial;
+use super::knots::{KnotTrial, NoiseOfWaves};
 use crate::reversal::channel_noise::white::Told;
 
 /// Whether there are enough knots.
@@ -30,6 +30,8 @@ pub struct FittedKnots {
     pub neighbour_z: f64,
     /// What it says.
     pub verdict: KnotVerdict,
+    /// The noise by which they were chosen, where its neighbours go together.
+    pub(in crate::reversal) waves: Option<NoiseOfWaves>,
 }
 
 /// Correlation of neighbours beyond this many standard deviations is told.
@@ -73,6 +75,7 @@ impl FittedKnots {
             neighbour_correlation: correlation,
             neighbour_z: z,
             verdict,
+            waves: None,
         }
     }
 

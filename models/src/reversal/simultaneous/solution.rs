@@ -286,6 +286,11 @@ impl Simultaneous {
         }
     }
 
+    /// Number of fitted forms.
+    pub(in crate::reversal) fn form_count(&self) -> usize {
+        self.unknowns.forms.len()
+    }
+
     /// The slope of a channel's trace, rad; `None` for a channel that was not read.
     pub fn slope(&self, channel: Channel) -> Option<f64> {
         let c = self.channels().iter().position(|k| *k == channel)?;

@@ -8,6 +8,9 @@ use super::trace::Trace;
 use crate::noise::{Law, Posterior, WithinCells, WithoutLines, decays, markov_form};
 use crate::reversal::channel_noise::traces::MOST_CELLS;
 
+/// Readings of a channel in a cell, at least, where channels are read at positions of their own.
+const READINGS_A_CELL: usize = 2;
+
 /// Adds to the covariance of the channels' slopes what correlated noise adds to that of white noise, `slopes` (variances,
 /// (µm/mm)²), and of drifts, and gives its law for the mean of a channel's traces; nothing where it is likelier to be white. `closure`: the profile
 /// (R1A + R1B − R2A − R2B)/4 at the positions of all traces, µm.
@@ -18,10 +21,18 @@ pub(super) fn add(
     slopes: &[f64],
 ) -> Option<Law> {
     let as_often = |t: &Trace| t.count.iter().all(|n| *n == traces[0].count[0]);
-    if !traces.iter().all(|t| t.x == x && as_often(t)) {
+    if !traces.iter().all(as_often) {
         return None;
     }
-    let each = x.len().div_ceil(MOST_CELLS);
+    let fewest = traces.iter().map(|t| t.x.len()).min().filter(|n| *n > 0)?;
+    let alike = traces.iter().all(|t| t.x == x);
+    // Between positions of a channel's own the profile is interpolated: what neighbours say beside means of several is not theirs.
+    let each = match alike {
+        true => x.len().div_ceil(MOST_CELLS),
+        false => (READINGS_A_CELL * x.len())
+            .div_ceil(fewest)
+            .max(x.len().div_ceil(MOST_CELLS)),
+    };
     let (mut within, mut places, mut means) = (WithinCells::default(), Vec::new(), Vec::new());
     for (x, closure) in x.chunks(each).zip(closure.chunks(each)) {
         let values = closure.iter().map(|c| 2.0 * c);
@@ -32,7 +43,9 @@ pub(super) fn add(
     }
     let mut values = WithoutLines::default();
     values.add(&places, means);
-    let posterior = Posterior::of(&values).filter(|p| p.may_be_noise(&within))?;
+    let posterior = Posterior::of(&values)
+        .filter(|p| p.may_be_noise(&within) && (alike || p.is_correlated()))?;
+    let readings = each as f64 * fewest as f64 / x.len() as f64;
     let x = places;
     let middle = x.iter().sum::<f64>() / x.len() as f64;
     let spread: f64 = x.iter().map(|x| (x - middle).powi(2)).sum();
@@ -48,5 +61,12 @@ pub(super) fn add(
         drifts.covariance[(c, c)] = own.max(variance - white);
     }
     drifts.freedom = drifts.freedom.min(freedom);
-    Some(within.law(&posterior))
+    if alike {
+        return Some(within.law(&posterior));
+    }
+    let means = posterior.mean();
+    Some(Law {
+        white: readings * means.white,
+        ..means
+    })
 }

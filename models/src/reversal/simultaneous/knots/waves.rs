@@ -8,7 +8,7 @@
 use crate::noise::Law;
 
 /// The noise of one pass over the travel, by its waves.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseOfWaves {
     law: Law,
     step: f64,

@@ -78,7 +78,7 @@ impl Carrying<'_> {
         members: &Members,
     ) -> (Carrier<'f>, Missed) {
         let n = self.centres.len();
-        let inner = ENDS..n.saturating_sub(ENDS).max(ENDS);
+        let inner = ENDS.min(n)..n.saturating_sub(ENDS).max(ENDS.min(n));
         let mut missed = Missed {
             centres: self.centres[inner.clone()].to_vec(),
             found: Vec::new(),

@@ -79,7 +79,7 @@ fn fit_on(
     ground.finest = finest;
     let mut minimum = minimum_on(breaks(&ground, &survey, None)?, &ground, &survey, &sigmas)?;
     for _ in 0..MOST_CHOICES {
-        let Some(better) = minimum.chosen_again(&ground, &survey, &sigmas)? else {
+        let Some(better) = minimum.chosen_again(&ground, &survey, &sigmas) else {
             break;
         };
         minimum = better;
@@ -166,20 +166,17 @@ impl Minimum<'_> {
         ground: &'g Ground,
         survey: &Survey,
         sigmas: &[f64],
-    ) -> Result<Option<Minimum<'g>>, DesignFitError> {
-        let chosen = matches!(ground.options.knots, Knots::Chosen);
-        let law = self.told.scatter.correlated();
-        let (true, None, Some(law), Some((step, readings))) =
-            (chosen, self.knots.refuted(), law, survey.pass())
-        else {
-            return Ok(None);
-        };
-        let waves = NoiseOfWaves::new(law, step, readings);
-        let chosen = breaks(ground, survey, Some(waves))?;
-        if chosen.breaks == self.breaks {
-            return Ok(None);
+    ) -> Option<Minimum<'g>> {
+        if !matches!(ground.options.knots, Knots::Chosen) || self.knots.refuted().is_some() {
+            return None;
         }
-        Ok(minimum_on(chosen, ground, survey, sigmas).ok())
+        let (step, readings) = survey.pass()?;
+        let waves = NoiseOfWaves::new(self.told.scatter.correlated()?, step, readings);
+        let chosen = breaks(ground, survey, Some(waves)).ok()?;
+        if chosen.breaks == self.breaks {
+            return None;
+        }
+        minimum_on(chosen, ground, survey, sigmas).ok()
     }
 }
 

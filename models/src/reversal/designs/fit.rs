@@ -171,9 +171,11 @@ impl Minimum<'_> {
             return None;
         }
         let (step, readings) = survey.pass()?;
-        let waves = NoiseOfWaves::new(self.told.scatter.correlated()?, step, readings);
+        let waves = NoiseOfWaves::new(self.told.scatter.correlated()?, step, readings)
+            .in_weights(&self.problem.weights, &ground.weights);
         let chosen = breaks(ground, survey, Some(waves)).ok()?;
-        if chosen.breaks == self.breaks {
+        // No finer: what the model misses would be taken up.
+        if chosen.breaks == self.breaks || chosen.common.len() > self.knots.breaks.len() {
             return None;
         }
         minimum_on(chosen, ground, survey, sigmas).ok()

@@ -30,7 +30,7 @@ pub(super) struct Ground<'a> {
     axis: Axis,
     body: Body,
     /// First weights, 1/σ by channel.
-    weights: Vec<f64>,
+    pub weights: Vec<f64>,
     /// How fine knots that are chosen may be.
     pub finest: Finest,
 }

@@ -211,11 +211,11 @@ impl<'g, 'a> Rungs<'g, 'a> {
                 bases: problem.splines.bases.clone(),
             };
             let own = trial(most, readings, count, squares);
-            let more = |w: NoiseOfWaves| cells.iter().map(|c| w.more(*c)).sum();
-            let own = match self.waves.map(more) {
-                Some(more) => own.taking_up(readings, more),
-                None => own,
+            let under = |waves: NoiseOfWaves| {
+                let more = cells.iter().map(|c| waves.more(*c)).sum();
+                own.taking_up(readings, more, waves.variance())
             };
+            let own = self.waves.map_or(own, under);
             (own, curves)
         }))
     }

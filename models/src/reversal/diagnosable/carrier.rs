@@ -68,7 +68,9 @@ impl Carrier<'_> {
             Self::Four(fit) if fit.effects.is_empty() => {
                 let coarsest = (positions_a_channel(observations) / POSITIONS_A_CELL).min(most);
                 let observations = as_four(observations);
-                let waves = fit.knots.waves;
+                // What the model misses would be taken up by finer forms as long as it counts more than the noise.
+                let agrees = fit.agreement.disagree != Some(true);
+                let waves = fit.knots.waves.filter(|_| agrees);
                 let first = if cells_of(&fit) > coarsest.max(1) {
                     let coarser = fit_four(&observations, assumptions, Knots::Cells(coarsest));
                     coarser.map_or(*fit, Cow::Owned)
@@ -188,8 +190,11 @@ fn criterion(fit: &Simultaneous, waves: Option<NoiseOfWaves>) -> f64 {
     let readings = fit.residuals.len();
     let unknowns = (readings as f64 - fit.degrees_of_freedom).round() as usize;
     let own = trial(cells_of(fit), readings, unknowns, squares);
-    let more = waves.map(|w| fit.form_count() as f64 * w.more(own.cells));
-    more.map_or(own, |more| own.taking_up(readings, more)).aicc
+    let under = |waves: NoiseOfWaves| {
+        let more = fit.form_count() as f64 * waves.more(own.cells);
+        own.taking_up(readings, more, waves.variance())
+    };
+    waves.map_or(own, under).aicc
 }
 
 /// Whether a fit carries what the traces of a channel have in common no less surely than these tell it.

@@ -163,8 +163,11 @@ pub(super) fn gather(
         centres: &centres,
     };
     let fit = carrying.refined(fit);
+    // Traces of a channel that were read at places of their own tell what is between those of one.
+    let repeated = are_repeated(&members, readings, width);
     let apart = between_grids::ALIKE * width;
-    let (fit, missed) = if !on_one_grid && are_apart(&members, readings, &centres, apart) {
+    let apart = repeated && are_apart(&members, readings, &centres, apart);
+    let (fit, missed) = if apart && !on_one_grid {
         carrying.beside_misfit(fit, &members)
     } else {
         (fit, Missed::default())
@@ -257,7 +260,7 @@ pub(super) fn gather(
         lacking,
         scatter: between_grids::variance(&lanes, &closures),
         ends: ends.map(|spread| spread.min(width)),
-        repeated: are_repeated(&members, readings, width),
+        repeated,
         gauge: StraightLine::carried(&positions, centres),
         halves,
         offsets,

@@ -92,15 +92,16 @@ impl Carrying<'_> {
             }
             let residuals = fit.residuals();
             let of = |channel: usize| {
-                let mut sum = DVector::zeros(missed.centres.len());
-                let mut traces = 0.0;
-                for (_, inside) in members.iter().filter(|(key, _)| key.0 == channel) {
-                    for (sum, own) in sum.iter_mut().zip(&inside[inner.clone()]) {
-                        *sum += mean(own, |k| residuals[k]).unwrap_or(0.0);
-                    }
-                    traces += 1.0;
-                }
-                smoother.smooth(&(sum / f64::max(traces, 1.0)))
+                let own: Vec<_> = members.iter().filter(|(key, _)| key.0 == channel).collect();
+                // What is in single traces alone goes with none of the others.
+                let usual = inner.clone().map(|cell| {
+                    let left = own.iter().map(|(_, inside)| inside[cell]);
+                    let mut left: Vec<f64> = left
+                        .filter_map(|rows| mean(rows, |k| residuals[k]))
+                        .collect();
+                    median(&mut left)
+                });
+                smoother.smooth(&DVector::from_iterator(inner.len(), usual))
             };
             let channels = 0..self.observations.design.channels().len();
             missed.found.push(channels.map(of).collect());
@@ -118,6 +119,16 @@ impl Carrying<'_> {
 
     fn finer<'f>(&self, fit: Carrier<'f>, observations: &DesignObservations) -> Carrier<'f> {
         fit.refined(observations, self.assumptions, self.most, self.routes)
+    }
+}
+
+/// The median of values; zero of none.
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    match n {
+        0 => 0.0,
+        _ => 0.5 * (values[(n - 1) / 2] + values[n / 2]),
     }
 }
 

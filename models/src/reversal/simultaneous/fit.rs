@@ -126,15 +126,17 @@ fn solve(
             break;
         };
         let waves = NoiseOfWaves::new(law, step, readings);
-        solution.knots.waves = Some(waves);
-        if !ground.choose_under(&mut breaks, effects, &waves) {
+        let waves_um = waves.in_weights(&solution.weights, &vec![1.0; solution.weights.len()]);
+        solution.knots.waves = Some(waves_um);
+        let at_first = waves.in_weights(&solution.weights, &ground.weights);
+        if !ground.choose_under(&mut breaks, effects, &at_first) {
             break;
         }
         match solve_on(&mut breaks, ground, survey, sigmas.clone(), effects) {
             Ok(better) => solution = better,
             Err(_) => break,
         }
-        solution.knots.waves = Some(waves);
+        solution.knots.waves = Some(waves_um);
     }
     Ok(solution)
 }

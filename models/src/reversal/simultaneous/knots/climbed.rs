@@ -34,33 +34,34 @@ pub fn trial(cells: usize, readings: usize, unknowns: usize, squares: f64) -> Kn
         unknowns,
         taken_up: p,
         noise: (squares / (m - p)).sqrt(),
-        aicc: aicc(m, p, log),
+        aicc: m * log + 2.0 * p * m / (m - p - 1.0),
         bic: m * log + p * m.ln(),
         gcv: m * squares / (m - p).powi(2),
     }
 }
 
 impl KnotTrial {
-    /// The same of noise of which the forms take up so much more than one variance an unknown.
+    /// The same of noise of a known variance, in the unit of the weighted squares, of which the forms take up so much more than
+    /// one an unknown: −2 ln L and the penalty.
     #[must_use]
-    pub fn taking_up(self, readings: usize, more: f64) -> Self {
+    pub fn taking_up(self, readings: usize, more: f64, variance: f64) -> Self {
         let (m, p) = (readings as f64, self.unknowns as f64);
         let squares = self.noise * self.noise * (m - p);
-        let log = (squares / m).max(f64::MIN_POSITIVE).ln();
         let taken_up = p + more;
+        let variance = variance.max(f64::MIN_POSITIVE);
         Self {
             taken_up,
-            aicc: aicc(m, taken_up, log),
+            aicc: m * (variance.ln() - 1.0) + squares / variance + penalty(m, taken_up),
             ..self
         }
     }
 }
 
-/// Of m readings of which a fit takes up so much noise; infinite where it takes up as much as there is.
-fn aicc(m: f64, taken_up: f64, log_mean_square: f64) -> f64 {
+/// Of m readings of which a fit takes up so much noise, corrected; infinite where it takes up as much as there is.
+fn penalty(m: f64, taken_up: f64) -> f64 {
     let left = m - taken_up - 1.0;
     if left > 0.0 {
-        m * log_mean_square + 2.0 * taken_up * m / left
+        2.0 * taken_up * m / left
     } else {
         f64::INFINITY
     }
@@ -92,6 +93,8 @@ pub struct Climbed {
     pub(super) best: usize,
     /// By rung.
     pub(super) fits: Vec<RungFit>,
+    /// The place of the best for white noise, once knots are chosen by the law of the noise.
+    for_white: Option<usize>,
     /// By how much the criterion of the best may be off.
     doubt: f64,
     /// Whether rounding has decided nothing.
@@ -108,6 +111,7 @@ impl Climbed {
             table: Vec::new(),
             best: 0,
             fits: Vec::new(),
+            for_white: None,
             doubt: 0.0,
             clear: true,
             finer: None,
@@ -150,22 +154,27 @@ impl Climbed {
     /// Takes the best rung under noise of these waves, where the criterion chose for white noise; says whether it is another one.
     pub fn choose_under(&mut self, forms: usize, waves: &NoiseOfWaves) -> bool {
         let before = self.best;
-        if self.least() != Some(before) {
-            return false;
-        }
+        let white = match self.for_white {
+            Some(white) => white,
+            None if self.least(self.table.len()) == Some(before) => before,
+            None => return false,
+        };
+        self.for_white = Some(white);
         for trial in &mut self.table {
-            *trial = trial.taking_up(self.readings, forms as f64 * waves.more(trial.cells));
+            let more = forms as f64 * waves.more(trial.cells);
+            *trial = trial.taking_up(self.readings, more, waves.variance());
         }
-        self.best = self.least().unwrap_or(before);
+        // No finer: what the model misses would be taken up.
+        self.best = self.least(white + 1).unwrap_or(before);
         if self.best < before && self.on_cells(TIMES * self.cells()) {
             self.finer = None;
         }
         self.best != before
     }
 
-    /// The place of the least criterion.
-    fn least(&self) -> Option<usize> {
-        let places = 0..self.table.len();
+    /// The place of the least criterion of the first rungs.
+    fn least(&self, rungs: usize) -> Option<usize> {
+        let places = 0..rungs.min(self.table.len());
         places.min_by(|a, b| self.table[*a].aicc.total_cmp(&self.table[*b].aicc))
     }
 

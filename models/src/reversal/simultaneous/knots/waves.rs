@@ -3,7 +3,8 @@
 //! A linear fit with the hat matrix H predicts readings of covariance V and mean variance v with an error that its residuals
 //! tell but for 2 tr HV: the penalty of the criterion is 2 tr HV/v in place of two an unknown (Altman, J. Am. Stat. Assoc. 85,
 //! 1990, for kernels). A spline on K cells follows about the first K + 2 half waves over the travel; each of them takes up the
-//! variance of the noise in it, and all of them more than K + 1 where neighbours go together.
+//! variance of the noise in it, and all of them more than K + 1 where neighbours go together. The variance is that of the law,
+//! not what the fit leaves: what the model misses would make that great, and fine forms dear.
 
 use crate::noise::Law;
 
@@ -22,6 +23,22 @@ impl NoiseOfWaves {
             law,
             step,
             readings,
+        }
+    }
+
+    /// Variance of a reading.
+    pub fn variance(&self) -> f64 {
+        self.law.of_readings()
+    }
+
+    /// Of a law in units of readings by some weights (by channel), the same by other weights.
+    #[must_use]
+    pub fn in_weights(self, weights: &[f64], other: &[f64]) -> Self {
+        let squares = weights.iter().zip(other).map(|(w, o)| (o / w).powi(2));
+        let factor = squares.sum::<f64>() / weights.len().max(1) as f64;
+        Self {
+            law: self.law.times(factor),
+            ..self
         }
     }
 

@@ -5,6 +5,7 @@
 //! left along each channel is smoothed over the cells, and the forms are fitted once more to the readings without it.
 
 use nalgebra::DVector;
+use statrs::statistics::{Data, OrderStatistics};
 
 use super::Assumptions;
 use super::arrangement::Arrangement;
@@ -96,10 +97,8 @@ impl Carrying<'_> {
                 // What is in single traces alone goes with none of the others.
                 let usual = inner.clone().map(|cell| {
                     let left = own.iter().map(|(_, inside)| inside[cell]);
-                    let mut left: Vec<f64> = left
-                        .filter_map(|rows| mean(rows, |k| residuals[k]))
-                        .collect();
-                    median(&mut left)
+                    let left = left.filter_map(|rows| mean(rows, |k| residuals[k]));
+                    Data::new(left.collect::<Vec<f64>>()).median()
                 });
                 smoother.smooth(&DVector::from_iterator(inner.len(), usual))
             };
@@ -119,16 +118,6 @@ impl Carrying<'_> {
 
     fn finer<'f>(&self, fit: Carrier<'f>, observations: &DesignObservations) -> Carrier<'f> {
         fit.refined(observations, self.assumptions, self.most, self.routes)
-    }
-}
-
-/// The median of values; zero of none.
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    match n {
-        0 => 0.0,
-        _ => 0.5 * (values[(n - 1) / 2] + values[n / 2]),
     }
 }
 

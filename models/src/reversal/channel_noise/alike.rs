@@ -68,8 +68,8 @@ impl Survey<'_> {
         .collect()
     }
 
-    /// The readings of every channel less the heights by which the repeats of one direction differ, or both passes where nothing
-    /// is repeated and these are zeroed anew; their mean is left. `None` where there is neither.
+    /// The readings of every channel less the heights by which the repeats of one direction differ, or all passes where these
+    /// are zeroed anew; their mean is left. `None` where there is neither.
     pub fn levelled(&self) -> Option<Levelled> {
         let zeroed = self.passes_are_zeroed();
         let both = || traces::groups_of_channels(&self.x, &self.traces);

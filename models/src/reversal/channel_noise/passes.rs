@@ -1,4 +1,4 @@
-//! One pass each way, nothing repeated in a direction: whether the indicators were set to zero anew between the passes.
+//! Passes each way: whether the indicators were set to zero anew between them.
 //!
 //! A play of an indicator, or a slide that leans to its other side, parts the two passes by the same in all channels of an
 //! indicator; a drift parts them by about what it adds along a pass, and an indicator that jumps parts those of one
@@ -13,7 +13,7 @@ const DIFFERENT: f64 = 1.0;
 /// The same that one indicator's must reach, in the scatter and in what it drifts along a pass.
 const APART: f64 = 3.0;
 
-/// The two passes of a channel.
+/// The two passes of a channel, or the means of those each way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BothWays {
     /// Which indicator reads the channel.
@@ -28,8 +28,8 @@ pub struct BothWays {
 
 impl BothWays {
     /// From places ξ, −1 to 1 over the travel, and by how much the backward pass lies above the forward one there, µm.
-    /// `None` for fewer than four of them.
-    pub fn of(indicator: usize, differences: &[(f64, f64)]) -> Option<Self> {
+    /// Each is that of the means of as many `repeats` each way. `None` for fewer than four of them.
+    pub fn of(indicator: usize, repeats: f64, differences: &[(f64, f64)]) -> Option<Self> {
         let n = differences.len() as f64;
         if differences.len() < 4 {
             return None;
@@ -45,12 +45,12 @@ impl BothWays {
         let left = differences
             .iter()
             .map(|(x, d)| (d - above - slope * (x - xi)).powi(2));
-        // A difference has the noise of two readings. Along a drift of a forward pass a backward one runs down again.
+        // A difference of single readings has the noise of two. Along a drift of a forward pass a backward one runs down again.
         Some(Self {
             indicator,
             above,
             drift: -slope,
-            scatter: (left.sum::<f64>() / (2.0 * (n - 2.0))).sqrt(),
+            scatter: (repeats * left.sum::<f64>() / (2.0 * (n - 2.0))).sqrt(),
         })
     }
 }
@@ -98,7 +98,7 @@ mod tests {
             let scatter = if k.is_multiple_of(2) { 0.1 } else { -0.1 };
             (xi, above - drift * xi + scatter)
         };
-        BothWays::of(indicator, &(0..40).map(at).collect::<Vec<_>>()).unwrap()
+        BothWays::of(indicator, 1.0, &(0..40).map(at).collect::<Vec<_>>()).unwrap()
     }
 
     fn zeroed(channels: [(usize, f64, f64); 4]) -> bool {

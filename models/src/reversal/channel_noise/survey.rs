@@ -48,35 +48,40 @@ impl<'a> Survey<'a> {
         }
     }
 
-    /// Whether nothing is repeated, but read once each way, and every pass zeroed anew.
+    /// Whether the zeros are set anew between passes each way.
     pub fn passes_are_zeroed(&self) -> bool {
-        self.repeats.is_empty() && passes::are_zeroed(&self.both_ways())
+        passes::are_zeroed(&self.both_ways())
     }
 
-    /// The passes of the channels that have two, one each way.
+    /// The passes of the channels that were read each way.
     fn both_ways(&self) -> Vec<BothWays> {
         let of = |c: usize| {
             let (x, traces) = (self.x[c], &self.traces[c]);
             let group = traces::of_channel(c, x, traces);
-            let [first, second] = group.traces[..] else {
-                return None;
-            };
-            let (backward, forward) = match [first, second].map(|t| traces[t].backward) {
-                [true, false] => (0, 1),
-                [false, true] => (1, 0),
-                _ => return None,
-            };
-            let means = group.means(traces, x, self.values[c]);
             let (low, high) = (group.positions.first()?, group.positions.last()?);
-            let mut below = vec![None; group.positions.len()];
-            for (cell, mean) in &means[forward] {
-                below[*cell] = Some(*mean);
+            // By direction and cell: the sum of the traces' means, and how many.
+            let mut sums = [false, true].map(|_| vec![(0.0, 0.0); group.positions.len()]);
+            let means = group.means(traces, x, self.values[c]);
+            for (t, own) in group.traces.iter().zip(&means) {
+                let sums = &mut sums[usize::from(traces[*t].backward)];
+                for (cell, mean) in own {
+                    sums[*cell].0 += mean;
+                    sums[*cell].1 += 1.0;
+                }
             }
-            let both = means[backward].iter().filter_map(|(cell, mean)| {
-                let along = (group.positions[*cell] - low) / (high - low);
-                Some((2.0 * along - 1.0, mean - below[*cell]?))
+            let [forward, backward] = &sums;
+            let both = || {
+                let cells = forward.iter().zip(backward).zip(&group.positions);
+                cells.filter(|((f, b), _)| f.1 > 0.0 && b.1 > 0.0)
+            };
+            // A difference of means over m and n has 1/m + 1/n of a reading's variance.
+            let parts: f64 = both().map(|((f, b), _)| 0.5 / f.1 + 0.5 / b.1).sum();
+            let repeats = both().count() as f64 / parts;
+            let differences = both().map(|((f, b), x)| {
+                let along = (x - low) / (high - low);
+                (2.0 * along - 1.0, b.0 / b.1 - f.0 / f.1)
             });
-            BothWays::of(self.indicator(c), &both.collect::<Vec<_>>())
+            BothWays::of(self.indicator(c), repeats, &differences.collect::<Vec<_>>())
         };
         (0..self.channels()).filter_map(of).collect()
     }

@@ -19,6 +19,7 @@ use super::carrier::{Carrier, Route};
 use super::edges::{by_cell, drop_short, edges_of_all, edges_to_fill, spread_of_ends};
 use super::filling::{self, Lane};
 use super::missed::{Carrying, Missed, are_apart};
+use super::reach;
 use super::sorting::{TraceKey, trace_key};
 use super::{Assumptions, NotDiagnosable};
 use crate::reversal::Direction;
@@ -142,7 +143,11 @@ pub(super) fn gather(
     let mut members: Vec<(TraceKey, Vec<&[usize]>)> = (traces.iter())
         .map(|(key, rows)| (*key, by_cell(rows, readings, &edges)))
         .collect();
-    let cells = edges.len() - 1;
+    let mut widths: Vec<f64> = edges.windows(2).map(|own| own[1] - own[0]).collect();
+    if !on_one_grid {
+        reach::leave_out_gaps(&mut members, readings, &mut widths);
+    }
+    let cells = widths.len();
     let mut sums = vec![(0.0, 0.0); cells];
     for (_, inside) in &members {
         for (sum, own) in sums.iter_mut().zip(inside) {
@@ -152,7 +157,7 @@ pub(super) fn gather(
     }
     let centres: Vec<f64> = sums.iter().map(|(sum, count)| sum / count).collect();
     let names = observations.design.channels();
-    let width = (edges[cells] - edges[0]) / cells as f64;
+    let width = widths.iter().sum::<f64>() / cells as f64;
     let routes = routes(&members, readings, &centres, names);
     let carrying = Carrying {
         observations,
@@ -183,7 +188,7 @@ pub(super) fn gather(
     } else {
         (0, cells)
     };
-    let [first, last] = are_beyond(&members, readings, &centres, width);
+    let [first, last] = reach::are_beyond(&members, readings, &centres, width);
     let inner = (
         from.max(usize::from(first)),
         to.min(cells - usize::from(last)),
@@ -299,30 +304,6 @@ fn are_repeated(
             })
         })
     })
-}
-
-/// Whether the centre of the first cell, and of the last, lies beyond all readings of a channel. What the model misses
-/// goes into the forms there, as none of the others is against it.
-fn are_beyond(
-    members: &[(TraceKey, Vec<&[usize]>)],
-    readings: &[DesignReading],
-    centres: &[f64],
-    width: f64,
-) -> [bool; 2] {
-    let beyond = |cell: usize, sign: f64| {
-        let mut nearest: BTreeMap<usize, f64> = BTreeMap::new();
-        for ((channel, _, _), inside) in members {
-            for k in inside[cell] {
-                let inwards = sign * (readings[*k].x - centres[cell]);
-                let own = nearest.entry(*channel).or_insert(inwards);
-                *own = own.min(inwards);
-            }
-        }
-        nearest
-            .values()
-            .any(|inwards| *inwards > between_grids::ALIKE * width)
-    };
-    [beyond(0, 1.0), beyond(centres.len() - 1, -1.0)]
 }
 
 /// From where each channel's readings in a cell are carried.

@@ -23,11 +23,10 @@ pub(super) struct Heights {
 impl Heights {
     /// The heights of readings, where they are to be free.
     pub fn of(sorted: &Sorted, seats: &[Seat]) -> Option<Self> {
-        let repeated = repeated(sorted);
-        let by_pass = match repeated.is_empty() {
-            true => are_zeroed(&both_ways(sorted, seats)).then_some(true),
-            false => are_free(&repeated, &courses(sorted, seats)),
-        }?;
+        let by_pass = match are_zeroed(&both_ways(sorted, seats)) {
+            true => true,
+            false => are_free(&repeated(sorted), &courses(sorted, seats))?,
+        };
         Some(Self::free(&sorted.places, &sorted.traces, by_pass))
     }
 
@@ -181,28 +180,36 @@ fn courses(sorted: &Sorted, seats: &[Seat]) -> Vec<Course> {
     channels.into_iter().map(in_order).collect()
 }
 
-/// The passes of the channels that have two, one each way.
+/// The passes of the channels that were read each way.
 fn both_ways(sorted: &Sorted, seats: &[Seat]) -> Vec<BothWays> {
     let (Some(low), Some(high)) = (sorted.positions.first(), sorted.positions.last()) else {
         return Vec::new();
     };
-    let mut channels: BTreeMap<usize, Vec<&Range<usize>>> = BTreeMap::new();
+    let mut channels: BTreeMap<usize, [Vec<&Range<usize>>; 2]> = BTreeMap::new();
     for (trace, channel) in sorted.traces.iter().zip(&sorted.trace_channels) {
-        channels.entry(*channel).or_default().push(trace);
+        let back = sorted.places[trace.start].direction < 0.0;
+        channels.entry(*channel).or_default()[usize::from(back)].push(trace);
     }
-    let of = |(channel, traces): (usize, Vec<&Range<usize>>)| {
-        let is_back = |t: &Range<usize>| sorted.places[t.start].direction < 0.0;
-        let (forward, backward) = match traces[..] {
-            [a, b] if is_back(b) && !is_back(a) => (a, b),
-            [a, b] if is_back(a) && !is_back(b) => (b, a),
-            _ => return None,
+    let of = |(channel, [forward, backward]): (usize, [Vec<&Range<usize>>; 2])| {
+        let (m, n) = (forward.len() as f64, backward.len() as f64);
+        if m * n == 0.0 {
+            return None;
+        }
+        let mean = |traces: &[&Range<usize>], k: usize| {
+            let sum: f64 = traces.iter().map(|t| sorted.values[t.start + k]).sum();
+            sum / traces.len() as f64
         };
-        let pairs = forward.clone().zip(backward.clone());
-        let differences = pairs.zip(&sorted.positions).map(|((f, b), x)| {
+        let differences = sorted.positions.iter().enumerate().map(|(k, x)| {
             let along = (x - low) / (high - low);
-            (2.0 * along - 1.0, sorted.values[b] - sorted.values[f])
+            (2.0 * along - 1.0, mean(&backward, k) - mean(&forward, k))
         });
-        BothWays::of(seats[channel].indicator, &differences.collect::<Vec<_>>())
+        // A difference of means over m and n has 1/m + 1/n of a reading's variance.
+        let repeats = 2.0 * m * n / (m + n);
+        BothWays::of(
+            seats[channel].indicator,
+            repeats,
+            &differences.collect::<Vec<_>>(),
+        )
     };
     channels.into_iter().filter_map(of).collect()
 }

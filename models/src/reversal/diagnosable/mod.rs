@@ -24,6 +24,7 @@ mod heights;
 mod laid;
 mod means;
 mod missed;
+mod reach;
 mod sorting;
 mod state;
 

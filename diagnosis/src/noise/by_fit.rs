@@ -24,6 +24,8 @@ pub(crate) struct ByFit {
     pub residual: Residual,
     /// The readings at the position of each reading.
     together: Vec<Vec<usize>>,
+    /// Standard deviation of a height from rounding alone.
+    least: f64,
 }
 
 impl ByFit {
@@ -38,6 +40,7 @@ impl ByFit {
             piles,
             residual,
             together: together.collect(),
+            least: model.rounding(),
         }
     }
 
@@ -61,7 +64,7 @@ impl ByFit {
         for _ in 0..ROUNDS {
             let residual = (self.residual.of)(readings);
             let heights = self.heights(&residual);
-            let Some(edge) = limit.or_else(|| edge(&heights)) else {
+            let Some(edge) = limit.or_else(|| edge(&heights, self.least)) else {
                 return 0;
             };
             limit = Some(edge);

@@ -54,8 +54,9 @@ pub(crate) fn over_neighbours(away: Vec<f64>) -> Heights {
     (away, near)
 }
 
-/// How high a spike may stand: by the median of all heights; none where there are no heights.
-pub(crate) fn edge(heights: &[Vec<Heights>]) -> Option<f64> {
+/// How high a spike may stand: by the median of all heights, which are `least` at least, as where readings are rounded so that most
+/// repeats are the same; none where there are no heights.
+pub(crate) fn edge(heights: &[Vec<Heights>], least: f64) -> Option<f64> {
     let all = heights.iter().flatten().flat_map(|(_, near)| near);
     let mut sizes: Vec<f64> = all.map(|h| h.abs()).collect();
     if sizes.is_empty() {
@@ -63,7 +64,7 @@ pub(crate) fn edge(heights: &[Vec<Heights>]) -> Option<f64> {
     }
     let middle = sizes.len() / 2;
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(SPIKE * SIGMA * *median)
+    Some(SPIKE * (SIGMA * *median).max(least))
 }
 
 /// The standard deviation of normal numbers over the median of their absolute values.

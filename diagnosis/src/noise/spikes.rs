@@ -65,6 +65,8 @@ pub(crate) struct Residual {
 pub(crate) struct Spikes {
     piles: Vec<Pile>,
     by_fit: Option<ByFit>,
+    /// Standard deviation of the difference of two readings from their rounding alone.
+    least: f64,
 }
 
 /// Readings with single spikes pulled in.
@@ -102,6 +104,7 @@ impl Spikes {
             return Self {
                 piles: Vec::new(),
                 by_fit: None,
+                least: 0.0,
             };
         }
         let mut piles = Vec::new();
@@ -128,7 +131,11 @@ impl Spikes {
             .partition(|p| p.traces.len() >= SPIKE_REPEATS);
         piles.extend(enough);
         let by_fit = (!few.is_empty()).then(|| ByFit::new(model, few, residual()));
-        Self { piles, by_fit }
+        Self {
+            piles,
+            by_fit,
+            least: 2f64.sqrt() * model.rounding(),
+        }
     }
 
     /// The readings with their spikes pulled in, and the law of heavy tails if they have them.
@@ -203,7 +210,7 @@ impl Spikes {
         let by_fit = self.by_fit.as_ref().filter(|_| self.piles.is_empty());
         let independent = by_fit.map_or(heights.len(), |by_fit| by_fit.residual.freedom);
         heights.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let middle = heights[heights.len() / 2].0;
+        let middle = heights[heights.len() / 2].0.max(self.least / SIGMA);
         // Steps and bumps are no tails.
         let usual = |(size, alone): &(f64, bool)| *alone || *size <= 3.0 * SIGMA * middle;
         let sizes: Vec<f64> = heights.into_iter().filter(usual).map(|h| h.0).collect();
@@ -233,7 +240,7 @@ impl Spikes {
     /// a step it stands out of one side only, and in a bump the nearer neighbours have their part.
     fn pull_in_by_repeats(&self, readings: &mut DVector<f64>) -> usize {
         let heights: Vec<Vec<Heights>> = self.piles.iter().map(|p| p.heights(readings)).collect();
-        let Some(edge) = edge(&heights) else {
+        let Some(edge) = edge(&heights, self.least) else {
             return 0;
         };
         let mut pulled = Vec::new();

@@ -112,6 +112,12 @@ impl Record {
     }
 }
 
+/// The greatest of what readings were computed to and what they were rounded to, by their decimals, as a standard deviation.
+pub(crate) fn rounding_of(readings: &DVector<f64>) -> f64 {
+    let read_to = decimal_step(readings.iter().copied()).unwrap_or(0.0);
+    (ROUNDING * readings.amax()).max(read_to / 12f64.sqrt())
+}
+
 /// The power of ten of which all readings are whole multiples: what they were rounded to. `None` where they have more
 /// decimals than anybody reads.
 pub(crate) fn decimal_step(readings: impl Iterator<Item = f64> + Clone) -> Option<f64> {
@@ -320,8 +326,7 @@ pub trait FittedModel: Clone + Send + Sync {
     /// 1e-12 of the greatest reading, unless they are small differences of greater numbers, or the standard deviation of
     /// rounding to the decimals that they have (GUM F.2.2.1).
     fn rounding(&self) -> f64 {
-        let read_to = decimal_step(self.observed().iter().copied()).unwrap_or(0.0);
-        (ROUNDING * self.observed().amax()).max(read_to / 12f64.sqrt())
+        rounding_of(self.observed())
     }
 
     /// Standard deviation of one reading where the user states it.

@@ -9,7 +9,7 @@ use super::arrangement::Seat;
 use super::heights;
 use super::state::Smoothing;
 use crate::model::{
-    Column, Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record,
+    Column, Effect, FittedModel, Freedom, Pattern, Profile, Profiles, Quantity, Record, rounding_of,
 };
 use crate::reversal::designs::{Determined, SLOPES, Zero};
 use crate::reversal::effects;
@@ -193,6 +193,12 @@ impl FittedModel for Linearised {
 
     fn expected_scatter(&self) -> &[Column] {
         &self.scatter
+    }
+
+    fn rounding(&self) -> f64 {
+        let steps = self.rounding.iter().map(|own| own.step);
+        let coarse = (steps.fold(0.0, f64::max).powi(2) / (12.0 * self.readings_in_each())).sqrt();
+        coarse.max(rounding_of(&self.record.observed))
     }
 
     fn refit(&self, observed: DVector<f64>) -> Self {

@@ -25,11 +25,13 @@ mod laid;
 mod means;
 mod missed;
 mod reach;
+mod rounded;
 mod sorting;
 mod state;
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::DVector;
@@ -46,6 +48,7 @@ use carrier::Carrier;
 pub use gathering::Gathered;
 use heights::Heights;
 pub(in crate::reversal) use laid::Laid;
+pub use rounded::Rounding;
 use sorting::Sorted;
 use state::ChannelLine;
 
@@ -128,6 +131,8 @@ pub struct Linearised {
     heights: Option<Heights>,
     /// The greatest of them, µm.
     pub levelled_um: Option<f64>,
+    /// Channels of which repeats are off by the same as their readings were rounded.
+    pub rounding: Vec<Rounding>,
 }
 
 impl Linearised {
@@ -204,9 +209,10 @@ impl Linearised {
         let traces = gathering::traces_of(observations);
         let shared = sorting::shared(observations, traces.len());
         let positions: Vec<usize> = arrangement.seats().iter().map(|s| s.position).collect();
+        let steps = rounded::steps(&observations.readings, positions.len());
         if !gathering::is_needed(traces.len(), shared.len(), observations.readings.len()) {
             let sorted = Sorted::new(observations, &positions, &shared);
-            return Self::sorted(sorted, arrangement, assumptions, None);
+            return Self::sorted(sorted, arrangement, assumptions, None, &steps);
         }
         let fit = match fit {
             Some(fit) => fit,
@@ -220,13 +226,14 @@ impl Linearised {
         };
         let (sorted, gathered) = gather(observations, traces.clone(), fit)?;
         let Some(heights) = free_heights(&sorted, &arrangement) else {
-            return Self::sorted(sorted, arrangement, assumptions, Some(gathered));
+            return Self::sorted(sorted, arrangement, assumptions, Some(gathered), &steps);
         };
         // Whether finer forms carry the readings better shows beside heights least of all.
         let (level, greatest) = heights.taken_from(observations, &sorted);
         let fit = Carrier::new(&level, &arrangement, assumptions)?;
         let (sorted, gathered) = gather(&level, traces, fit)?;
-        let model = Self::sorted(sorted, arrangement, assumptions, Some(gathered))?;
+        // Where in its step a reading stood goes with the height that was taken from it.
+        let model = Self::sorted(sorted, arrangement, assumptions, Some(gathered), &[])?;
         Ok(model.with_heights(heights, greatest))
     }
 
@@ -235,6 +242,7 @@ impl Linearised {
         arrangement: Arrangement,
         assumptions: Assumptions,
         gathered: Option<Gathered>,
+        steps: &[Option<f64>],
     ) -> Result<Self, NotDiagnosable> {
         if sorted.positions.len() < FEWEST_POSITIONS {
             return Err(NotDiagnosable::RangesDiffer);
@@ -270,6 +278,8 @@ impl Linearised {
             |gathered| gathered.gauge.clone(),
         );
         let heights = free_heights(&sorted, &arrangement);
+        let in_each = (gathered.as_ref()).map_or(1.0, |gathered| gathered.readings_per_cell);
+        let rounding = rounded::found(&sorted, steps, in_each);
         let values = sorted.values;
         let model = Self {
             span: 1.0,
@@ -295,12 +305,23 @@ impl Linearised {
             scatter: scatter.into(),
             heights: None,
             levelled_um: None,
+            rounding,
         };
         let observed = DVector::from_vec(values);
-        Ok(match heights {
-            None => model.refit(observed),
-            Some(heights) => model.refit(observed).with_heights(heights, 0.0),
-        })
+        let mut model = match heights {
+            None => model.refit(observed.clone()),
+            Some(heights) => model.refit(observed.clone()).with_heights(heights, 0.0),
+        };
+        if !model.rounding.is_empty() {
+            let level = |trace: &Range<usize>| {
+                let above = trace.clone().map(|k| observed[k] - model.cell_reading(k));
+                above.sum::<f64>() / trace.len() as f64
+            };
+            let levels: Vec<f64> = model.record.traces.iter().map(level).collect();
+            let columns = model.scatter_of_rounding(&model.rounding, &levels);
+            model.scatter = model.scatter.iter().cloned().chain(columns).collect();
+        }
+        Ok(model)
     }
 
     /// The same model with the heights of its repeats as unknowns, of which `greatest` (µm) has been taken out already.

@@ -316,6 +316,14 @@ pub fn notes(model: &Linearised) -> Vec<String> {
             "{filled} readings that single traces lack at places which the others have were put in, by what the traces of their channel have in common; they bring nothing of their own, so the noise is told greater than the repeats show it, and uncertainties with it."
         ));
     }
+    if let Some(rounding) = model.rounded_to() {
+        notes.push(format!(
+            "Readings are rounded to {} µm, more coarsely than they scatter ({} µm before): repeats have an error of {} µm of it in common, which is no gap.",
+            number::plain(rounding.step, 3),
+            number::plain(rounding.noise, 2),
+            number::plain(rounding.std(), 2)
+        ));
+    }
     if let Some(greatest) = model.levelled_um {
         notes.push(format!(
             "The traces of a channel differ in height, by up to {} µm from their mean, as where an indicator is set to zero before each of them; their heights are unknowns of the fit, the gap is what is left beside them, and what shows in heights alone is not seen.",

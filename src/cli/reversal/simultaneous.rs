@@ -7,7 +7,7 @@ use errsep_models::reversal::simultaneous::{
     Simultaneous, Thickness, With,
 };
 use errsep_models::reversal::staged::Value as Measured;
-use errsep_models::reversal::{Channel, Contrast, Observations};
+use errsep_models::reversal::{Channel, Contrast, Observations, Rounding};
 use errsep_models::uncertainty::DegreesOfFreedom;
 
 use super::effects;
@@ -325,6 +325,17 @@ pub(super) fn levelled(greatest_um: f64) -> String {
     )
 }
 
+/// That readings are rounded more coarsely than they scatter.
+pub(super) fn rounded(rounding: Rounding) -> String {
+    format!(
+        "readings are rounded to {} µm, more coarsely than they scatter ({} µm before): repeats have an error of {} µm of it in common, which \
+         no repeating takes away and the uncertainties count",
+        number::plain(rounding.step, 3),
+        number::plain(rounding.noise, 2),
+        number::plain(rounding.std(), 2)
+    )
+}
+
 /// That the heights of repeats are unknowns beside effects.
 fn heights_beside(greatest_um: f64) -> String {
     format!(
@@ -341,6 +352,7 @@ fn warnings(fit: &Simultaneous, closure: Option<&Closure>, setup: &ReversalSetup
         heights_beside
     };
     let mut warnings: Vec<String> = fit.levelled_um.map(heights).into_iter().collect();
+    warnings.extend(fit.rounding().map(rounded));
     if fit.agreement.disagree == Some(true) && fit.agreement.missed > 0.0 {
         warnings.push(noise::disagreement(fit.agreement.missed));
     }

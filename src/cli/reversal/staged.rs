@@ -83,7 +83,7 @@ fn outcome(s: Staged, setup: &ReversalSetup) -> Outcome {
         degrees_of_freedom: s.residual.degrees_of_freedom as f64,
         noise_law: None,
         noise_freedom: freedom(s.slope_freedom),
-        form_freedom: freedom(s.noise.degrees_of_freedom),
+        form_freedom: freedom(s.of_mean.degrees_of_freedom),
         disagree: profile_exceeds_noise(&s),
         missed: 0.0,
         method_errors: method_errors(&s),
@@ -237,8 +237,8 @@ fn profile_exceeds_noise(s: &Staged) -> Option<bool> {
     match s.noise.source {
         NoiseSource::Declared | NoiseSource::Repeats => {
             // Few positions scatter: by chance the closure of seven exceeds the share once in twenty.
-            let clear = s.noise.exceeded_by(closing).is_some();
-            Some(clear && closing.sigma > EXCESS * s.noise.sigma)
+            let clear = s.of_mean.exceeded_by(closing).is_some();
+            Some(clear && closing.sigma > EXCESS * s.of_mean.sigma)
         }
         NoiseSource::Closure => {
             let neighbours = noise_by(s, NoiseSource::Neighbours).filter(|_| s.one_grid)?;
@@ -256,6 +256,7 @@ fn warnings(s: &Staged, setup: &ReversalSetup) -> Vec<String> {
     let mut warnings: Vec<String> = (s.levelled_um.map(super::simultaneous::levelled))
         .into_iter()
         .collect();
+    warnings.extend(s.rounding.map(super::simultaneous::rounded));
     if !s.one_grid {
         warnings.push(
             "the traces have different positions: they were interpolated onto the coarsest grid; \

@@ -219,7 +219,8 @@ impl AlongTraces {
     /// clearly, and its degrees of freedom.
     ///
     /// With V the covariance of the noise and H the hat matrix their sum of squares is expected to be
-    /// tr V − tr HV; the last is found by drawn signs, ηᵀHVη.
+    /// tr V − tr HV; the last is found by drawn signs, ηᵀHVη. What repeats have in common of their rounding is no misfit; the fit
+    /// takes up a part of it as of what is independent from place to place.
     fn missed<R>(
         &self,
         fit: &AtRest<R>,
@@ -231,6 +232,8 @@ impl AlongTraces {
         let shared = self.likelier().map(Together::means);
         let (mut squares, mut expected, mut variance) = (0.0, 0.0, 0.0);
         let (mut readings, mut cells) = (0.0, 0.0);
+        let rounding = survey.rounding();
+        let mut rounded = 0.0;
         let mut first = 0;
         for group in groups {
             let traces = &self.gathered.traces[first..first + group.traces.len()];
@@ -281,6 +284,16 @@ impl AlongTraces {
                 Some(both) => 0.5 * both.iter().map(squares_of).sum::<f64>(),
             };
             variance += 2.0 * (count / repeats).powi(2) * of_group;
+            if let Some(rounding) = &rounding[group.channel] {
+                let (waves, rest) = rounding.waves();
+                let weight = fit.weights[group.channel].powi(2);
+                // Of the readings of one trace in a cell each stands elsewhere in its step.
+                let of = |variance: f64| weight * variance * repeats * seen.len() as f64;
+                let waves = waves.iter().map(|wave| of(wave.std * wave.std));
+                rounded += of(rest) + waves.clone().sum::<f64>();
+                // A sine and a cosine of one chance each.
+                variance += waves.map(|wave| wave * wave).sum::<f64>();
+            }
         }
         let unknowns = fit.counts.2 as f64;
         let freedom = cells - unknowns;
@@ -288,6 +301,7 @@ impl AlongTraces {
             return (0.0, 1.0);
         }
         expected -= self.taken_up(fit.covariance, fit.counts, &mean_law);
+        expected += rounded * freedom / cells;
         let known = self.apart.freedom();
         let doubt = (variance + 2.0 / known * expected * expected).sqrt();
         if squares - expected <= CLEAR * doubt {

@@ -14,6 +14,7 @@ pub mod laws;
 pub mod levels;
 pub mod pairs;
 pub mod passes;
+pub mod rounded;
 pub mod scatter;
 pub mod settle;
 pub mod supposed;

@@ -15,6 +15,7 @@ use super::problem::DesignProblem;
 use super::readings::{DesignObservations, Trace};
 use super::solution::{DesignFit, Reached};
 use crate::reversal::channel_noise::along::AtRest;
+use crate::reversal::channel_noise::rounded::Rounded;
 use crate::reversal::channel_noise::settle::{Asked, Settled, settle};
 use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::channel_noise::white::Told;
@@ -257,7 +258,10 @@ fn told(
             layout.free_count(),
         ),
     };
-    Ok(Told::along(&at_rest, survey, &settled.residuals, sigmas)?.unwrap_or(white))
+    let rounded = Rounded::of(&at_rest, survey, &settled.residuals)?;
+    let mut told = Told::along(&at_rest, survey, &settled.residuals, sigmas)?.unwrap_or(white);
+    told.scatter = told.scatter.beside(rounded);
+    Ok(told)
 }
 
 /// The largest difference between an analytic derivative of a residual at the fit and a central

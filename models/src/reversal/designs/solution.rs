@@ -14,6 +14,7 @@ use super::problem::crest::Beside;
 use super::problem::{Body, DesignProblem, Splines};
 use super::readings::{DesignObservations, Trace};
 use crate::basis::bspline::{Cubic, horner};
+use crate::reversal::Rounding;
 use crate::reversal::channel_noise::gathered::Gathered;
 use crate::reversal::channel_noise::scatter::Scatter;
 use crate::reversal::channel_noise::settle::Settled;
@@ -187,6 +188,12 @@ impl DesignFit {
             against_white(&counted, share, length).sqrt()
         };
         Ok(self.slope_order().iter().map(factor).collect())
+    }
+
+    /// How readings were rounded where that is more coarsely than they scatter: the channel of which repeats have most of it in
+    /// common. It is in the uncertainties.
+    pub fn rounding(&self) -> Option<Rounding> {
+        self.scatter.rounding()
     }
 
     fn border_value(&self, j: usize) -> (Value, f64) {

@@ -196,7 +196,7 @@ impl FittedModel for Linearised {
     }
 
     fn rounding(&self) -> f64 {
-        let steps = self.rounding.iter().map(|own| own.step);
+        let steps = self.rounding.iter().map(|(_, own)| own.step);
         let coarse = (steps.fold(0.0, f64::max).powi(2) / (12.0 * self.readings_in_each())).sqrt();
         coarse.max(rounding_of(&self.record.observed))
     }

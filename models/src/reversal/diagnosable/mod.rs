@@ -41,14 +41,13 @@ use super::designs::{DesignFit, DesignObservations, DesignReading, Zero};
 use super::simultaneous::Simultaneous;
 use super::smooth_profile::{SmoothProfile, Smoother};
 use super::straight_line::StraightLine;
-use super::{Convention, Observations};
+use super::{Convention, Observations, Rounding};
 use crate::model::{Column, FittedModel, Place, Record};
 pub use arrangement::{Arrangement, Seat, indicator_name};
 use carrier::Carrier;
 pub use gathering::Gathered;
 use heights::Heights;
 pub(in crate::reversal) use laid::Laid;
-pub use rounded::Rounding;
 use sorting::Sorted;
 use state::ChannelLine;
 
@@ -132,7 +131,7 @@ pub struct Linearised {
     /// The greatest of them, µm.
     pub levelled_um: Option<f64>,
     /// Channels of which repeats are off by the same as their readings were rounded.
-    pub rounding: Vec<Rounding>,
+    pub(super) rounding: Vec<rounded::OfChannel>,
 }
 
 impl Linearised {
@@ -346,6 +345,13 @@ impl Linearised {
             }
             _ => self,
         }
+    }
+
+    /// How readings were rounded where that is more coarsely than they scatter: of the channel of which repeats have most of it in
+    /// common.
+    pub fn rounded_to(&self) -> Option<Rounding> {
+        let all = self.rounding.iter().map(|(_, own)| *own);
+        all.max_by(|a, b| a.std().total_cmp(&b.std()))
     }
 
     /// Positions at which every trace was read, mm.

@@ -26,6 +26,7 @@ use super::solution::{ChannelNoise, Convergence, Simultaneous};
 use super::told;
 use crate::reversal::Observations;
 use crate::reversal::channel_noise::along::AtRest;
+use crate::reversal::channel_noise::rounded::Rounded;
 use crate::reversal::channel_noise::settle::{Asked, Settled, settle};
 use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::channel_noise::white::Told;
@@ -289,15 +290,16 @@ fn learn_law(
         ),
     };
     let residuals = &settled.residuals;
-    let Some(told) = Told::along(&fit, survey, residuals, sigmas)? else {
-        return Ok(());
-    };
-    let freedom = solution.degrees_of_freedom;
-    solution.noise = channel_noise(problem.channels, sigmas, residuals, &told, freedom);
-    solution.noise_origin = told.origin;
-    solution.agreement = told.agreement;
-    solution.knots = solution.knots.clone().under(&told);
-    solution.scatter = told.scatter;
+    let rounded = Rounded::of(&fit, survey, residuals)?;
+    if let Some(told) = Told::along(&fit, survey, residuals, sigmas)? {
+        let freedom = solution.degrees_of_freedom;
+        solution.noise = channel_noise(problem.channels, sigmas, residuals, &told, freedom);
+        solution.noise_origin = told.origin;
+        solution.agreement = told.agreement;
+        solution.knots = solution.knots.clone().under(&told);
+        solution.scatter = told.scatter;
+    }
+    solution.scatter = solution.scatter.clone().beside(rounded);
     Ok(())
 }
 

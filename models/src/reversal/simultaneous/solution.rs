@@ -25,7 +25,7 @@ use crate::reversal::channel_noise::traces;
 use crate::reversal::combinations::determined;
 use crate::reversal::finer_forms::FinerForms;
 use crate::reversal::staged::Value;
-use crate::reversal::{Channel, Combination, Convention, Observations, Reading};
+use crate::reversal::{Channel, Combination, Convention, Observations, Reading, Rounding};
 
 /// A tilt, or a combination of tilts where the channels determine no more.
 #[derive(Debug, Clone, PartialEq)]
@@ -207,6 +207,12 @@ pub struct Simultaneous {
 }
 
 impl Simultaneous {
+    /// How readings were rounded where that is more coarsely than they scatter: the channel of which repeats have most of it in
+    /// common. It is in the uncertainties.
+    pub fn rounding(&self) -> Option<Rounding> {
+        self.scatter.rounding()
+    }
+
     /// The channels that were read.
     pub fn channels(&self) -> &[Channel] {
         &self.unknowns.channels

@@ -32,7 +32,7 @@ pub use trace::Trace;
 
 use super::cells::Union;
 use super::convention::{Contrast, Convention};
-use super::{Channel, Observations};
+use super::{Channel, Observations, Rounding};
 use crate::noise::Law;
 use designs::Designs;
 use estimates::rms;
@@ -188,6 +188,12 @@ pub struct Staged {
     pub noise: Noise,
     /// Every noise figure at hand, the one in use first.
     pub noise_figures: Vec<Noise>,
+    /// How readings were rounded where that is more coarsely than they scatter: the channel of which repeats have most of it in
+    /// common.
+    pub rounding: Option<Rounding>,
+    /// The noise of one reading that makes the means of repeats as far off as they are: its own, and what they have in common of
+    /// their rounding.
+    pub of_mean: Noise,
     /// The law of the noise of the mean of a channel's traces, µm², as the closure tells it, where a part is likelier to be
     /// correlated along a trace than not.
     pub correlated: Option<Law>,
@@ -243,24 +249,26 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
     let closing = (traces.len() == 4).then(|| together.closure(&designs, &joint));
     let noise_figures = noise_figures(options, &traces, closing.as_ref());
     let noise = *noise_figures.first().ok_or(NoSolution::NoReadings)?;
+    let rounding = trace::rounding(observations);
+    let of_mean = noise.beside(rounding.as_ref(), &traces);
     let by_closure = noise_figures
         .iter()
         .find(|n| n.source == NoiseSource::Closure);
     let correlated = match (&closing, by_closure) {
         // A closure that repeats do not explain is no noise.
         (Some((x, profile, _)), Some(told))
-            if noise.source != NoiseSource::Declared && noise.exceeded_by(told).is_none() =>
+            if noise.source != NoiseSource::Declared && of_mean.exceeded_by(told).is_none() =>
         {
-            let white = joint.slopes().diagonal() * noise.sigma.powi(2);
+            let white = joint.slopes().diagonal() * of_mean.sigma.powi(2);
             correlated::add(&mut drifts, &traces, (x, profile), white.as_slice())
         }
         _ => None,
     };
-    let known = noise.degrees_of_freedom.unwrap_or(f64::INFINITY);
+    let known = of_mean.degrees_of_freedom.unwrap_or(f64::INFINITY);
     let sheared = sheared_slopes(&traces, &estimates);
-    let tilts = Tilts::of(&joint, (noise.sigma, known), &drifts, &sheared);
+    let tilts = Tilts::of(&joint, (of_mean.sigma, known), &drifts, &sheared);
     let lines = channel_lines(&traces, fits, estimates, &tilts);
-    let forms = together.forms(&designs, &joint, noise.sigma);
+    let forms = together.forms(&designs, &joint, of_mean.sigma);
     let contrasts = (traces.len() == 4).then(|| contrasts(&tilts));
     let closure = closing
         .zip(contrasts)
@@ -277,7 +285,7 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
                     |(_, v)| *v,
                 ),
                 rms: rms(&profile),
-                expected_rms: noise.sigma * expected.sqrt(),
+                expected_rms: of_mean.sigma * expected.sqrt(),
                 x,
                 profile,
             }
@@ -298,6 +306,8 @@ pub fn solve(observations: &Observations, options: &Options) -> Result<Staged, N
         closure,
         noise,
         noise_figures,
+        rounding,
+        of_mean,
         correlated,
     };
     staged.residual.rms = rms(staged.residuals().iter().flat_map(|(_, r)| r));

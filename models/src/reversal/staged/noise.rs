@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::line::Line;
 use super::trace::Trace;
-use crate::reversal::{Channel, Observations};
+use crate::reversal::{Channel, Observations, Rounding};
 use crate::uncertainty::{DegreesOfFreedom, Disagreement, TOLD_BELOW};
 
 /// Where a noise figure comes from.
@@ -46,6 +46,26 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// What it is where the means at each position are off as far as they are by noise and by what repeats have in common of their
+    /// rounding, `rounding`; that is in a figure from the closure or from neighbours already.
+    pub(super) fn beside(&self, rounding: Option<&Rounding>, traces: &[Trace]) -> Self {
+        let told = matches!(self.source, NoiseSource::Declared | NoiseSource::Repeats);
+        let Some(rounding) = rounding.filter(|_| told) else {
+            return *self;
+        };
+        let places: usize = traces.iter().map(|t| t.count.len()).sum();
+        let readings: f64 = traces.iter().flat_map(|t| &t.count).sum();
+        let repeats = readings / places.max(1) as f64;
+        let sigma = self.sigma.hypot(repeats.sqrt() * rounding.std());
+        // Welch and Satterthwaite: how great the rounding is, is known.
+        let share = (self.sigma / sigma).powi(2);
+        Self {
+            sigma,
+            degrees_of_freedom: self.degrees_of_freedom.map(|own| own / (share * share)),
+            ..*self
+        }
+    }
+
     /// The scatter of another figure where it is clearly larger than this one.
     pub fn exceeded_by(&self, other: &Self) -> Option<Disagreement> {
         let freedom = other.degrees_of_freedom?;

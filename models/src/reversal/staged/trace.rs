@@ -2,7 +2,7 @@
 
 use crate::reversal::channel_noise::survey::Survey;
 use crate::reversal::simultaneous::ChannelReadings;
-use crate::reversal::{Channel, Direction, Observations};
+use crate::reversal::{Channel, Direction, Observations, Rounding};
 
 /// The mean readings of a channel at its positions, in growing order of position.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,6 +115,15 @@ impl Trace {
             _ => (0.0, 0.0),
         }
     }
+}
+
+/// How readings were rounded where that is more coarsely than they scatter: of the channel of which repeats have most of it in
+/// common.
+pub(super) fn rounding(observations: &Observations) -> Option<Rounding> {
+    let channels = ChannelReadings::sort(observations);
+    let survey = Survey::new(&channels, |i| observations.taken(i));
+    let all = survey.rounding().into_iter().flatten();
+    all.max_by(|a, b| a.std().total_cmp(&b.std()))
 }
 
 /// Running mean and sum of squares about it (Welford).

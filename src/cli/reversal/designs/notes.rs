@@ -104,6 +104,10 @@ pub(super) fn warnings(
         fit.levelled_um
             .map(crate::cli::reversal::simultaneous::levelled),
     );
+    warnings.extend(
+        fit.rounding()
+            .map(crate::cli::reversal::simultaneous::rounded),
+    );
     if !data.not_read.is_empty() {
         let names = data.not_read.join(", ");
         warnings.push(format!("channels of the set-up without a reading: {names}"));

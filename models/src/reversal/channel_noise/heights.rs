@@ -4,8 +4,8 @@
 //! scatter. As noise such a shift would be the greatest of all by far and known from a few repeats only, and whatever is
 //! looked for would be looked for beside it. As an unknown of the fit it takes nothing from what a trace shows along itself.
 //! What shows in heights alone, a lost motion between directions or a drift from repeat to repeat, is then not seen; so heights
-//! are left to noise and effects unless nearly all channels have them, and they follow no course. Where nothing is repeated but
-//! read once each way, see [`passes`](super::passes).
+//! are left to noise and effects unless nearly all channels have them, and they follow no course. Where channels are read each way,
+//! see [`passes`](super::passes).
 
 use std::collections::BTreeMap;
 

@@ -9,5 +9,7 @@ mod one_pass;
 mod own_positions;
 mod plan;
 mod refusals;
+mod rounded;
 mod together;
 mod uncertainty;
+mod zeroed;

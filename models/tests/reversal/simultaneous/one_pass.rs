@@ -2,9 +2,9 @@
 
 use errsep_models::basis::bspline::CubicBSpline;
 use errsep_models::noise::Law;
-use errsep_models::reversal::simulate::{Plan, even_grid, simulate};
-use errsep_models::reversal::simultaneous::{Noise, NoiseOrigin, Options, fit};
-use errsep_models::reversal::staged;
+use errsep_models::reversal::simulate::{Plan, Truth, even_grid, simulate};
+use errsep_models::reversal::simultaneous::{Noise, NoiseOrigin, Options, Simultaneous, fit};
+use errsep_models::reversal::staged::{self, Staged};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -22,6 +22,23 @@ const LAW: Law = Law {
     shift: 0.0,
     drift: 0.0,
 };
+
+/// How many of the tilts lie within their 95 % intervals: simultaneous and staged.
+pub fn held(found: &Simultaneous, stages: &Staged, truth: &Truth) -> [usize; 2] {
+    let of_stages = stages.slope_freedom.unwrap_or(f64::INFINITY);
+    let holds = |name: &str, value: f64, std: f64, freedom: f64| {
+        let truth = truths(truth).iter().find(|t| t.0 == name).unwrap().1;
+        let law = StudentsT::new(0.0, 1.0, freedom.min(1e6)).unwrap();
+        (value - truth).abs() < law.inverse_cdf(0.975) * std
+    };
+    let (tilts, of_staged) = (found.tilts(), stages.tilts.iter());
+    let simultaneous = tilts.iter().filter(|tilt| {
+        let (angle, freedom) = (tilt.angle, tilt.degrees_of_freedom);
+        holds(&tilt.name, angle.value, angle.std, freedom)
+    });
+    let staged = of_staged.filter(|t| holds(&t.name, t.angle.value, t.angle.std, of_stages));
+    [simultaneous.count(), staged.count()]
+}
 
 /// How many of the tilts of all seeds lie within their 95 % intervals: simultaneous and staged; and how often the fit tells
 /// correlated noise, and a misfit.
@@ -53,19 +70,8 @@ fn counted_of(
             ..staged::Options::default()
         };
         let stages = staged::solve(&readings, &options).unwrap();
-        let of_stages = stages.slope_freedom.unwrap_or(f64::INFINITY);
-        let mut count = |which: usize, name: &str, value: f64, std: f64, freedom: f64| {
-            let truth = truths(&truth).iter().find(|t| t.0 == name).unwrap().1;
-            let law = StudentsT::new(0.0, 1.0, freedom.min(1e6)).unwrap();
-            inside[which] += usize::from((value - truth).abs() < law.inverse_cdf(0.975) * std);
-        };
-        for tilt in found.tilts() {
-            let (angle, freedom) = (tilt.angle, tilt.degrees_of_freedom);
-            count(0, &tilt.name, angle.value, angle.std, freedom);
-        }
-        for tilt in &stages.tilts {
-            count(1, &tilt.name, tilt.angle.value, tilt.angle.std, of_stages);
-        }
+        let held = held(&found, &stages, &truth);
+        inside = [inside[0] + held[0], inside[1] + held[1]];
     }
     (inside, correlated, disagree)
 }

@@ -231,7 +231,7 @@ fn what_the_model_misses_is_carried_beside_the_forms() {
 }
 
 /// *Simulated truth*: no channel has readings in a sixth of the travel, and each trace has positions of its own. Nothing is carried over the gap, so the
-/// closure of what is carried is noise of its means and what forms of waves down to 30 mm do between places: 1.6 times the noise, root mean square of six
+/// closure of what is carried is noise of its means and what forms of waves of 30 mm and less do between places: 1.6 times the noise, root mean square of six
 /// seeds. Where cells lie over the gap it is 2.4 times.
 #[test]
 fn nothing_is_carried_over_a_gap() {

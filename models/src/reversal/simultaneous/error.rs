@@ -202,7 +202,9 @@ impl ReversalError {
     pub(super) fn is_no_minimum(&self) -> bool {
         matches!(
             self,
-            Self::NotConverged { .. } | Self::EffectsNotConverged { .. }
+            Self::NotConverged { .. }
+                | Self::EffectsNotConverged { .. }
+                | Self::NotDetermined { .. }
         )
     }
 }

@@ -28,7 +28,7 @@ pub const REFUSED: usize = 2;
 pub enum Finest {
     /// As fine as the positions carry.
     Carried,
-    /// Three positions of a channel a cell: where finer ones left a fit without a minimum.
+    /// Three positions of a channel a cell: where finer ones left a fit without a minimum or a tilt open.
     ThreePositions,
 }
 

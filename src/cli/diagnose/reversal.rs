@@ -318,7 +318,7 @@ pub fn notes(model: &Linearised) -> Vec<String> {
     }
     if let Some(rounding) = model.rounded_to() {
         notes.push(format!(
-            "Readings are rounded to {} µm, more coarsely than they scatter ({} µm before): repeats have an error of {} µm of it in common, which is no gap.",
+            "Readings are rounded to {} µm, more coarsely than they scatter (about {} µm before): repeats have an error of {} µm of it in common, which is no gap.",
             number::plain(rounding.step, 3),
             number::plain(rounding.noise, 2),
             number::plain(rounding.std(), 2)

@@ -328,7 +328,7 @@ pub(super) fn levelled(greatest_um: f64) -> String {
 /// That readings are rounded more coarsely than they scatter.
 pub(super) fn rounded(rounding: Rounding) -> String {
     format!(
-        "readings are rounded to {} µm, more coarsely than they scatter ({} µm before): repeats have an error of {} µm of it in common, which \
+        "readings are rounded to {} µm, more coarsely than they scatter (about {} µm before): repeats have an error of {} µm of it in common, which \
          no repeating takes away and the uncertainties count",
         number::plain(rounding.step, 3),
         number::plain(rounding.noise, 2),
